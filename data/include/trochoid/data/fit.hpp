@@ -1,0 +1,82 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace trochoid::data {
+
+/// free: estimated; fixed: given; derived: computed from free ones and priors (with propagated
+/// sigma); prior: free but carried by its prior, the recording says nothing.
+enum class ParameterStatus { free, fixed, derived, prior };
+
+struct FitParameter {
+  std::string name;
+  double value = 0.0;
+  double sigma = 0.0;  ///< standard deviation; 0 if fixed, infinity if not identifiable
+  std::string unit;
+  ParameterStatus status = ParameterStatus::free;
+  bool identifiable = true;
+  std::string note;  ///< e.g. "only the product Is * omega_s is determined"
+};
+
+/// One arc of a track: between release, impacts and rest the motion is smooth.
+struct FitArc {
+  int track = 0;  ///< which track file
+  int object = 0;
+  double from_s = 0.0;
+  double to_s = 0.0;
+  int samples = 0;
+};
+
+/// A direction of parameter space the data do not see.
+struct NullVector {
+  std::map<std::string, double> components;  ///< parameter name -> weight (scaled, unit length)
+  std::string words;
+};
+
+/// A rung of the ladder that was tried.
+struct ModelScore {
+  std::string model;
+  double chi2 = 0.0, aicc = 0.0, bic = 0.0;
+  double whiteness_p = 0.0;       ///< p-value of the residuals being white
+  double held_back_rms_sigma = 0.0;  ///< prediction of the held-back last third, in sigmas
+  int parameters = 0;
+  bool recommended = false;
+};
+
+/// Result of a fit; survives a trip through its JSON file. Names of initial-state parameters of arc
+/// i > 0 carry the suffix "@i".
+struct Fit {
+  std::string model;
+  bool converged = false;
+  std::string outcome;   ///< one word: converged, no_convergence, not_identifiable, too_short
+  std::string reason;    ///< one sentence
+  std::string start_path;  ///< which start won: integral_matching, windows, shooting, multistart, given
+  std::vector<FitParameter> parameters;
+  std::vector<std::string> covariance_names;  ///< free parameters, in the order of the rows
+  Eigen::MatrixXd covariance;
+  double chi2 = 0.0;
+  int dof = 0;
+  double noise_scale = 1.0;  ///< factor by which the track's sigmas were re-estimated
+  double aicc = 0.0, bic = 0.0;
+  double whiteness_p = 0.0;
+  double correlation_time_s = 0.0;
+  int rank = 0;
+  double condition = 0.0;
+  std::vector<NullVector> null_vectors;
+  double integration_error_sigma = 0.0;  ///< largest integration error in units of sigma
+  double time_origin_s = 0.0;            ///< t_s the initial state refers to (first arc)
+  std::vector<FitArc> arcs;
+  std::vector<ModelScore> comparison;
+  std::vector<std::string> warnings;
+  std::map<std::string, std::string> inputs;    ///< file name -> sha256
+  std::map<std::string, std::string> versions;  ///< program and libraries
+  std::uint64_t seed = 0;
+  std::string scene_toml;  ///< the scene as resolved, so that the fit can be replayed alone
+
+  [[nodiscard]] const FitParameter* find(const std::string& name) const;
+};
+
+}  // namespace trochoid::data

@@ -1,0 +1,55 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/table.hpp"
+#include "trochoid/data/track.hpp"
+
+/// Readers throw InputError with file, line or key, value and remedy. Writers write whole files or
+/// nothing: to a temporary neighbour first, then renamed. Formats: docs/formats.md.
+namespace trochoid::data {
+
+[[nodiscard]] TrackFile read_track(const std::filesystem::path& path);
+void write_track(const TrackFile& file, const std::filesystem::path& path);
+
+[[nodiscard]] Scene read_scene(const std::filesystem::path& path);
+/// Parses TOML text; `where` stands for the file in messages.
+[[nodiscard]] Scene parse_scene(const std::string& toml, const std::string& where);
+[[nodiscard]] std::string to_toml(const Scene& scene);
+
+[[nodiscard]] Fit read_fit(const std::filesystem::path& path);
+void write_fit(const Fit& fit, const std::filesystem::path& path);
+
+[[nodiscard]] Camera read_camera(const std::filesystem::path& path);
+void write_camera(const Camera& camera, const std::filesystem::path& path);
+
+/// Body, support, model and start of a recording's object.json (see docs/formats.md).
+[[nodiscard]] Scene read_object(const std::filesystem::path& path);
+
+[[nodiscard]] Table read_table(const std::filesystem::path& path);
+void write_table(const Table& table, const std::filesystem::path& path);
+
+/// Writes `text` whole or not at all. @throws InputError if the folder cannot be written.
+void write_text(const std::string& text, const std::filesystem::path& path);
+/// Hex SHA-256 of a file's bytes.
+[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+
+/// A temporary file beside `target` that becomes `target` on commit() and vanishes otherwise; for
+/// writers that need a path (video encoders).
+class PendingFile {
+ public:
+  explicit PendingFile(std::filesystem::path target);
+  ~PendingFile();
+  PendingFile(const PendingFile&) = delete;
+  PendingFile& operator=(const PendingFile&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+};
+
+}  // namespace trochoid::data

@@ -1,0 +1,31 @@
+#pragma once
+#include <Eigen/Core>
+#include <cmath>
+
+namespace trochoid::data {
+
+/// Position and attitude of a cylinder in the table frame (z up, floor z = 0).
+/// Euler angles 3-1-3: R(body -> table) = Rz(phi) Rx(theta) Rz(psi); theta = 0 lies flat.
+template <class Scalar = double>
+struct Pose {
+  Eigen::Matrix<Scalar, 3, 1> centre_m = Eigen::Matrix<Scalar, 3, 1>::Zero();  ///< centre of mass
+  Scalar theta_rad{0};
+  Scalar phi_rad{0};
+  Scalar psi_rad{0};
+};
+
+/// Symmetry axis k of a body in attitude (theta, phi).
+template <class Scalar>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 1> symmetry_axis(const Scalar& theta, const Scalar& phi) {
+  using std::cos, std::sin;
+  return {sin(phi) * sin(theta), -cos(phi) * sin(theta), cos(theta)};
+}
+
+/// Height of the CoM of a cylinder whose lower rim touches the floor: R sin(theta) + h |cos(theta)|.
+template <class Scalar>
+[[nodiscard]] Scalar height_on_floor_m(const Scalar& theta, double radius_m, double half_thickness_m) {
+  using std::abs, std::cos, std::sin;
+  return radius_m * sin(theta) + half_thickness_m * abs(cos(theta));
+}
+
+}  // namespace trochoid::data

@@ -1,0 +1,21 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace trochoid::data {
+
+/// Named numeric columns with '#' header lines: trajectories, studies, truth files. Units are in the
+/// column names.
+struct Table {
+  std::vector<std::pair<std::string, std::string>> header;  ///< key, value lines
+  std::vector<std::string> columns;
+  Eigen::MatrixXd values;  ///< rows x columns; NaN = empty cell
+
+  [[nodiscard]] bool has(const std::string& column) const;
+  /// @throws InputError naming the column and those there are.
+  [[nodiscard]] Eigen::VectorXd column(const std::string& name) const;
+};
+
+}  // namespace trochoid::data

@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+
+namespace trochoid::fitting {
+
+struct FitOptions {
+  std::string model;          ///< overrides the scene's; "auto" compares the rungs
+  bool free_pivot = false;
+  std::string from, to;       ///< seconds or "f" frames
+  double hold_back = 0.0;     ///< fraction at the end predicted, not fitted (model comparison uses 1/3)
+  bool profile = false;       ///< profile likelihood of the dynamics parameters
+  int bootstrap = 0;          ///< block bootstrap draws, 0 = off
+  std::uint64_t seed = 1;
+  int threads = 0;            ///< 0 = all cores; the result does not depend on it
+  double tolerance = 0.0;     ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
+  std::function<void(const std::string& stage, double fraction)> progress;
+};
+
+/// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
+/// An unwelcome answer (no convergence, not identifiable, too short) is an outcome in the Fit.
+/// @throws InputError if the scene lacks what the model needs or a track is unusable.
+[[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
+                            const FitOptions& options = {});
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,22 @@
+#pragma once
+#include <CLI/CLI.hpp>
+
+/// One subcommand per file; each adds itself to the program.
+namespace trochoid::tools {
+
+/// Thrown by a command that finished but whose answer is not good (no convergence, broken track):
+/// the files are written, the exit status is 3.
+struct NotGood : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+void add_simulate_command(CLI::App& app);
+void add_fit_command(CLI::App& app);
+void add_study_command(CLI::App& app);
+#ifdef TROCHOID_HAS_TRACKING
+void add_track_command(CLI::App& app);
+void add_overlay_command(CLI::App& app);
+void add_run_command(CLI::App& app);
+#endif
+
+}  // namespace trochoid::tools

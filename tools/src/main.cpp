@@ -1,0 +1,47 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "commands.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace {
+
+enum ExitStatus { kDone = 0, kError = 1, kUsage = 2, kNotGood = 3 };
+
+int run(int argc, char** argv) {
+  CLI::App app{"Track spinning and rolling discs and rings in video, fit a rigid-body model to the "
+               "path, and show prediction and observation together."};
+  app.set_version_flag("--version", "trochoid " TROCHOID_VERSION);
+  app.require_subcommand(1);
+  using namespace trochoid::tools;
+  add_simulate_command(app);
+  add_fit_command(app);
+  add_study_command(app);
+#ifdef TROCHOID_HAS_TRACKING
+  add_track_command(app);
+  add_overlay_command(app);
+  add_run_command(app);
+#endif
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+// The only place that catches: libraries throw, commands do not print errors.
+int main(int argc, char** argv) try {
+  return run(argc, argv);
+} catch (const trochoid::tools::NotGood& answer) {
+  fmt::print(stderr, "trochoid: {}\n", answer.what());
+  return kNotGood;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "trochoid: {}\n", error.what());
+  return kError;
+}

@@ -1,0 +1,53 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+namespace trochoid::tracking {
+
+/// One decoded picture: upright (rotation metadata applied), 8-bit luma in full range, its index as
+/// decoded and its presentation time since the first frame.
+struct Frame {
+  cv::Mat luma;    ///< CV_8UC1
+  cv::Mat bgr;     ///< CV_8UC3, empty unless asked for
+  std::int64_t index = 0;
+  double t_s = 0.0;
+  bool damaged = false;  ///< the decoder reported an error in it
+};
+
+struct VideoInfo {
+  int width_px = 0, height_px = 0;  ///< upright
+  double frame_rate_hz = 0.0;       ///< average of the time stamps
+  std::int64_t frames = 0;          ///< as the container says, 0 if it does not
+  std::string codec;
+  bool variable_rate = false;
+};
+
+struct SourceOptions {
+  bool colour = false;
+  std::optional<double> frame_rate_hz;  ///< overrides the time stamps: slow motion, image sequences
+  std::string from, to;                 ///< "1.5" seconds or "f120" frames; empty = all
+  int decoder_threads = 0;              ///< 0 = the decoder's choice
+};
+
+/// Frames in order from a video file or a printf-style image sequence ("img/%04d.png").
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  [[nodiscard]] virtual const VideoInfo& info() const = 0;
+  /// Next frame, or nothing at the end. Each returned frame owns its pixels.
+  /// @throws InputError if the file breaks off before its promised end; the message says where.
+  [[nodiscard]] virtual std::optional<Frame> next() = 0;
+};
+
+/// @throws InputError (missing, not a video, no picture stream) before any frame is handed out.
+[[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,
+                                                      const SourceOptions& options = {});
+/// The same source decoded ahead in its own thread, with a bounded queue.
+[[nodiscard]] std::unique_ptr<FrameSource> decode_ahead(std::unique_ptr<FrameSource> source,
+                                                        int queue_length = 8);
+
+}  // namespace trochoid::tracking
