@@ -1,0 +1,63 @@
+#pragma once
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "trochoid/data/body.hpp"
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/pose.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/tracking/detector.hpp"
+
+namespace trochoid::tracking {
+
+/// An edge found in the image that the fit accepted.
+struct EdgePoint {
+  Eigen::Vector2d image_px;
+  Eigen::Vector2d normal_px;  ///< of the predicted outline
+  double sigma_px = 0.0;      ///< along the normal
+  double residual_px = 0.0;   ///< along the normal, after the fit
+};
+
+/// What one frame says about the pose of the body, with the covariance of what was estimated.
+struct PoseMeasurement {
+  data::Pose<> pose;                   ///< psi only if a mark was read
+  Eigen::Vector2d centre_px;           ///< projection of the CoM
+  Eigen::Matrix2d covariance_m2;       ///< of pose.centre_m x, y
+  Eigen::Matrix2d covariance_px2;      ///< of centre_px
+  double sigma_theta_rad = 0.0;        ///< infinite when the image does not tell
+  double sigma_phi_rad = 0.0;
+  std::optional<double> sigma_psi_rad;
+  double rms_px = 0.0;                 ///< of the accepted edge points about the outline
+  double accepted = 0.0;               ///< fraction of the predicted outline with an accepted edge
+  std::vector<EdgePoint> edges;
+};
+
+/// Picture evidence for one measurement. `background` may be empty.
+struct OutlineEvidence {
+  const cv::Mat& luma;                       ///< CV_8UC1
+  const cv::Mat& background;                 ///< CV_8UC1 of the same size, or empty
+  std::optional<Detection> detection;        ///< used for a start when there is no prediction
+  std::optional<data::Pose<>> predicted;
+  /// Image motion of the CoM during the exposure [px]; inflates along-motion sigma.
+  Eigen::Vector2d smear_px = Eigen::Vector2d::Zero();
+};
+
+/// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
+/// rim (floor) or lying on its face (flat); (theta, phi, s) with the axis through a pivot and the
+/// distance s along the axis free, so that a track never assumes the l it is later asked for.
+class OutlineFitter {
+ public:
+  /// @throws InputError if body has no shape, or support is pivot without pivot_m.
+  OutlineFitter(data::Body body, data::Support support, data::Camera camera);
+  /// Nothing if the image does not hold the body there; never a guess.
+  [[nodiscard]] std::optional<PoseMeasurement> measure(const OutlineEvidence& evidence) const;
+
+ private:
+  data::Body body_;
+  data::Support support_;
+  data::Camera camera_;
+};
+
+}  // namespace trochoid::tracking
