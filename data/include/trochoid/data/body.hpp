@@ -21,7 +21,7 @@ struct SpinMark {
 struct Body {
   BodyKind kind = BodyKind::disc;
   double radius_m = 0.0;        ///< outer rim, > 0 unless kind == top
-  double inner_radius_m = 0.0;  ///< bore of a ring, 0 <= inner < radius
+  double inner_radius_m = 0.0;  ///< bore of a ring, 0 <= inner <= radius (equal: a thin hoop)
   double thickness_m = 0.0;     ///< >= 0
   double axle_radius_m = 0.0;   ///< thin axle along k (tops), 0 = none
   double axle_above_m = 0.0;    ///< how far the axle sticks out of the upper face

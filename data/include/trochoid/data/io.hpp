@@ -26,7 +26,8 @@ void write_fit(const Fit& fit, const std::filesystem::path& path);
 [[nodiscard]] Camera read_camera(const std::filesystem::path& path);
 void write_camera(const Camera& camera, const std::filesystem::path& path);
 
-/// Body, support, model and start of a recording's object.json (see docs/formats.md).
+/// Body and support of a recording's object.json (see docs/formats.md). Never the law, its
+/// parameters, the start, or the distance from pivot to CoM: those are for the fit to find.
 [[nodiscard]] Scene read_object(const std::filesystem::path& path);
 
 [[nodiscard]] Table read_table(const std::filesystem::path& path);

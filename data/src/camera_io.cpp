@@ -1,0 +1,108 @@
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "json_read.hpp"
+#include "trochoid/data/io.hpp"
+
+// camera.json: docs/formats.md.
+namespace trochoid::data {
+namespace {
+
+int image_size(const JsonReader& json, const char* key) {
+  constexpr double kLargest_px = 65536.0;
+  const double value = json.number(key);
+  if (!(value >= 1.0 && value <= kLargest_px && value == std::floor(value)))
+    json.fail(fmt::format("\"{}\" = {} must be a whole number of pixels in 1..{}", key, value,
+                          kLargest_px));
+  return static_cast<int>(value);
+}
+
+double positive(const JsonReader& json, const char* key) {
+  const double value = json.number(key);
+  if (!(value > 0.0)) json.fail(fmt::format("\"{}\" = {} must be greater than 0", key, value));
+  return value;
+}
+
+Eigen::Matrix3d rotation(const JsonReader& json, const char* key) {
+  const nlohmann::json& rows = json.at(key);
+  if (!rows.is_array() || rows.size() != 3)
+    json.fail(fmt::format("\"{}\" must be a list of three rows", key));
+  Eigen::Matrix3d R;
+  for (int row = 0; row < 3; ++row) {
+    const nlohmann::json wrapped{{key, rows[row]}};
+    const auto values = JsonReader(wrapped, json.where()).numbers(key, 3);
+    for (int column = 0; column < 3; ++column) R(row, column) = values[column];
+  }
+  constexpr double kRoundedByHand = 1e-3;  // three printed digits still make a usable rotation
+  const bool orthonormal =
+      (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < kRoundedByHand;
+  if (!orthonormal || R.determinant() < 0.0)
+    json.fail(
+        fmt::format("\"{}\" is no rotation (its rows must be orthonormal, right-handed)", key));
+  return R;
+}
+
+Camera::Projection projection_of(const JsonReader& json) {
+  const std::string name = json.text_or("projection", "perspective");
+  if (name == "perspective") return Camera::Projection::perspective;
+  if (name == "orthographic") return Camera::Projection::orthographic;
+  json.fail("\"projection\" must be perspective or orthographic");
+}
+
+}  // namespace
+
+Camera read_camera(const std::filesystem::path& path) {
+  const nlohmann::json object = read_json_object(path);
+  const JsonReader json(object, path.string());
+  Camera camera;
+  camera.projection = projection_of(json);
+  camera.width_px = image_size(json, "width");
+  camera.height_px = image_size(json, "height");
+  camera.fx = positive(json, "fx");
+  camera.fy = positive(json, "fy");
+  camera.cx = json.number("cx");
+  camera.cy = json.number("cy");
+  if (json.has("dist_k1_k2_p1_p2_k3")) {
+    const auto values = json.numbers("dist_k1_k2_p1_p2_k3", 5);
+    std::copy(values.begin(), values.end(), camera.distortion.begin());
+  }
+  camera.camera_from_table = rotation(json, "R_world_to_cam");
+  const auto t = json.numbers("t_world_to_cam_m", 3);
+  camera.camera_from_table_m = {t[0], t[1], t[2]};
+  if (json.has("fps")) camera.frame_rate_hz = positive(json, "fps");
+  if (json.has("shutter_fraction_of_frame")) {
+    camera.exposure_fraction = json.number("shutter_fraction_of_frame");
+    if (!(*camera.exposure_fraction >= 0.0 && *camera.exposure_fraction <= 1.0))
+      json.fail(fmt::format("\"shutter_fraction_of_frame\" = {} must lie in 0..1",
+                            *camera.exposure_fraction));
+  }
+  return camera;
+}
+
+void write_camera(const Camera& camera, const std::filesystem::path& path) {
+  nlohmann::ordered_json json;
+  json["width"] = camera.width_px;
+  json["height"] = camera.height_px;
+  if (camera.frame_rate_hz) json["fps"] = *camera.frame_rate_hz;
+  if (camera.exposure_fraction) json["shutter_fraction_of_frame"] = *camera.exposure_fraction;
+  json["pixel_convention"] = "centre of the top-left pixel is (0,0); x right, y down";
+  if (camera.projection == Camera::Projection::orthographic) json["projection"] = "orthographic";
+  json["fx"] = camera.fx;
+  json["fy"] = camera.fy;
+  json["cx"] = camera.cx;
+  json["cy"] = camera.cy;
+  json["dist_k1_k2_p1_p2_k3"] = camera.distortion;
+  for (int row = 0; row < 3; ++row)
+    json["R_world_to_cam"].push_back({camera.camera_from_table(row, 0),
+                                      camera.camera_from_table(row, 1),
+                                      camera.camera_from_table(row, 2)});
+  const Eigen::Vector3d& t = camera.camera_from_table_m;
+  json["t_world_to_cam_m"] = {t.x(), t.y(), t.z()};
+  const Eigen::Vector3d at = camera.position_m();
+  json["camera_position_m"] = {at.x(), at.y(), at.z()};
+  write_text(json.dump(1) + "\n", path);
+}
+
+}  // namespace trochoid::data

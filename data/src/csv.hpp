@@ -1,0 +1,52 @@
+#pragma once
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace trochoid::data {
+
+/// Line-wise reader of comma-separated numbers below '#' header lines and one line of column names.
+/// Tolerates CRLF, a byte order mark, blanks around cells, empty lines and '#' lines anywhere;
+/// everything else is refused with file and line.
+class CsvReader {
+ public:
+  /// Reads up to the column names. `text` must outlive the reader; `where` names the file.
+  /// @throws InputError if there are no column names, or some are empty or doubled.
+  CsvReader(std::string_view text, std::string where);
+
+  /// key and value of the "# key: value" lines met so far; value empty for "# words".
+  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& header() const {
+    return header_;
+  }
+  [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
+  /// Index of a column, -1 if absent.
+  [[nodiscard]] int index_of(std::string_view column) const;
+
+  /// Moves to the next row. @returns false at the end. @throws InputError on a wrong cell count.
+  bool next();
+  [[nodiscard]] std::string_view cell(int column) const { return cells_[column]; }
+  /// The number in a cell, NaN if the cell is empty or the column is absent (index -1).
+  /// @throws InputError naming line and column if it is no finite number.
+  [[nodiscard]] double number(int column) const;
+  /// "file:line" of the current row.
+  [[nodiscard]] std::string place() const;
+
+ private:
+  bool next_content_line(std::string_view& line);
+  void keep_header(std::string_view line);
+
+  std::string_view text_;
+  std::string where_;
+  std::size_t position_ = 0;
+  std::size_t line_ = 0;
+  std::vector<std::pair<std::string, std::string>> header_;
+  std::vector<std::string> columns_;
+  std::vector<std::string_view> cells_;
+};
+
+/// "# key: value\n" or "# key\n"; line breaks inside become blanks so that the file stays readable.
+[[nodiscard]] std::string header_line(std::string_view key, std::string_view value = {});
+
+}  // namespace trochoid::data

@@ -1,0 +1,24 @@
+#include "trochoid/data/table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "text.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::data {
+
+bool Table::has(const std::string& column) const {
+  return std::find(columns.begin(), columns.end(), column) != columns.end();
+}
+
+Eigen::VectorXd Table::column(const std::string& name) const {
+  const auto found = std::find(columns.begin(), columns.end(), name);
+  if (found == columns.end())
+    throw InputError(
+        fmt::format("table: there is no column {}; there are {}", name, join(columns, ",")));
+  return values.col(found - columns.begin());
+}
+
+}  // namespace trochoid::data

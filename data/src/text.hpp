@@ -1,0 +1,32 @@
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Small helpers of the readers and writers; private to this module.
+namespace trochoid::data {
+
+/// Bytes of a file, refused beyond `limit_bytes` (an endless device, a video given as a table).
+/// @throws InputError naming the file if it is missing, a folder, unreadable or too large.
+[[nodiscard]] std::string read_text(const std::filesystem::path& path,
+                                    std::size_t limit_bytes = std::size_t{64} << 20);
+
+/// `text` in single quotes for a message: control characters and bytes outside ASCII become '?',
+/// long text is clipped, so that an error stays one readable line whatever the file holds.
+[[nodiscard]] std::string in_quotes(std::string_view text);
+/// The same without the quotes, for sentences made by a parser.
+[[nodiscard]] std::string one_line(std::string_view text, std::size_t limit = 200);
+
+/// The candidate with the smallest edit distance to `word`; empty if there is none.
+[[nodiscard]] std::string nearest(std::string_view word, std::span<const std::string> candidates);
+
+[[nodiscard]] std::string join(std::span<const std::string> words, std::string_view separator);
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+
+/// Shortest text that reads back as the same double, e.g. "0.1"; "nan", "inf" for the others.
+[[nodiscard]] std::string shortest(double value);
+
+}  // namespace trochoid::data
