@@ -13,6 +13,7 @@ struct NotGood : std::runtime_error {
 void add_simulate_command(CLI::App& app);
 void add_fit_command(CLI::App& app);
 void add_study_command(CLI::App& app);
+void add_study_reference(CLI::App& study);
 #ifdef TROCHOID_HAS_TRACKING
 void add_track_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);

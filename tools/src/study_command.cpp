@@ -1,0 +1,13 @@
+#include "commands.hpp"
+
+namespace trochoid::tools {
+
+void add_study_command(CLI::App& app) {
+  CLI::App* study = app.add_subcommand(
+      "study",
+      "Measure the program itself: error against run time, and what survives the extremes");
+  study->require_subcommand(1);
+  add_study_reference(*study);
+}
+
+}  // namespace trochoid::tools
