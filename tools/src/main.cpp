@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "commands.hpp"
+#include "progress.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace {
@@ -12,10 +13,18 @@ namespace {
 enum ExitStatus { kDone = 0, kError = 1, kUsage = 2, kNotGood = 3 };
 
 int run(int argc, char** argv) {
-  CLI::App app{"Track spinning and rolling discs and rings in video, fit a rigid-body model to the "
-               "path, and show prediction and observation together."};
+  CLI::App app{
+      "Track spinning and rolling discs and rings in video, fit a rigid-body model to the "
+      "path, and show prediction and observation together."};
   app.set_version_flag("--version", "trochoid " TROCHOID_VERSION);
   app.require_subcommand(1);
+  app.fallthrough();  // --quiet and --verbose may stand before or after the command
+  app.add_flag_callback(
+      "-q,--quiet", [] { trochoid::tools::set_talk(trochoid::tools::Talk::quiet); },
+      "No progress and no remarks on stderr, errors only");
+  app.add_flag_callback(
+      "-v,--verbose", [] { trochoid::tools::set_talk(trochoid::tools::Talk::verbose); },
+      "Say on stderr what is being done and why");
   using namespace trochoid::tools;
   add_simulate_command(app);
   add_fit_command(app);
