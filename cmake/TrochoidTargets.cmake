@@ -2,7 +2,7 @@
 
 add_library(trochoid_warnings INTERFACE)
 target_compile_options(trochoid_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wno-psabi
   $<$<BOOL:${TROCHOID_WERROR}>:-Werror>)
 if(TROCHOID_SANITIZE)
   target_compile_options(trochoid_warnings INTERFACE

@@ -6,11 +6,11 @@ namespace trochoid::model {
 /// Why a run ended. Every run ends in exactly one of these.
 enum class Outcome {
   reached_end,
-  flat,                     ///< theta fell below the face-contact limit
-  rim_switch,               ///< theta = pi/2 on a thick body: the contact jumps to the other rim
-  lift_off,                 ///< normal force reached zero
+  flat,        ///< theta fell below the face-contact limit
+  rim_switch,  ///< theta = pi/2 on a thick body: the contact jumps to the other rim
+  lift_off,    ///< normal force reached zero
   at_rest,
-  inconsistent_contact,     ///< Painleve: no admissible contact force
+  inconsistent_contact,  ///< Painleve: no admissible contact force
   step_limit,
   tolerance_not_reachable,  ///< step size fell to rounding
   out_of_domain,            ///< parameters or state outside the model's range

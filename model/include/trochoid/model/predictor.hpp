@@ -67,7 +67,8 @@ class Predictor {
   [[nodiscard]] int index_of(const std::string& parameter) const;  ///< -1 if there is none
 };
 
-/// Chooses the equations and terms once. Names: top, top-euler, rolling, sliding, puck, pivot, smooth.
+/// Chooses the equations and terms once. Names: top, top-euler, rolling, sliding, puck, pivot,
+/// smooth.
 /// @throws InputError naming the missing field if the scene lacks what the model needs.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(const data::Scene& scene);
 

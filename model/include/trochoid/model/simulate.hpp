@@ -21,8 +21,8 @@ struct Statistics {
 };
 
 /// A finished run on a uniform time grid. Columns follow the reference files' names with units:
-/// t_s, phi_rad, theta_rad, psi_rad, dphi_rad_s, dtheta_rad_s, dpsi_rad_s, x_m, y_m, z_m, energy_J and
-/// what the model adds (w1_rad_s.., vx_m_s, vy_m_s, normal_force_N, ...).
+/// t_s, phi_rad, theta_rad, psi_rad, dphi_rad_s, dtheta_rad_s, dpsi_rad_s, x_m, y_m, z_m, energy_J
+/// and what the model adds (w1_rad_s.., vx_m_s, vy_m_s, normal_force_N, ...).
 struct Trajectory {
   std::string model;
   std::string integrator;         ///< chosen integrator
