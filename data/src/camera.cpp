@@ -52,10 +52,12 @@ Eigen::Vector2d undistort(const std::array<double, 5>& coefficients,
     p += step;
     now = next;
   }
-  // Beyond the fold of a polynomial distortion no point of space has this image.
+  // Beyond the fold of a polynomial distortion no point of space has this image; Newton may still
+  // end at a root on the far side of the fold, where the (symmetric) derivative is not positive
+  // definite.
   constexpr double kAccepted = 1e-9;
-  if (!((target - now.at).norm() <= kAccepted * (1.0 + target.norm())) ||
-      now.derivative.determinant() <= 0.0)
+  const bool before_fold = now.derivative.determinant() > 0.0 && now.derivative.trace() > 0.0;
+  if (!((target - now.at).norm() <= kAccepted * (1.0 + target.norm())) || !before_fold)
     throw NumericalError(
         fmt::format("camera: no ray has the distorted image ({}, {}) focal lengths from the "
                     "principal point; the "

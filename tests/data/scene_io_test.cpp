@@ -1,0 +1,298 @@
+#include <cmath>
+#include <limits>
+
+#include "files_for_tests.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::data {
+namespace {
+
+constexpr const char* kFullScene = R"(
+[body]
+kind = "ring"
+radius_m = 0.030
+inner_radius_m = 0.027
+thickness_m = 0.008
+mass_kg = 0.0337
+I_kg_m2 = 1
+Is_kg_m2 = 1.5
+mark = { distance_m = 0.02, size_m = 0.004, angle_deg = 90, faces = "both" }
+
+[support]
+kind = "floor"
+
+[camera]
+file = "camera.json"
+readout_s = 0.01
+frame_rate_hz = 240
+
+[tracking]
+objects = 2
+at_px = [10, 20.5]
+from = 0.5
+to = "f120"
+
+[model]
+name = "rolling"
+gravity_m_s2 = 9.80
+air_linear_N_m_s = [2.5e-6, 2.5e-6, 1.5e-5]
+friction = 0.3
+
+[start]
+theta_rad = 1.2566
+w2_rad_s = 24.73
+w3_rad_s = 4.42
+
+[run]
+until_s = 9.0
+rate_hz = 120
+tolerance = 1e-10
+integrator = "cvode-bdf"
+
+[fit]
+free = ["air_linear_N_m_s", "theta_rad"]
+prior = { mass_kg = [0.0337, 0.0001] }
+fixed = { friction = 0.2 }
+bounds = { theta_rad = [0.1, inf] }
+free_pivot = true
+)";
+
+TEST(SceneFile, GivesEveryValueItHolds) {
+  const Scene scene = parse_scene(kFullScene, "ring.toml");
+  ASSERT_TRUE(scene.body);
+  EXPECT_EQ(scene.body->kind, BodyKind::ring);
+  EXPECT_EQ(scene.body->inner_radius_m, 0.027);
+  EXPECT_EQ(scene.body->I_kg_m2, 1.0);
+  ASSERT_EQ(scene.body->marks.size(), 1u);
+  EXPECT_NEAR(scene.body->marks[0].angle_rad, std::acos(0.0), 1e-15);
+  EXPECT_TRUE(scene.body->marks[0].on_upper_face && scene.body->marks[0].on_lower_face);
+  EXPECT_EQ(scene.camera.file, "camera.json");
+  EXPECT_EQ(scene.camera.frame_rate_hz, 240.0);
+  EXPECT_EQ(scene.tracking.objects, 2);
+  EXPECT_EQ(scene.tracking.at_px, Eigen::Vector2d(10, 20.5));
+  EXPECT_EQ(scene.tracking.from, "0.5");
+  EXPECT_EQ(scene.tracking.to, "f120");
+  EXPECT_EQ(scene.model.name, "rolling");
+  EXPECT_EQ(scene.model.gravity_m_s2, 9.80);
+  EXPECT_EQ(scene.model.air_linear_N_m_s, Eigen::Vector3d(2.5e-6, 2.5e-6, 1.5e-5));
+  EXPECT_FALSE(scene.model.gap_viscosity_Pa_s);
+  EXPECT_EQ(scene.start.w2_rad_s, 24.73);
+  EXPECT_EQ(scene.run.integrator, "cvode-bdf");
+  EXPECT_EQ(scene.fit.free.size(), 2u);
+  EXPECT_EQ(scene.fit.prior.at("mass_kg").sigma, 0.0001);
+  EXPECT_EQ(scene.fit.fixed.at("friction"), 0.2);
+  EXPECT_TRUE(std::isinf(scene.fit.bounds.at("theta_rad").second));
+  EXPECT_TRUE(scene.fit.free_pivot);
+}
+
+TEST(SceneFile, SurvivesBeingWrittenAndReadAgain) {
+  const std::string once = to_toml(parse_scene(kFullScene, "ring.toml"));
+  const Scene again = parse_scene(once, "again.toml");
+  EXPECT_EQ(to_toml(again), once);
+  EXPECT_EQ(again.body, parse_scene(kFullScene, "ring.toml").body);
+}
+
+// Every listed key holds a value other than the default once, so that none can be lost unnoticed.
+TEST(SceneFile, WritesEveryKeyThatDiffersFromItsDefault) {
+  const std::string all = R"([body]
+kind = "top"
+radius_m = 0.5
+inner_radius_m = 0.25
+thickness_m = 0.125
+axle_radius_m = 0.0625
+axle_above_m = 0.5
+mass_kg = 2.0
+I_kg_m2 = 1.0
+Is_kg_m2 = 1.5
+l_m = 0.25
+[[body.mark]]
+distance_m = 0.25
+size_m = 0.125
+angle_rad = 1.5
+faces = "lower"
+
+[support]
+kind = "pivot"
+pivot_m = [0.5, -0.25, 1.0]
+
+[camera]
+scale_px_per_m = 100.0
+height_m = 2.0
+readout_s = 0.5
+frame_rate_hz = 60.0
+exposure_s = 0.25
+
+[tracking]
+objects = 3
+at_px = [1.5, 2.5]
+from = "0.5"
+to = "f9"
+
+[model]
+name = "top-euler"
+gravity_m_s2 = 9.5
+air_linear_N_m_s = [1.0, 2.0, 3.0]
+air_quadratic_N_m_s2 = [1.0, 2.0, 3.5]
+air_force_N_s_m = 0.5
+gap_viscosity_Pa_s = 1.8e-05
+friction = 0.25
+slip_regularisation_m_s = 0.001
+rolling_friction_m = 0.0001
+pivoting_friction_m = 0.0002
+contour_friction_m = 0.0003
+couple_regularisation_rad_s = 0.01
+drag_transverse_N_m_s = 0.125
+drag_spin_N_m_s = 0.25
+spin_down_dry_rad_s2 = 0.5
+spin_down_viscous_1_s = 0.75
+spin_down_quadratic_1_rad = 0.0625
+
+[start]
+theta_rad = 0.5
+phi_rad = 0.25
+psi_rad = -0.5
+w1_rad_s = 1.5
+w2_rad_s = 2.5
+w3_rad_s = 3.5
+omega_s_rad_s = 155.0
+x_m = 0.1
+y_m = 0.2
+vx_m_s = 0.3
+vy_m_s = 0.4
+w_body_rad_s = [1.0, 1.5, 2.0]
+moments_kg_m2 = [0.5, 0.25, 0.75]
+
+[run]
+until_s = 9.5
+rate_hz = 120.0
+tolerance = 1e-09
+integrator = "taylor"
+rim_switch = "impact"
+
+[fit]
+free = ["l_m", "I_kg_m2"]
+prior = { "mass_kg" = [2.0, 0.5] }
+fixed = { "l_m" = 0.25 }
+bounds = { "I_kg_m2" = [0.5, inf] }
+free_pivot = true
+free_scale = true
+)";
+  EXPECT_EQ(to_toml(parse_scene(all, "all.toml")), all);
+}
+
+TEST(SceneFile, MayBeEmptyOrHoldOnlyABody) {
+  EXPECT_FALSE(parse_scene("", "s").body);
+  EXPECT_EQ(to_toml(Scene{}), "");
+  EXPECT_EQ(parse_scene("[body]\nradius_m = 1", "s").support.kind, SupportKind::floor);
+}
+
+TEST(SceneFile, TakesATopOrAPivotPositionForAHeldBody) {
+  EXPECT_EQ(parse_scene("[body]\nkind = 'top'", "s").support.kind, SupportKind::pivot);
+  EXPECT_EQ(parse_scene("[support]\npivot_m = [0, 0, 0]", "s").support.kind, SupportKind::pivot);
+  Scene free_top = parse_scene("[body]\nkind = 'top'\n[support]\nkind = 'floor'", "s");
+  EXPECT_EQ(parse_scene(to_toml(free_top), "s").support.kind, SupportKind::floor);
+}
+
+TEST(SceneFile, LooksForItsCameraBesideItself) {
+  const TestFolder folder;
+  const auto path = folder.write("s.toml", "[camera]\nfile = 'camera.json'\n");
+  EXPECT_EQ(read_scene(path).camera.file, (folder / "camera.json").string());
+  const auto absolute = folder.write("a.toml", "[camera]\nfile = '/somewhere/c.json'\n");
+  EXPECT_EQ(read_scene(absolute).camera.file, "/somewhere/c.json");
+}
+
+TEST(SceneFile, OfTheSamplesAndTheirObjectFilesAgree) {
+  for (const char* sample : {"s1_disc_paper", "s5_top_marker"}) {
+    const auto folder = std::filesystem::path(TROCHOID_SOURCE_DIR) / "data/samples" / sample;
+    const Scene scene = read_scene(folder / "scene.toml");
+    const Scene object = read_object(folder / "object.json");
+    EXPECT_EQ(scene.body, object.body) << sample;
+    EXPECT_EQ(scene.support.kind, object.support.kind);
+    EXPECT_EQ(scene.support.pivot_m, object.support.pivot_m);
+    EXPECT_TRUE(std::filesystem::exists(scene.camera.file));
+  }
+}
+
+struct Refusal {
+  const char* name;
+  std::string text;
+  const char* place;
+  const char* reason;
+};
+class SceneRefusal : public testing::TestWithParam<Refusal> {};
+
+TEST_P(SceneRefusal, NamesFileLineAndReason) {
+  const std::string message =
+      refusal([] { static_cast<void>(parse_scene(GetParam().text, "s.toml")); });
+  EXPECT_EQ(message.rfind(std::string("s.toml") + GetParam().place, 0), 0u) << message;
+  EXPECT_NE(message.find(GetParam().reason), std::string::npos) << message;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, SceneRefusal,
+    testing::Values(
+        Refusal{"UnknownKey", "[body]\nradius_m = 1\nradus_m = 2",
+                ":3:", "'radus_m' is not a key of [body]; did you mean radius_m?"},
+        Refusal{"UnknownTable", "\n[bodi]\nradius_m = 1", ":2:", "did you mean body?"},
+        Refusal{"UnknownMarkKey",
+                "[body]\nradius_m = 1\n[[body.mark]]\ndistance_m = 0.5\nsize_m = 0.1\nface = 1",
+                ":6:", "did you mean faces?"},
+        Refusal{"KeyOutsideTables", "radius_m = 1", ":1:", "not a key of a scene's tables"},
+        Refusal{"NegativeRadius", "[body]\nradius_m = -1",
+                ":2:", "radius_m = -1 must be greater than 0"},
+        Refusal{"ZeroRadius", "[body]\nradius_m = 0", ":2:", "greater than 0"},
+        Refusal{"NoRadius", "[body]\nkind = 'disc'", ":1:", "needs radius_m"},
+        Refusal{"NaN", "[body]\nradius_m = nan", ":2:", "greater than 0"},
+        Refusal{"Infinite", "[body]\nradius_m = inf", ":2:", "greater than 0"},
+        Refusal{"TextForNumber", "[body]\nradius_m = '0.03'", ":2:", "must be a number"},
+        Refusal{"BoolForNumber", "[body]\nradius_m = true", ":2:", "must be a number"},
+        Refusal{"BoreTooLarge", "[body]\nkind = 'ring'\nradius_m = 1\ninner_radius_m = 1.5",
+                ":4:", "must not exceed"},
+        Refusal{"RingWithoutBore", "[body]\nkind = 'ring'\nradius_m = 1", ":1:", "inner_radius_m"},
+        Refusal{"UnknownKind", "[body]\nkind = 'rign'\nradius_m = 1", ":2:", "did you mean ring?"},
+        Refusal{"NumberForKind", "[body]\nkind = 3", ":2:", "one of disc, ring, top"},
+        Refusal{"ZeroMass", "[body]\nradius_m = 1\nmass_kg = 0", ":3:", "mass_kg = 0"},
+        Refusal{"MarkOutside", "[body]\nradius_m = 1\nmark = {distance_m = 2, size_m = 0.1}",
+                ":3:", "outside radius_m"},
+        Refusal{"MarkWithoutSize", "[body]\nradius_m = 1\nmark = {distance_m = 0.2}",
+                ":3:", "size_m"},
+        Refusal{"MarkNoTable", "[body]\nradius_m = 1\nmark = 3", ":3:", "must be a table"},
+        Refusal{"TwoAngles",
+                "[body]\nradius_m = 1\nmark = {distance_m = 0.2, size_m = 0.1, angle_deg = 1, "
+                "angle_rad = 1}",
+                ":3:", "keep one"},
+        Refusal{"BodyNoTable", "body = 3", ":1:", "must be a table"},
+        Refusal{"PivotOnTheFloor", "[support]\nkind = 'floor'\npivot_m = [0,0,0]", ":3:", "pivot"},
+        Refusal{"ShortPivot", "[support]\npivot_m = [0,0]", ":2:", "three numbers"},
+        Refusal{"WordsInPivot", "[support]\npivot_m = [0,0,'a']", ":2:", "must be a number"},
+        Refusal{"FileAndScale", "[camera]\nfile = 'c.json'\nscale_px_per_m = 100",
+                ":3:", "keep one"},
+        Refusal{"EmptyFile", "[camera]\nfile = ''", ":2:", "leave the key out"},
+        Refusal{"NegativeReadout", "[camera]\nreadout_s = -0.1", ":2:", "0 or greater"},
+        Refusal{"NoObjects", "[tracking]\nobjects = 0", ":2:", "1..64"},
+        Refusal{"HalfObjects", "[tracking]\nobjects = 1.5", ":2:", "whole number"},
+        Refusal{"BadFrom", "[tracking]\nfrom = 'soon'", ":2:", "seconds (1.5) or a frame"},
+        Refusal{"UnknownModel", "[model]\nname = 'roling'", ":2:", "did you mean rolling?"},
+        Refusal{"NegativeFriction", "[model]\nfriction = -0.1", ":2:", "0 or greater"},
+        Refusal{"ScalarDrag", "[model]\nair_linear_N_m_s = 1e-6", ":2:", "three numbers"},
+        Refusal{"BothRates", "[start]\nw2_rad_s = 1\ndphi_rad_s = 2", ":3:", "same thing"},
+        Refusal{"TiltBeyondPi", "[start]\ntheta_rad = 4", ":2:", "pi"},
+        Refusal{"LooseTolerance", "[run]\ntolerance = 1", ":2:", "at most 0.1"},
+        Refusal{"EndlessRun", "[run]\nuntil_s = 1e300", ":2:", "rows"},
+        Refusal{"UnknownIntegrator", "[run]\nintegrator = 'rk4'", ":2:", "dop853"},
+        Refusal{"PriorWithoutSigma", "[fit]\nprior = { mass_kg = 0.03 }",
+                ":2:", "prior.mass_kg must be [value, sigma]"},
+        Refusal{"PriorSigmaZero", "[fit]\nprior = { mass_kg = [0.03, 0] }", ":2:", "fixed"},
+        Refusal{"BoundsReversed", "[fit]\nbounds = { l_m = [2, 1] }", ":2:", "lower < upper"},
+        Refusal{"FreeTwice", "[fit]\nfree = ['l_m', 'l_m']", ":2:", "twice"},
+        Refusal{"FreeNoList", "[fit]\nfree = 'l_m'", ":2:", "list of names"},
+        Refusal{"DoubledKey", "[body]\nradius_m = 1\nradius_m = 2", ":3:", "not TOML"},
+        Refusal{"NotToml", "[body\nradius_m = 1", ":1:", "not TOML"},
+        Refusal{"Nul", std::string("[body]\nradius_m = \0", 18), ":2:", "not TOML"},
+        Refusal{"BrokenUtf8", "[body]\nkind = \"\xff\xfe\"", ":2:", "not TOML"},
+        Refusal{"LongUnknownKey", "[body]\n" + std::string(100000, 'a') + " = 1", ":2:", "..."},
+        Refusal{"DeepNesting", "[fit]\nfree = " + std::string(100000, '['), ":2:", "not TOML"}),
+    [](const auto& instance) { return instance.param.name; });
+
+}  // namespace
+}  // namespace trochoid::data
