@@ -28,12 +28,15 @@ struct VideoInfo {
 
 struct SourceOptions {
   bool colour = false;
-  std::optional<double> frame_rate_hz;  ///< overrides the time stamps: slow motion, image sequences
-  std::string from, to;                 ///< "1.5" seconds or "f120" frames; empty = all
+  std::optional<double> frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences
+  std::string from{}, to{};             ///< "1.5" seconds or "f120" frames, inclusive; empty = all
   int decoder_threads = 0;              ///< 0 = the decoder's choice
+  /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
+  bool key_frames_only = false;
 };
 
-/// Frames in order from a video file or a printf-style image sequence ("img/%04d.png").
+/// Frames in order from a video file or an image sequence: printf-style ("img/%04d.png"), a pattern
+/// ("img/*.png") or a folder of images; a sequence needs SourceOptions::frame_rate_hz.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;

@@ -1,0 +1,180 @@
+#include "trochoid/tracking/frame_source.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int kFrames = 12, kWidth = 64, kHeight = 48;
+
+/// A folder of this test's own that vanishes with it.
+class FrameSourceTest : public testing::Test {
+ protected:
+  FrameSourceTest()
+      : folder_(fs::temp_directory_path() /
+                ("trochoid_" +
+                 std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
+                 std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~FrameSourceTest() override { fs::remove_all(folder_); }
+
+  /// Gray level of frame i: distinct, and far enough apart to survive compression.
+  static int level(int i) { return 20 + 15 * i; }
+
+  fs::path write_clip(const std::string& name, const std::string& fourcc, double rate_hz) const {
+    const fs::path path = folder_ / name;
+    cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG,
+                           cv::VideoWriter::fourcc(fourcc[0], fourcc[1], fourcc[2], fourcc[3]),
+                           rate_hz, cv::Size(kWidth, kHeight), true);
+    EXPECT_TRUE(writer.isOpened());
+    for (int i = 0; i < kFrames; ++i)
+      writer.write(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(level(i))));
+    return path;
+  }
+
+  static std::string error_of(const fs::path& path, const SourceOptions& options = {}) {
+    try {
+      const auto source = open_video(path, options);
+      while (source->next()) {
+      }
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(FrameSourceTest, HandsOutEveryFrameWithItsOwnTime) {
+  const auto source = open_video(write_clip("clip.mkv", "FFV1", 50.0));
+  EXPECT_EQ(source->info().width_px, kWidth);
+  EXPECT_EQ(source->info().height_px, kHeight);
+  for (int i = 0; i < kFrames; ++i) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->index, i);
+    EXPECT_NEAR(frame->t_s, 0.02 * i, 1e-3);  // Matroska counts milliseconds
+    ASSERT_EQ(frame->luma.type(), CV_8UC1);
+    // Full range: conversion to limited range and back rounds twice.
+    EXPECT_NEAR(frame->luma.at<uchar>(5, 7), level(i), 2);
+  }
+  EXPECT_FALSE(source->next());
+  EXPECT_FALSE(source->next()) << "the end stays the end";
+}
+
+TEST_F(FrameSourceTest, LimitedRangeLumaIsStretched) {
+  for (const auto& [name, fourcc] :
+       {std::pair{"clip.mp4", "avc1"}, std::pair{"clip.avi", "MJPG"}}) {
+    const auto source = open_video(write_clip(name, fourcc, 25.0));
+    const auto frame = source->next();
+    ASSERT_TRUE(frame) << name;
+    EXPECT_NEAR(cv::mean(frame->luma)[0], level(0), 3.0) << name;
+  }
+}
+
+TEST_F(FrameSourceTest, ColourComesOnlyWhenAsked) {
+  const fs::path clip = write_clip("clip.mp4", "mp4v", 25.0);
+  EXPECT_TRUE(open_video(clip)->next()->bgr.empty());
+  const auto frame = open_video(clip, {.colour = true})->next();
+  ASSERT_EQ(frame->bgr.type(), CV_8UC3);
+  EXPECT_NEAR(frame->bgr.at<cv::Vec3b>(3, 3)[2], level(0), 4);
+}
+
+TEST_F(FrameSourceTest, ARateGivenOverridesTheTimeStamps) {
+  const auto source = open_video(write_clip("clip.mp4", "mp4v", 30.0), {.frame_rate_hz = 240.0});
+  EXPECT_DOUBLE_EQ(source->info().frame_rate_hz, 240.0);
+  source->next();
+  EXPECT_DOUBLE_EQ(source->next()->t_s, 1.0 / 240.0);
+}
+
+TEST_F(FrameSourceTest, AWindowKeepsIndexAndTimeOfTheWholeFile) {
+  const fs::path clip = write_clip("clip.mp4", "mp4v", 10.0);
+  const auto frames = open_video(clip, {.from = "f3", .to = "f5"});
+  for (int i = 3; i <= 5; ++i) {
+    const auto frame = frames->next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->index, i);
+    EXPECT_NEAR(frame->t_s, 0.1 * i, 1e-6);
+  }
+  EXPECT_FALSE(frames->next());
+  const auto seconds = open_video(clip, {.from = "0.5"});
+  EXPECT_EQ(seconds->next()->index, 5);
+  EXPECT_THAT(error_of(clip, {.from = "soon"}), HasSubstr("--from soon"));
+}
+
+TEST_F(FrameSourceTest, DecodingAheadChangesNothing) {
+  const fs::path clip = write_clip("clip.mp4", "avc1", 25.0);
+  const auto plain = open_video(clip);
+  const auto ahead = decode_ahead(open_video(clip), 2);
+  while (const auto a = plain->next()) {
+    const auto b = ahead->next();
+    ASSERT_TRUE(b);
+    EXPECT_EQ(a->t_s, b->t_s);
+    EXPECT_EQ(cv::norm(a->luma, b->luma, cv::NORM_INF), 0.0);
+  }
+  EXPECT_FALSE(ahead->next());
+}
+
+TEST_F(FrameSourceTest, DecodingAheadStopsWhenNobodyListens) {
+  const auto ahead = decode_ahead(open_video(write_clip("clip.mp4", "avc1", 25.0)), 1);
+  EXPECT_TRUE(ahead->next());
+}
+
+TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
+  for (int i = 0; i < kFrames; ++i)
+    cv::imwrite((folder_ / cv::format("img_%03d.png", 7 + i)).string(),
+                cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(257.0 * level(i))));
+  EXPECT_THAT(error_of(folder_ / "img_%03d.png"), HasSubstr("rate"));
+  for (const fs::path& path : {folder_ / "img_%03d.png", folder_ / "img_*.png", folder_}) {
+    const auto source = open_video(path, {.frame_rate_hz = 100.0});
+    int count = 0;
+    while (const auto frame = source->next()) {
+      EXPECT_NEAR(frame->luma.at<uchar>(0, 0), level(count), 1) << path;
+      EXPECT_DOUBLE_EQ(frame->t_s, count / 100.0);
+      ++count;
+    }
+    EXPECT_EQ(count, kFrames) << path;
+  }
+}
+
+TEST_F(FrameSourceTest, BadFilesAreRefusedInOneLineThatNamesThem) {
+  const fs::path empty = folder_ / "empty.mp4", words = folder_ / "words.mp4";
+  std::ofstream(empty).close();
+  std::ofstream(words) << "these are words, not pictures, and they go on for a while";
+  EXPECT_THAT(error_of(folder_ / "missing.mp4"), HasSubstr("missing.mp4: no such file"));
+  EXPECT_THAT(error_of(empty), HasSubstr("empty.mp4: the file is empty"));
+  EXPECT_THAT(error_of(words), HasSubstr("words.mp4: not a readable video"));
+  EXPECT_THAT(error_of(folder_ / "sub" / "%04d.png", {.frame_rate_hz = 1.0}),
+              HasSubstr("no such folder"));
+  EXPECT_EQ(error_of(empty).find('\n'), std::string::npos);
+}
+
+TEST_F(FrameSourceTest, AFileCutShortIsNotTakenForAWholeOne) {
+  // The index is in front and promises 250 frames; two thirds of the pictures follow.
+  const fs::path whole = fs::path(TROCHOID_SOURCE_DIR) / "data/samples/s1_disc_paper/video.mp4";
+  std::ifstream in(whole, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const bool index_in_front = bytes.find("moov") < bytes.find("mdat");
+  const fs::path cut = folder_ / "cut.mp4";
+  std::ofstream(cut, std::ios::binary) << bytes.substr(0, bytes.size() * 2 / 3);
+  EXPECT_THAT(error_of(cut),
+              HasSubstr(index_in_front ? "breaks off after frame" : "not a readable video"));
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,16 @@
+#pragma once
+#include <opencv2/core.hpp>
+
+#include "libav_handles.hpp"
+
+namespace trochoid::tracking {
+
+/// 8-bit full-range luma of a decoded picture. Planar YUV and gray are read as coded (limited range
+/// stretched, deeper samples rounded to 8 bit); everything else goes through libswscale, whose
+/// context is kept in `scaler`.
+[[nodiscard]] cv::Mat luma_of(const AVFrame& picture, Scaler& scaler);
+
+/// The same picture in colour, CV_8UC3 in OpenCV's order.
+[[nodiscard]] cv::Mat bgr_of(const AVFrame& picture, Scaler& scaler);
+
+}  // namespace trochoid::tracking
