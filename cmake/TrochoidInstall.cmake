@@ -1,0 +1,20 @@
+# The install tree: libraries, public headers, the program, and a package other projects can find.
+include(CMakePackageConfigHelpers)
+include(GNUInstallDirs)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trochoid)
+set(TROCHOID_COMPONENTS data model fitting)
+if(TROCHOID_TRACKING)
+  list(APPEND TROCHOID_COMPONENTS tracking)
+endif()
+foreach(component IN LISTS TROCHOID_COMPONENTS)
+  install(TARGETS trochoid_${component} EXPORT trochoid FILE_SET HEADERS)
+endforeach()
+install(TARGETS trochoid)
+install(EXPORT trochoid NAMESPACE trochoid:: FILE trochoidTargets.cmake DESTINATION ${package_dir})
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/trochoidConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/trochoidConfig.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/trochoidConfig.cmake
+              ${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake DESTINATION ${package_dir})
