@@ -45,39 +45,61 @@ constexpr std::array<ColumnName, 30> kColumns{
      {"Fx", "force_x_N"},    {"Fy", "force_y_N"},    {"xc", "contact_x_m"},
      {"yc", "contact_y_m"},  {"slip", "slip_m_s"},   {"mode", "mode"}}};
 
+int index_of(const std::vector<std::string>& columns, std::string_view name) {
+  const auto found = std::find(columns.begin(), columns.end(), name);
+  return found == columns.end() ? -1 : static_cast<int>(found - columns.begin());
+}
+
 /// The trajectory under the reference files' column names.
 data::Table as_reference_table(const model::Trajectory& run) {
   data::Table table;
   std::vector<int> kept;
   for (const ColumnName& name : kColumns) {
-    const auto found = std::find(run.columns.begin(), run.columns.end(), name.ours);
-    if (found == run.columns.end()) continue;
+    const int found = index_of(run.columns, name.ours);
+    if (found < 0) continue;
     table.columns.emplace_back(name.reference);
-    kept.push_back(static_cast<int>(found - run.columns.begin()));
+    kept.push_back(found);
   }
-  table.values.resize(run.values.rows(), static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i)
-    table.values.col(static_cast<Eigen::Index>(i)) = run.values.col(kept[i]);
+  table.values = run.values(Eigen::all, kept);
   return table;
 }
 
-/// Largest differences to the reference over the common rows; NaN where a column is missing.
+/// Our rows at the reference's times and in its columns (empty where we have none): the reference
+/// may hold only every n-th row of the grid. Rows after the end of our run are missing.
+data::Table on_grid_of(const data::Table& reference, const data::Table& ours, double rate_hz) {
+  constexpr double kSameTime = 1e-6;  // of a grid step; files round their times to 15 digits
+  data::Table table{.header = {}, .columns = reference.columns, .values = {}};
+  std::vector<Eigen::Index> rows;
+  for (const double t : reference.column("t")) {
+    const double row = t * rate_hz;
+    if (std::abs(row - std::round(row)) > kSameTime)
+      throw InputError(
+          fmt::format("t = {} is not on the grid of {} Hz the case states", t, rate_hz));
+    if (row < static_cast<double>(ours.values.rows()) - 0.5) rows.push_back(std::lround(row));
+  }
+  table.values.setConstant(static_cast<Eigen::Index>(rows.size()), reference.values.cols(), NAN);
+  for (std::size_t i = 0; i < reference.columns.size(); ++i)
+    if (ours.has(reference.columns[i]))
+      table.values.col(static_cast<Eigen::Index>(i)) = ours.column(reference.columns[i])(rows);
+  return table;
+}
+
+/// Largest differences to the reference; NaN where a column is missing.
 struct Errors {
   double theta_rad = NAN, phi_rad = NAN, xy_m = NAN, energy = NAN, w_rad_s = NAN;
-  Eigen::Index rows = 0, missing_rows = 0;
+  Eigen::Index missing_rows = 0;
 };
 
 double largest(const Eigen::VectorXd& difference) {
-  return difference.size() == 0 ? NAN : difference.cwiseAbs().maxCoeff();
+  return difference.size() == 0 ? NAN : difference.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
 }
 
 Errors compare(const data::Table& ours, const data::Table& reference) {
   Errors errors;
-  errors.rows = std::min(ours.values.rows(), reference.values.rows());
-  errors.missing_rows = reference.values.rows() - errors.rows;
+  errors.missing_rows = reference.values.rows() - ours.values.rows();
   const auto difference = [&](const char* name) -> Eigen::VectorXd {
-    if (!ours.has(name) || !reference.has(name)) return {};
-    return ours.column(name).head(errors.rows) - reference.column(name).head(errors.rows);
+    if (!reference.has(name)) return {};
+    return ours.column(name) - reference.column(name).head(ours.values.rows());
   };
   errors.theta_rad = largest(difference("theta"));
   errors.phi_rad = largest(difference("phi"));
@@ -133,11 +155,14 @@ bool study_case(const fs::path& json, const Options& options) {
   data::ReferenceCase item = data::read_reference_case(json);
   item.scene.run.tolerance = options.tolerance;
   const auto [run, time_ms] = timed_run(item.scene);
-  const data::Table ours = as_reference_table(run);
-  if (!options.out.empty()) data::write_table(ours, options.out / (item.name + ".csv"));
+  data::Table ours = as_reference_table(run);
   std::optional<Errors> errors;
-  const fs::path csv = fs::path(json).replace_extension(".csv");
-  if (fs::exists(csv)) errors = compare(ours, data::read_table(csv));
+  if (const fs::path csv = fs::path(json).replace_extension(".csv"); fs::exists(csv)) {
+    const data::Table reference = data::read_table(csv);
+    ours = on_grid_of(reference, ours, item.scene.run.rate_hz);
+    errors = compare(ours, reference);
+  }
+  if (!options.out.empty()) data::write_table(ours, options.out / (item.name + ".csv"));
   print_row(item, run, errors, time_ms);
   return !errors || errors->missing_rows == 0;
 }
