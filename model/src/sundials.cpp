@@ -1,0 +1,299 @@
+#include "trochoid/model/sundials.hpp"
+
+#include <arkode/arkode_arkstep.h>
+#include <arkode/arkode_butcher_dirk.h>
+#include <arkode/arkode_erkstep.h>
+#include <cvodes/cvodes.h>
+#include <fmt/format.h>
+#include <nvector/nvector_serial.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+
+#include <cmath>
+#include <memory>
+#include <sundials/sundials_context.hpp>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::model {
+namespace {
+
+// --- SUNDIALS' objects, owned ------------------------------------------------------------------
+
+struct FreeVector {
+  void operator()(N_Vector v) const { N_VDestroy(v); }
+};
+using Vector = std::unique_ptr<std::remove_pointer_t<N_Vector>, FreeVector>;
+struct FreeMatrix {
+  void operator()(SUNMatrix m) const { SUNMatDestroy(m); }
+};
+using Matrix = std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix>;
+struct FreeLinearSolver {
+  void operator()(SUNLinearSolver s) const { SUNLinSolFree(s); }
+};
+using LinearSolver = std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeLinearSolver>;
+struct FreeNonlinearSolver {
+  void operator()(SUNNonlinearSolver s) const { SUNNonlinSolFree(s); }
+};
+using NonlinearSolver =
+    std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeNonlinearSolver>;
+
+Vector make_vector(const Eigen::VectorXd& values, SUNContext context) {
+  Vector v(N_VNew_Serial(values.size(), context));
+  Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(v.get()), values.size()) = values;
+  return v;
+}
+
+// --- callbacks: SUNDIALS is C, so nothing throws through it --------------------------------------
+
+constexpr int kRecoverable = 1;  // "try a shorter step"
+
+bool all_finite(const double* values, int count) {
+  for (int i = 0; i < count; ++i)
+    if (!std::isfinite(values[i])) return false;
+  return true;
+}
+
+int call_derivative(double t, N_Vector y, N_Vector dy, void* user) {
+  const Ode& ode = *static_cast<const Ode*>(user);
+  ode.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(dy));
+  return all_finite(N_VGetArrayPointer(dy), ode.states) ? 0 : kRecoverable;
+}
+
+int call_jacobian(double t, N_Vector y, N_Vector, SUNMatrix jacobian, void* user, N_Vector,
+                  N_Vector, N_Vector) {
+  const Ode& ode = *static_cast<const Ode*>(user);
+  ode.jacobian(t, N_VGetArrayPointer(y), SUNDenseMatrix_Data(jacobian));
+  return all_finite(SUNDenseMatrix_Data(jacobian), ode.states * ode.states) ? 0 : kRecoverable;
+}
+
+int call_events(double t, N_Vector y, double* g, void* user) {
+  static_cast<const Ode*>(user)->event_functions(t, N_VGetArrayPointer(y), g);
+  return 0;
+}
+
+void keep_quiet(int, const char*, const char*, char*, void*) {}  // outcomes say it instead
+
+// --- one stepper of SUNDIALS ---------------------------------------------------------------------
+
+/// What the three packages do under different names.
+class Stepper {
+ public:
+  virtual ~Stepper() = default;
+  /// Advances to t_limit_s; @returns SUNDIALS' flag.
+  virtual int advance(double t_limit_s, N_Vector y, double& t_s) = 0;
+  virtual void root_signs(int* signs) = 0;
+  virtual void count(SundialsRun& run) = 0;
+  virtual std::string flag_name(int flag) const = 0;
+};
+
+void require(int flag, const char* call) {
+  if (flag < 0) throw NumericalError(fmt::format("SUNDIALS: {} failed with flag {}", call, flag));
+}
+
+std::string named(char* name) {
+  std::string words(name);
+  std::free(name);  // SUNDIALS hands out malloc'ed text
+  return words;
+}
+
+class Cvode : public Stepper {
+ public:
+  Cvode(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
+        const SundialsOptions& options, SUNContext context) {
+    const bool stiff = options.method == SundialsMethod::cvode_bdf;
+    memory_ = CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context);
+    CVodeSetErrHandlerFn(memory_, keep_quiet, nullptr);
+    require(CVodeInit(memory_, call_derivative, start_s, y.get()), "CVodeInit");
+    require(CVodeSVtolerances(memory_, options.rtol, atol.get()), "CVodeSVtolerances");
+    CVodeSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: C interface, never written
+    CVodeSetMaxNumSteps(memory_, options.max_steps);
+    if (options.max_step_s > 0.0) CVodeSetMaxStep(memory_, options.max_step_s);
+    if (stiff)
+      use_newton(ode, y, context);
+    else
+      use_fixed_point(y, context);
+    if (ode.events > 0) require(CVodeRootInit(memory_, ode.events, call_events), "CVodeRootInit");
+  }
+  ~Cvode() override { CVodeFree(&memory_); }
+
+  int advance(double t_limit_s, N_Vector y, double& t_s) override {
+    CVodeSetStopTime(memory_, t_limit_s);
+    return CVode(memory_, t_limit_s, y, &t_s, CV_NORMAL);
+  }
+  void root_signs(int* signs) override { CVodeGetRootInfo(memory_, signs); }
+  void count(SundialsRun& run) override {
+    CVodeGetNumSteps(memory_, &run.steps);
+    CVodeGetNumRhsEvals(memory_, &run.evaluations);
+    CVodeGetNumErrTestFails(memory_, &run.failed);
+    if (linear_) CVodeGetNumJacEvals(memory_, &run.jacobians);
+  }
+  std::string flag_name(int flag) const override { return named(CVodeGetReturnFlagName(flag)); }
+
+ private:
+  void use_newton(const Ode& ode, const Vector& y, SUNContext context) {
+    matrix_.reset(SUNDenseMatrix(ode.states, ode.states, context));
+    linear_.reset(SUNLinSol_Dense(y.get(), matrix_.get(), context));
+    require(CVodeSetLinearSolver(memory_, linear_.get(), matrix_.get()), "CVodeSetLinearSolver");
+    if (ode.jacobian) require(CVodeSetJacFn(memory_, call_jacobian), "CVodeSetJacFn");
+  }
+  void use_fixed_point(const Vector& y, SUNContext context) {
+    nonlinear_.reset(SUNNonlinSol_FixedPoint(y.get(), 0, context));
+    require(CVodeSetNonlinearSolver(memory_, nonlinear_.get()), "CVodeSetNonlinearSolver");
+  }
+
+  void* memory_ = nullptr;
+  Matrix matrix_;
+  LinearSolver linear_;
+  NonlinearSolver nonlinear_;
+};
+
+class Erk : public Stepper {
+ public:
+  Erk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
+      const SundialsOptions& options, SUNContext context) {
+    memory_ = ERKStepCreate(call_derivative, start_s, y.get(), context);
+    ERKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
+    require(ERKStepSVtolerances(memory_, options.rtol, atol.get()), "ERKStepSVtolerances");
+    require(ERKStepSetTableNum(memory_, ARKODE_FEHLBERG_13_7_8), "ERKStepSetTableNum");
+    ERKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
+    ERKStepSetMaxNumSteps(memory_, options.max_steps);
+    if (options.max_step_s > 0.0) ERKStepSetMaxStep(memory_, options.max_step_s);
+    if (ode.events > 0)
+      require(ERKStepRootInit(memory_, ode.events, call_events), "ERKStepRootInit");
+  }
+  ~Erk() override { ERKStepFree(&memory_); }
+
+  // Stepping exactly to each output keeps order 8; interpolating would be of order 5 at most.
+  int advance(double t_limit_s, N_Vector y, double& t_s) override {
+    ERKStepSetStopTime(memory_, t_limit_s);
+    return ERKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
+  }
+  void root_signs(int* signs) override { ERKStepGetRootInfo(memory_, signs); }
+  void count(SundialsRun& run) override {
+    ERKStepGetNumSteps(memory_, &run.steps);
+    ERKStepGetNumRhsEvals(memory_, &run.evaluations);
+    ERKStepGetNumErrTestFails(memory_, &run.failed);
+  }
+  std::string flag_name(int flag) const override { return named(ERKStepGetReturnFlagName(flag)); }
+
+ private:
+  void* memory_ = nullptr;
+};
+
+class Dirk : public Stepper {
+ public:
+  Dirk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
+       const SundialsOptions& options, SUNContext context) {
+    memory_ = ARKStepCreate(nullptr, call_derivative, start_s, y.get(), context);
+    ARKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
+    require(ARKStepSVtolerances(memory_, options.rtol, atol.get()), "ARKStepSVtolerances");
+    require(ARKStepSetTableNum(memory_, ARKODE_ESDIRK547L2SA_7_4_5, ARKODE_ERK_NONE),
+            "ARKStepSetTableNum");
+    ARKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
+    ARKStepSetMaxNumSteps(memory_, options.max_steps);
+    if (options.max_step_s > 0.0) ARKStepSetMaxStep(memory_, options.max_step_s);
+    matrix_.reset(SUNDenseMatrix(ode.states, ode.states, context));
+    linear_.reset(SUNLinSol_Dense(y.get(), matrix_.get(), context));
+    require(ARKStepSetLinearSolver(memory_, linear_.get(), matrix_.get()),
+            "ARKStepSetLinearSolver");
+    if (ode.jacobian) require(ARKStepSetJacFn(memory_, call_jacobian), "ARKStepSetJacFn");
+    if (ode.events > 0)
+      require(ARKStepRootInit(memory_, ode.events, call_events), "ARKStepRootInit");
+  }
+  ~Dirk() override { ARKStepFree(&memory_); }
+
+  int advance(double t_limit_s, N_Vector y, double& t_s) override {
+    ARKStepSetStopTime(memory_, t_limit_s);
+    return ARKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
+  }
+  void root_signs(int* signs) override { ARKStepGetRootInfo(memory_, signs); }
+  void count(SundialsRun& run) override {
+    long explicit_evaluations = 0;
+    ARKStepGetNumSteps(memory_, &run.steps);
+    ARKStepGetNumRhsEvals(memory_, &explicit_evaluations, &run.evaluations);
+    ARKStepGetNumErrTestFails(memory_, &run.failed);
+    ARKStepGetNumJacEvals(memory_, &run.jacobians);
+  }
+  std::string flag_name(int flag) const override { return named(ARKStepGetReturnFlagName(flag)); }
+
+ private:
+  void* memory_ = nullptr;
+  Matrix matrix_;
+  LinearSolver linear_;
+};
+
+std::unique_ptr<Stepper> make_stepper(const Ode& ode, double start_s, const Vector& y,
+                                      const Vector& atol, const SundialsOptions& options,
+                                      SUNContext context) {
+  switch (options.method) {
+    case SundialsMethod::arkode_erk:
+      return std::make_unique<Erk>(ode, start_s, y, atol, options, context);
+    case SundialsMethod::arkode_dirk:
+      return std::make_unique<Dirk>(ode, start_s, y, atol, options, context);
+    default:
+      return std::make_unique<Cvode>(ode, start_s, y, atol, options, context);
+  }
+}
+
+void check_call(const Ode& ode, double start_s, const Eigen::VectorXd& y0,
+                std::span<const double> t_s, const SundialsOptions& options) {
+  if (y0.size() != ode.states || options.atol.size() != ode.states)
+    throw InputError(
+        fmt::format("integrate_sundials: {} states, but {} initial values and {} "
+                    "absolute tolerances; all must be equal",
+                    ode.states, y0.size(), options.atol.size()));
+  for (std::size_t i = 0; i < t_s.size(); ++i)
+    if (!(t_s[i] >= (i == 0 ? start_s : t_s[i - 1])))
+      throw InputError(fmt::format("integrate_sundials: t_s[{}] = {} must not precede {}", i,
+                                   t_s[i], i == 0 ? start_s : t_s[i - 1]));
+}
+
+constexpr int kRootFlag = 2;      // CV_ROOT_RETURN and ARK_ROOT_RETURN
+constexpr int kTooMuchWork = -1;  // CV_TOO_MUCH_WORK and ARK_TOO_MUCH_WORK
+static_assert(kRootFlag == CV_ROOT_RETURN && kRootFlag == ARK_ROOT_RETURN);
+static_assert(kTooMuchWork == CV_TOO_MUCH_WORK && kTooMuchWork == ARK_TOO_MUCH_WORK);
+
+int first_event(Stepper& stepper, int events) {
+  std::vector<int> signs(static_cast<std::size_t>(events), 0);
+  stepper.root_signs(signs.data());
+  for (int i = 0; i < events; ++i)
+    if (signs[static_cast<std::size_t>(i)] != 0) return i;
+  return -1;
+}
+
+}  // namespace
+
+SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::VectorXd& y0,
+                               std::span<const double> t_s, const SundialsOptions& options) {
+  check_call(ode, start_s, y0, t_s, options);
+  sundials::Context context;
+  const Vector y = make_vector(y0, context);
+  const Vector atol = make_vector(options.atol, context);
+  const auto stepper = make_stepper(ode, start_s, y, atol, options, context);
+  const Eigen::Map<const Eigen::VectorXd> state(N_VGetArrayPointer(y.get()), ode.states);
+
+  SundialsRun run;
+  run.states.resize(static_cast<Eigen::Index>(t_s.size()), ode.states);
+  run.end_s = start_s;
+  Eigen::Index rows = 0;
+  for (const double t : t_s) {
+    if (t > run.end_s) {
+      const int flag = stepper->advance(t, y.get(), run.end_s);
+      if (flag == kRootFlag) run.event = first_event(*stepper, ode.events);
+      if (flag < 0) {
+        run.outcome = flag == kTooMuchWork ? Outcome::step_limit : Outcome::tolerance_not_reachable;
+        run.message = stepper->flag_name(flag);
+      }
+      if (flag < 0 || (flag == kRootFlag && run.end_s < t)) break;
+    }
+    run.states.row(rows++) = state.transpose();
+  }
+  run.states.conservativeResize(rows, Eigen::NoChange);
+  run.end_state = state;
+  stepper->count(run);
+  return run;
+}
+
+}  // namespace trochoid::model

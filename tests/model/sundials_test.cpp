@@ -1,0 +1,121 @@
+#include "trochoid/model/sundials.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::model {
+namespace {
+
+// y'' = -y from (1, 0): y = cos t.
+template <class S>
+struct Oscillator {
+  using Scalar = S;
+  static constexpr int kStates = 2;
+  void derivative(double, const State<S, 2>& y, State<S, 2>& dy) const {
+    dy[0] = y[1];
+    dy[1] = -y[0];
+  }
+  [[nodiscard]] Oscillator<double> values() const { return {}; }
+};
+
+SundialsOptions options(SundialsMethod method, double tolerance) {
+  SundialsOptions result;
+  result.method = method;
+  result.rtol = tolerance;
+  result.atol = Eigen::VectorXd::Constant(2, tolerance);
+  return result;
+}
+
+class EveryMethod : public testing::TestWithParam<SundialsMethod> {};
+
+TEST_P(EveryMethod, FollowsTheCosine) {
+  const std::array<double, 3> times{0.0, 1.0, 5.0};
+  const double tolerance = 1e-9;
+  const SundialsRun run =
+      integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0, Eigen::Vector2d(1.0, 0.0), times,
+                         options(GetParam(), tolerance));
+  ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+  ASSERT_EQ(run.states.rows(), 3);
+  // Local errors are controlled; over a few hundred steps they add up.
+  const double allowed = 1000.0 * tolerance;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(run.states(i, 0), std::cos(times[static_cast<std::size_t>(i)]), allowed);
+}
+
+TEST_P(EveryMethod, StopsAtAnEventAndNamesIt) {
+  Ode ode = make_ode(Oscillator<Dual<4>>{});
+  ode.events = 2;
+  ode.event_functions = [](double, const double* y, double* g) {
+    g[0] = y[0] + 10.0;  // never
+    g[1] = y[0];         // at pi/2
+  };
+  const std::array<double, 2> times{1.0, 5.0};
+  const SundialsRun run =
+      integrate_sundials(ode, 0.0, Eigen::Vector2d(1.0, 0.0), times, options(GetParam(), 1e-10));
+  EXPECT_EQ(run.event, 1);
+  EXPECT_EQ(run.states.rows(), 1);
+  EXPECT_NEAR(run.end_s, 0.5 * M_PI, 1e-7);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sundials, EveryMethod,
+                         testing::Values(SundialsMethod::cvode_adams, SundialsMethod::cvode_bdf,
+                                         SundialsMethod::arkode_erk, SundialsMethod::arkode_dirk));
+
+TEST(Sundials, FollowsAStiffDecayInFewStepsWithTheExactJacobian) {
+  Ode ode;
+  ode.states = 1;
+  ode.derivative = [](double t, const double* y, double* dy) {
+    dy[0] = -1e6 * (y[0] - std::sin(t)) + std::cos(t);
+  };
+  ode.jacobian = [](double, const double*, double* j) { j[0] = -1e6; };
+  SundialsOptions stiff;
+  stiff.rtol = 1e-8;
+  stiff.atol = Eigen::VectorXd::Constant(1, 1e-10);
+  const std::array<double, 1> times{3.0};
+  const SundialsRun run =
+      integrate_sundials(ode, 0.0, Eigen::VectorXd::Constant(1, 1.0), times, stiff);
+  EXPECT_NEAR(run.states(0, 0), std::sin(3.0), 1e-6);
+  EXPECT_LT(run.steps, 5000);  // an explicit method needs 1e6 of them for stability alone
+}
+
+TEST(Sundials, NamesTheStepLimitInsteadOfGoingOnForEver) {
+  SundialsOptions few = options(SundialsMethod::cvode_adams, 1e-12);
+  few.max_steps = 3;
+  const std::array<double, 1> times{100.0};
+  const SundialsRun run = integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0,
+                                             Eigen::Vector2d(1.0, 0.0), times, few);
+  EXPECT_EQ(run.outcome, Outcome::step_limit);
+  EXPECT_EQ(run.states.rows(), 0);
+}
+
+TEST(Sundials, EndsWithAReasonAtAPole) {
+  Ode ode;
+  ode.states = 1;
+  ode.derivative = [](double, const double* y, double* dy) { dy[0] = y[0] * y[0]; };  // 1/(1 - t)
+  SundialsOptions chosen;
+  chosen.method = SundialsMethod::cvode_adams;
+  chosen.max_steps = 100000;
+  chosen.atol = Eigen::VectorXd::Constant(1, 1e-10);
+  const std::array<double, 2> times{0.5, 2.0};
+  const SundialsRun run =
+      integrate_sundials(ode, 0.0, Eigen::VectorXd::Constant(1, 1.0), times, chosen);
+  EXPECT_NE(run.outcome, Outcome::reached_end);
+  EXPECT_FALSE(run.message.empty());
+  EXPECT_NEAR(run.states(0, 0), 2.0, 1e-6);
+}
+
+TEST(Sundials, RefusesTolerancesThatDoNotMatchTheStates) {
+  SundialsOptions wrong = options(SundialsMethod::cvode_bdf, 1e-8);
+  wrong.atol.resize(1);
+  const std::array<double, 1> times{1.0};
+  EXPECT_THROW((void)integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0,
+                                        Eigen::Vector2d(1.0, 0.0), times, wrong),
+               InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::model
