@@ -1,0 +1,95 @@
+#pragma once
+#include "trochoid/model/dormand_prince.hpp"
+
+/// A disc or ring with the lowest point of its rim on the floor: geometry shared by the rolling,
+/// sliding and smooth models. Equation numbers of model/theory/rolling.md.
+///
+///   theta      angle between symmetry axis k and the vertical Z [rad]; pi/2 stands on edge
+///   phi, psi   precession and spin [rad]
+///   n e2 k     node frame: n horizontal, e2 up along the steepest line of the disc, k the axis
+///   mh         horizontal, across the node line: mh = cos(theta) e2 - sin(theta) k
+///   w1 w2 w3   angular velocity along n, e2, k [rad/s]
+///   m A C      mass [kg], central moments across and along k [kg m^2]
+///   R h        rim radius and half thickness [m]
+namespace trochoid::model {
+inline namespace TROCHOID_ISA {
+
+/// Order of the state of every model with rim contact. Rolling bodies have the first eight: their
+/// velocity follows from the rest.
+struct Rim {
+  enum Component : int { phi, theta, psi, w1, w2, w3, x, y, vx, vy };
+};
+
+struct RimBody {
+  double m = 1.0, A = 0.0, C = 0.0;
+  double R = 0.0, h = 0.0;
+  double g = 9.81;
+  /// +1: the rim below k's far face touches (theta < pi/2); -1: the other rim. h enters as side *
+  /// h.
+  double side = 1.0;
+
+  [[nodiscard]] double signed_h() const { return side * h; }
+};
+
+/// sin and cos of the tilt, height z(theta) of the centre of mass and its slope dz/dtheta;
+/// d2z/dtheta2 = -z.                                                                          (2)
+template <class S>
+struct Tilt {
+  S s, c, z, slope;
+};
+template <class S>
+[[nodiscard]] TROCHOID_INLINE Tilt<S> tilt(const RimBody& body, const S& theta) {
+  const S s = sin(theta), c = cos(theta);
+  const double h = body.signed_h();
+  return {s, c, body.R * s + h * c, body.R * c - h * s};
+}
+
+/// Angular velocity and velocity of the centre of mass in the node frame, with what they hang on.
+template <class S>
+struct NodeMotion {
+  Tilt<S> at;
+  S w1, w2, w3;
+  S precession_k;  ///< dphi cos(theta) = w2 cot(theta): the node frame's own rate about k
+  S v1, v2, v3;
+};
+
+/// Couple about the centre of mass, and body force at it, in node components [N m], [N].
+template <class S>
+struct Load {
+  S t1{0.0}, t2{0.0}, t3{0.0};
+  S d1{0.0}, d2{0.0}, d3{0.0};
+};
+
+/// Contact couple per unit normal force, node components [m].
+template <class S>
+struct ContactCouple {
+  S k1{0.0}, k2{0.0}, k3{0.0};
+};
+
+/// Force of the floor on the body: normal N along Z, and tangential along n and mh [N].
+template <class S>
+struct ContactForce {
+  S normal, along_n, along_mh;
+};
+
+/// Kinetic and potential energy above the floor [J], (9).
+template <class S>
+[[nodiscard]] S energy_J(const RimBody& body, const NodeMotion<S>& q) {
+  return 0.5 * body.m * (q.v1 * q.v1 + q.v2 * q.v2 + q.v3 * q.v3) +
+         0.5 * body.A * (q.w1 * q.w1 + q.w2 * q.w2) + 0.5 * body.C * q.w3 * q.w3 +
+         body.m * body.g * q.at.z;
+}
+
+/// Horizontal velocity of the contact point along n and mh [m/s], (3).
+template <class S>
+struct Slip {
+  S along_n, along_mh;
+};
+template <class S>
+[[nodiscard]] TROCHOID_INLINE Slip<S> slip_velocity(const RimBody& body, const NodeMotion<S>& q) {
+  const S vt = q.v2 * q.at.c - q.v3 * q.at.s;
+  return {q.v1 + body.R * q.w3 - body.signed_h() * q.w2, vt + q.at.z * q.w1};
+}
+
+}  // namespace TROCHOID_ISA
+}  // namespace trochoid::model
