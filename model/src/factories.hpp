@@ -1,0 +1,40 @@
+#pragma once
+#include <memory>
+
+#include "trochoid/model/events.hpp"
+#include "trochoid/model/predictor.hpp"
+#include "trochoid/model/simulate.hpp"
+
+/// One function per rung; predictor.cpp and simulate.cpp choose by the scene's model name.
+namespace trochoid::model {
+
+std::unique_ptr<Predictor> make_top(const data::Scene& scene);
+std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene);
+
+Trajectory simulate_free(const data::Scene& scene);
+Trajectory simulate_top(const data::Scene& scene);
+Trajectory simulate_top_euler(const data::Scene& scene);
+
+/// How a run that an integrator ended is called to the outside.
+[[nodiscard]] inline Outcome outcome_of(RunEnd end) {
+  switch (end) {
+    case RunEnd::step_limit:
+      return Outcome::step_limit;
+    case RunEnd::rounding_limit:
+      return Outcome::tolerance_not_reachable;
+    case RunEnd::not_finite:
+      return Outcome::out_of_domain;
+    default:
+      return Outcome::reached_end;
+  }
+}
+
+/// Checks what every predictor promises: as many finite values as parameters, each in its range,
+/// times ascending from start_s. @throws InputError.
+void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::VectorXd>& values,
+                   const PredictRequest& request);
+
+/// The output times of a scene's [run]: 0, 1/rate, ... up to until_s. @throws InputError.
+[[nodiscard]] std::vector<double> output_times_s(const data::RunSettings& run);
+
+}  // namespace trochoid::model

@@ -1,0 +1,56 @@
+#include "trochoid/model/predictor.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "factories.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::model {
+
+int Predictor::index_of(const std::string& parameter) const {
+  const auto& list = parameters();
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (list[i].name == parameter) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::VectorXd>& values,
+                   const PredictRequest& request) {
+  const auto& list = predictor.parameters();
+  if (values.size() != static_cast<Eigen::Index>(list.size())) {
+    throw InputError(fmt::format("model {}: {} values for {} parameters", predictor.model_name(),
+                                 values.size(), list.size()));
+  }
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const double value = values[static_cast<Eigen::Index>(i)];
+    if (!std::isfinite(value) || value < list[i].lower || value > list[i].upper) {
+      throw InputError(fmt::format("model {}: {} = {} must lie between {} and {}",
+                                   predictor.model_name(), list[i].name, value, list[i].lower,
+                                   list[i].upper));
+    }
+  }
+  double previous = request.start_s;
+  for (const double t : request.t_s) {
+    if (!(t >= previous)) {
+      throw InputError(fmt::format("t_s = {} does not ascend from {}", t, previous));
+    }
+    previous = t;
+  }
+  for (const int index : request.derivatives) {
+    if (index < 0 || index >= values.size())
+      throw InputError(
+          fmt::format("derivative by parameter {}: there are {}", index, values.size()));
+  }
+}
+
+std::unique_ptr<Predictor> make_predictor(const data::Scene& scene) {
+  const std::string& name = scene.model.name;
+  if (name == "top") return make_top(scene);
+  throw InputError(
+      fmt::format("model.name = \"{}\" cannot be predicted; models with a path are top", name));
+}
+
+}  // namespace trochoid::model

@@ -1,0 +1,40 @@
+#include "trochoid/model/simulate.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "factories.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::model {
+
+std::vector<double> output_times_s(const data::RunSettings& run) {
+  if (!(run.until_s > 0.0) || !std::isfinite(run.until_s))
+    throw InputError(fmt::format("run.until_s = {} must be greater than 0", run.until_s));
+  if (!(run.rate_hz > 0.0) || !std::isfinite(run.rate_hz))
+    throw InputError(fmt::format("run.rate_hz = {} must be greater than 0", run.rate_hz));
+  constexpr double kMostRows = 5e7;  // some GB of numbers
+  // A grid whose last point misses until_s by rounding still has that point.
+  const double last = std::floor(run.until_s * run.rate_hz * (1.0 + 1e-12) + 1e-9);
+  if (last > kMostRows) {
+    throw InputError(
+        fmt::format("run.until_s = {} at run.rate_hz = {} asks for {:.0f} rows; lower one",
+                    run.until_s, run.rate_hz, last + 1.0));
+  }
+  std::vector<double> t_s(static_cast<std::size_t>(last) + 1);
+  for (std::size_t n = 0; n < t_s.size(); ++n)
+    t_s[n] = std::min(static_cast<double>(n) / run.rate_hz, run.until_s);
+  return t_s;
+}
+
+Trajectory simulate(const data::Scene& scene) {
+  if (!(scene.run.tolerance > 0.0) || scene.run.tolerance > 0.1) {
+    throw InputError(
+        fmt::format("run.tolerance = {} must lie between 0 and 0.1", scene.run.tolerance));
+  }
+  const std::string& name = scene.model.name;
+  throw InputError(fmt::format("model.name = \"{}\" cannot be simulated; none is ready", name));
+}
+
+}  // namespace trochoid::model

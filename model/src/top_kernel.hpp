@@ -1,0 +1,52 @@
+#pragma once
+
+/// What the top's inner loops take and give: plain numbers, so that copies built for different
+/// instruction sets share nothing but these.
+namespace trochoid::model {
+
+/// Parameters that need the variational equations; the others enter the observation in closed form.
+enum TopVariable {
+  kTopA,
+  kTopB,
+  kTopGamma1,
+  kTopGamma3,
+  kTopTheta,
+  kTopDtheta,
+  kTopDphi,
+  kTopVariables
+};
+
+inline constexpr int kTopLanes = 8;
+
+struct TopRun {
+  double variable[kTopVariables];
+  double phi_rad = 0.0;
+  bool drag = false;
+  bool with_derivatives = false;
+  bool with_angles = false;  ///< follow phi and psi, not only the axis
+  double start_s = 0.0;
+  double end_s = 0.0;
+  const double* t_s = nullptr;
+  int count = 0;
+  double tolerance = 1e-9;
+  int max_steps = 1000000;
+};
+
+/// Columns: 0..2 axis k, 3 phi (unwrapped), 4 psi without psi_0 and omega_s (zero at the start).
+inline constexpr int kTopColumns = 5;
+/// End state: theta, phi, dtheta, dphi, b, psi as in column 4.
+inline constexpr int kTopEndValues = 6;
+
+struct TopResult {
+  double* value[kTopColumns] = {};       ///< count numbers each, or null
+  double* derivative[kTopColumns] = {};  ///< count x kTopLanes, lane = TopVariable; or null
+  double end[kTopEndValues] = {};
+  double end_derivative[kTopEndValues][kTopLanes] = {};
+  int written = 0;     ///< times that have been reached
+  int end_reason = 0;  ///< RunEnd
+  double reached_s = 0.0;
+  int steps = 0, rejected = 0, evaluations = 0;
+  double error_sum = 0.0;  ///< local errors of k added up
+};
+
+}  // namespace trochoid::model

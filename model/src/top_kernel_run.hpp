@@ -1,0 +1,277 @@
+#pragma once
+#include "top_kernel.hpp"
+#include "trochoid/model/events.hpp"
+#include "trochoid/model/top.hpp"
+
+/// The top's run over its output times, included once per instruction set.
+namespace trochoid::model {
+inline namespace TROCHOID_ISA {
+namespace top_kernel {
+
+constexpr double kPi = 3.14159265358979323846;
+
+TROCHOID_INLINE double wrapped(double angle) {
+  return angle - 2.0 * kPi * __builtin_floor(angle / (2.0 * kPi) + 0.5);
+}
+
+template <class S>
+TROCHOID_INLINE S variable(const TopRun& run, TopVariable which) {
+  if constexpr (requires { S::kLanes; }) {
+    return S::variable(run.variable[which], which);
+  } else {
+    return run.variable[which];
+  }
+}
+
+TROCHOID_INLINE void store(double* value, double*, int n, double x) {
+  value[n] = x;
+}
+TROCHOID_INLINE void store(double* value, double* derivative, int n, const Dual<kTopLanes>& x) {
+  value[n] = x.value;
+  for (int lane = 0; lane < kTopLanes; ++lane) {
+    derivative[n * kTopLanes + lane] = x.derivative[lane];
+  }
+}
+TROCHOID_INLINE void store_end(TopResult& result, int i, double x) {
+  result.end[i] = x;
+}
+TROCHOID_INLINE void store_end(TopResult& result, int i, const Dual<kTopLanes>& x) {
+  result.end[i] = x.value;
+  for (int lane = 0; lane < kTopLanes; ++lane) {
+    result.end_derivative[i][lane] = x.derivative[lane];
+  }
+}
+
+/// Errors count where they matter: in the tilt of the axis, relative to how far it can move. Near
+/// the upright position the horizontal components are what grows, so their floor shrinks with them;
+/// L gets the scale of its fast part b k.
+template <class System>
+StepControl<System::kStates> control_for(const TopRun& run, const AxisAndMomentum<double>& start) {
+  const double b = __builtin_fabs(run.variable[kTopB]);
+  const double root_a = __builtin_sqrt(__builtin_fabs(run.variable[kTopA]));
+  const double sine = __builtin_hypot(start.k[0], start.k[1]);
+  const double across = __builtin_hypot(run.variable[kTopDtheta], run.variable[kTopDphi] * sine);
+  const double rate = b + root_a + across + 1e-300;
+  double amplitude = sine + across / rate;
+  amplitude = amplitude > 1.0 ? 1.0 : (amplitude < 1e-16 ? 1e-16 : amplitude);
+  StepControl<System::kStates> control;
+  control.rtol = run.tolerance;
+  control.max_steps = run.max_steps;
+  for (int i = 0; i < System::kStates; ++i) control.atol[i] = run.tolerance;
+  for (int i = 0; i < System::kAxis; ++i) control.atol[i] = run.tolerance * amplitude * rate;
+  control.atol[System::kAxis] = control.atol[System::kAxis + 1] = run.tolerance * amplitude;
+  return control;
+}
+
+/// phi as a continuous angle: the axis is looked at often enough that it cannot turn by half a
+/// revolution unseen, except exactly through the pole, where phi jumps by nature.
+class Azimuth {
+ public:
+  void start(double phi_rad) { phi_ = phi_rad; }
+  TROCHOID_INLINE double follow(double kx, double ky) {
+    if (kx != 0.0 || ky != 0.0) phi_ += wrapped(__builtin_atan2(kx, -ky) - phi_);
+    return phi_;
+  }
+
+ private:
+  double phi_ = 0.0;
+};
+
+template <class S>
+TROCHOID_INLINE S azimuth(const S& kx, const S& ky, double near) {
+  const double phi = near;
+  if constexpr (requires { S::kLanes; }) {
+    S result = atan2(kx, -ky);
+    result.value = phi;
+    return result;
+  } else {
+    return phi;
+  }
+}
+
+/// Samples between outputs at which the azimuth is followed within one step.
+constexpr int kLooks = 16;
+
+template <class System>
+class Run {
+ public:
+  using S = typename System::Scalar;
+  static constexpr bool kAngles = requires(System system) { system.side; };
+
+  Run(const TopRun& run, TopResult& result) : run_(run), result_(result) {}
+
+  void operator()() {
+    const TopAngles<S> angles{variable<S>(run_, kTopTheta), S(run_.phi_rad),
+                              variable<S>(run_, kTopDtheta), variable<S>(run_, kTopDphi)};
+    const S b = variable<S>(run_, kTopB);
+    const auto start = axis_and_momentum(angles, b);
+    State<S, System::kStates> y;
+    const System system = make_system(b, start, y);
+    DormandPrince<System> stepper(system, control(start));
+    azimuth_.start(run_.phi_rad);
+    stepper.start(run_.start_s, y);
+    stepper.prepare_dense();
+    hand_out(stepper, run_.start_s);
+    StepEnd end = StepEnd::accepted;
+    while (stepper.t_s() < run_.end_s && end == StepEnd::accepted) {
+      end = stepper.step(run_.end_s);
+      if (end == StepEnd::accepted) after_step(stepper);
+    }
+    finish(stepper, end);
+  }
+
+ private:
+  System make_system(const S& b, const AxisAndMomentum<S>& start,
+                     State<S, System::kStates>& y) const {
+    const S a = variable<S>(run_, kTopA), gamma1 = variable<S>(run_, kTopGamma1),
+            gamma3 = variable<S>(run_, kTopGamma3);
+    System system;
+    if constexpr (kAngles) {
+      State<S, System::kStates - 1> base;
+      static_cast<typename System::Base_&>(system) = System::at(a, b, gamma1, gamma3, start, base);
+      for (int i = 0; i + 1 < System::kStates; ++i) y[i] = base[i];
+      system.side = value_of(start.k[2]) < -0.5 ? -1.0 : 1.0;
+      y[System::kStates - 1] = S(run_.phi_rad);  // phi + psi, or phi - psi: psi counts from zero
+    } else {
+      system = System::at(a, b, gamma1, gamma3, start, y);
+    }
+    return system;
+  }
+  [[nodiscard]] StepControl<System::kStates> control(const AxisAndMomentum<S>& start) const {
+    AxisAndMomentum<double> values;
+    for (int i = 0; i < 3; ++i) {
+      values.k[i] = value_of(start.k[i]);
+      values.L[i] = value_of(start.L[i]);
+    }
+    return control_for<System>(run_, values);
+  }
+
+  void after_step(DormandPrince<System>& stepper) {
+    const double t = stepper.t_s();
+    const bool outputs = next_ < run_.count && run_.t_s[next_] <= t;
+    if (outputs || kAngles) stepper.prepare_dense();
+    if constexpr (kAngles) {
+      for (int look = 1; look <= kLooks; ++look) {
+        const double u = static_cast<double>(look) / kLooks;
+        hand_out(stepper, stepper.t_previous_s() + u * stepper.step_s());
+        azimuth_.follow(stepper.dense_value(System::kAxis, u),
+                        stepper.dense_value(System::kAxis + 1, u));
+      }
+      hand_out(stepper, t);
+      change_side(stepper);
+    } else {
+      if (outputs) hand_out(stepper, t);
+    }
+  }
+  void hand_out(DormandPrince<System>& stepper, double until) {
+    for (; next_ < run_.count && run_.t_s[next_] <= until; ++next_) {
+      write(stepper, next_, stepper.fraction(run_.t_s[next_]));
+    }
+  }
+  void write(DormandPrince<System>& stepper, int n, double u) {
+    const S kx = stepper.dense(System::kAxis, u), ky = stepper.dense(System::kAxis + 1, u);
+    put(0, n, kx);
+    put(1, n, ky);
+    if (result_.value[2] != nullptr) put(2, n, stepper.dense(System::kAxis + 2, u));
+    if constexpr (kAngles) {
+      const S phi = azimuth(kx, ky, azimuth_.follow(value_of(kx), value_of(ky)));
+      put(3, n, phi);
+      put(4, n, spin_angle(stepper, phi, stepper.dense(System::kStates - 1, u)));
+    }
+  }
+  TROCHOID_INLINE void put(int column, int n, const S& x) {
+    store(result_.value[column], result_.derivative[column], n, x);
+  }
+  [[nodiscard]] S spin_angle(const DormandPrince<System>& stepper, const S& phi,
+                             const S& combined) const {
+    return stepper.system().side > 0.0 ? combined - phi : phi - combined;
+  }
+  /// Below -0.5 use phi - psi, above +0.5 phi + psi: each is regular there (9).
+  void change_side(DormandPrince<System>& stepper) {
+    const double kz = value_of(stepper.y()[System::kAxis + 2]);
+    const double side = stepper.system().side;
+    if (side * kz > -0.5) return;
+    auto y = stepper.y();
+    const S kx = y[System::kAxis], ky = y[System::kAxis + 1];
+    const S phi = azimuth(kx, ky, azimuth_.follow(value_of(kx), value_of(ky)));
+    y[System::kStates - 1] = 2.0 * phi - y[System::kStates - 1];
+    stepper.system().side = -side;
+    stepper.start(stepper.t_s(), y);
+  }
+
+  void finish(DormandPrince<System>& stepper, StepEnd end) {
+    result_.written = next_;
+    result_.end_reason = static_cast<int>(end == StepEnd::accepted         ? RunEnd::reached_end
+                                          : end == StepEnd::step_limit     ? RunEnd::step_limit
+                                          : end == StepEnd::rounding_limit ? RunEnd::rounding_limit
+                                                                           : RunEnd::not_finite);
+    result_.reached_s = stepper.t_s();
+    const StepCounts& counts = stepper.counts();
+    result_.steps = counts.steps;
+    result_.rejected = counts.rejected;
+    result_.evaluations = counts.evaluations;
+    result_.error_sum = counts.error_sum * run_.tolerance;
+    store_end_state(stepper);
+  }
+  void store_end_state(DormandPrince<System>& stepper) {
+    const auto& y = stepper.y();
+    const System& system = stepper.system();
+    AxisAndMomentum<S> state;
+    S b;
+    if constexpr (kAngles) {
+      const auto base = System::base(y);
+      state = system.unpack(base);
+      b = system.spin(base);
+    } else {
+      state = system.unpack(y);
+      b = system.spin(y);
+    }
+    const TopAngles<S> angles = angles_of(state, b);
+    S phi = angles.phi_rad;
+    if constexpr (kAngles) {
+      phi = azimuth(state.k[0], state.k[1],
+                    azimuth_.follow(value_of(state.k[0]), value_of(state.k[1])));
+      store_end(result_, 5, spin_angle(stepper, phi, y[System::kStates - 1]));
+    }
+    store_end(result_, 0, angles.theta_rad);
+    store_end(result_, 1, phi);
+    store_end(result_, 2, angles.dtheta_rad_s);
+    store_end(result_, 3, angles.dphi_rad_s);
+    store_end(result_, 4, b);
+  }
+
+  const TopRun& run_;
+  TopResult& result_;
+  Azimuth azimuth_;
+  int next_ = 0;
+};
+
+template <class S>
+void run_with(const TopRun& run, TopResult& result) {
+  if (run.drag) {
+    if (run.with_angles) {
+      Run<WithSpinAngle<TopWithDrag<S>>>(run, result)();
+    } else {
+      Run<TopWithDrag<S>>(run, result)();
+    }
+  } else {
+    if (run.with_angles) {
+      Run<WithSpinAngle<Top<S>>>(run, result)();
+    } else {
+      Run<Top<S>>(run, result)();
+    }
+  }
+}
+
+}  // namespace top_kernel
+
+void run_top(const TopRun& run, TopResult& result) {
+  if (run.with_derivatives) {
+    top_kernel::run_with<Dual<kTopLanes>>(run, result);
+  } else {
+    top_kernel::run_with<double>(run, result);
+  }
+}
+
+}  // namespace TROCHOID_ISA
+}  // namespace trochoid::model

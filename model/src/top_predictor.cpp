@@ -1,0 +1,321 @@
+#include <cmath>
+#include <limits>
+
+#include "factories.hpp"
+#include "top_dispatch.hpp"
+#include "top_scene.hpp"
+
+// The top as a function of its parameters: the kernel follows the axis k, everything else (length,
+// pivot, azimuth, spin) enters the observation in closed form.
+namespace trochoid::model {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using Role = ParameterInfo::Role;
+
+enum Parameter {
+  kA,
+  kB,
+  kL,
+  kGamma1,
+  kGamma3,
+  kTheta,
+  kPhi,
+  kDtheta,
+  kDphi,
+  kPsi,
+  kOmega,
+  kPivotX,
+  kPivotY
+};
+
+struct Entry {
+  Parameter parameter;
+  ParameterInfo info;
+};
+
+std::vector<Entry> entries(const TopSettings& top) {
+  std::vector<Entry> list{{kA,
+                           {"a_1_s2", "1/s^2", Role::dynamics, 0.0, kInfinity, true, top.a_1_s2,
+                            true, "weight couple over moment, m g l / I"}},
+                          {kB,
+                           {"b_1_s", "1/s", Role::initial, -kInfinity, kInfinity, false, top.b_1_s,
+                            true, "spin momentum over moment, Is omega_s / I"}},
+                          {kL,
+                           {"l_m", "m", Role::dynamics, 0.0, kInfinity, true, top.l_m, true,
+                            "distance from pivot to centre of mass"}}};
+  if (top.drag) {
+    list.push_back({kGamma1,
+                    {"gamma1_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma1_1_s,
+                     true, "drag across the axis, c1 / I"}});
+    list.push_back({kGamma3,
+                    {"gamma3_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma3_1_s,
+                     true, "drag on the spin, c3 / Is"}});
+  }
+  const std::vector<Entry> rest{
+      {kTheta, {"theta_rad", "rad", Role::initial, 0.0, M_PI, false, top.theta_rad, true, "tilt"}},
+      {kPhi,
+       {"phi_rad", "rad", Role::initial, -kInfinity, kInfinity, false, top.phi_rad, true,
+        "precession angle"}},
+      {kDtheta,
+       {"dtheta_rad_s", "rad/s", Role::initial, -kInfinity, kInfinity, false, top.dtheta_rad_s,
+        true, "tilting rate"}},
+      {kDphi,
+       {"dphi_rad_s", "rad/s", Role::initial, -kInfinity, kInfinity, false, top.dphi_rad_s, true,
+        "precession rate"}},
+      {kPsi,
+       {"psi_rad", "rad", Role::initial, -kInfinity, kInfinity, false, top.psi_rad, false,
+        "spin angle"}},
+      {kOmega,
+       {"omega_s_rad_s", "rad/s", Role::initial, -kInfinity, kInfinity, false, top.omega_s_rad_s,
+        false, "spin about the own axis; only a mark shows it"}},
+      {kPivotX,
+       {"pivot_x_m", "m", Role::observation, -kInfinity, kInfinity, false, top.pivot_x_m, false,
+        "pivot in the table frame"}},
+      {kPivotY,
+       {"pivot_y_m", "m", Role::observation, -kInfinity, kInfinity, false, top.pivot_y_m, false,
+        "pivot in the table frame"}}};
+  list.insert(list.end(), rest.begin(), rest.end());
+  return list;
+}
+
+int lane_of(Parameter parameter) {
+  switch (parameter) {
+    case kA:
+      return kTopA;
+    case kB:
+      return kTopB;
+    case kGamma1:
+      return kTopGamma1;
+    case kGamma3:
+      return kTopGamma3;
+    case kTheta:
+      return kTopTheta;
+    case kDtheta:
+      return kTopDtheta;
+    case kDphi:
+      return kTopDphi;
+    default:
+      return -1;
+  }
+}
+
+/// Integral of exp(-g s) over [0, t] and its derivative by g: the spin left under drag.
+struct Decay {
+  double integral, by_gamma;
+};
+Decay decay(double gamma, double t) {
+  const double x = gamma * t;
+  if (x < 1e-4) {  // series: the closed form cancels; next term x^3/24, below 1e-13
+    return {t * (1.0 - x / 2.0 + x * x / 6.0), t * t * (-0.5 + x / 3.0 - x * x / 8.0)};
+  }
+  const double e = std::exp(-x);
+  return {(1.0 - e) / gamma, (t * e * gamma - (1.0 - e)) / (gamma * gamma)};
+}
+
+class TopPredictor : public Predictor {
+ public:
+  explicit TopPredictor(const TopSettings& top) : drag_(top.drag) {
+    for (Entry& entry : entries(top)) {
+      kinds_.push_back(entry.parameter);
+      infos_.push_back(std::move(entry.info));
+    }
+  }
+  [[nodiscard]] const std::string& model_name() const override { return name_; }
+  [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override { return infos_; }
+  [[nodiscard]] Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                   const PredictRequest& request) const override;
+
+ private:
+  struct Work;
+  [[nodiscard]] double get(const Eigen::Ref<const Eigen::VectorXd>& values, Parameter which) const;
+  void fill_observable(const Work& work, int slot, Prediction& prediction) const;
+  void fill_end(const Work& work, Prediction& prediction) const;
+  [[nodiscard]] double derivative(const Work& work, Observable what, Parameter by, int n) const;
+
+  std::string name_ = "top";
+  bool drag_;
+  std::vector<Parameter> kinds_;
+  std::vector<ParameterInfo> infos_;
+};
+
+/// One call's run and what it was asked.
+struct TopPredictor::Work {
+  const PredictRequest& request;
+  TopRun run;
+  TopResult result;
+  double l_m, omega_s, gamma3, psi_rad, pivot_x_m, pivot_y_m;
+  std::vector<double> values, derivatives;
+
+  [[nodiscard]] double value(int column, int n) const { return result.value[column][n]; }
+  [[nodiscard]] double lane(int column, int n, int i) const {
+    return result.derivative[column][static_cast<std::ptrdiff_t>(n) * kTopLanes + i];
+  }
+  void prepare() {
+    const std::size_t count = request.t_s.size();
+    const int columns = run.with_angles ? kTopColumns : 3;
+    values.resize(count * columns);
+    if (run.with_derivatives) derivatives.resize(count * columns * kTopLanes);
+    for (int c = 0; c < columns; ++c) {
+      result.value[c] = values.data() + c * count;
+      if (run.with_derivatives) result.derivative[c] = derivatives.data() + c * count * kTopLanes;
+    }
+  }
+};
+
+double TopPredictor::get(const Eigen::Ref<const Eigen::VectorXd>& values, Parameter which) const {
+  for (std::size_t i = 0; i < kinds_.size(); ++i) {
+    if (kinds_[i] == which) return values[static_cast<Eigen::Index>(i)];
+  }
+  return 0.0;
+}
+
+bool wants_angles(const PredictRequest& request) {
+  for (const Observable what : request.observables) {
+    if (what == Observable::phi_rad || what == Observable::psi_rad) return true;
+  }
+  return request.want_end_state;
+}
+
+Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                 const PredictRequest& request) const {
+  check_request(*this, values, request);
+  Work work{request,
+            {},
+            {},
+            get(values, kL),
+            get(values, kOmega),
+            get(values, kGamma3),
+            get(values, kPsi),
+            get(values, kPivotX),
+            get(values, kPivotY),
+            {},
+            {}};
+  TopRun& run = work.run;
+  for (const Parameter which : {kA, kB, kGamma1, kGamma3, kTheta, kDtheta, kDphi})
+    run.variable[lane_of(which)] = get(values, which);
+  run.phi_rad = get(values, kPhi);
+  run.drag = drag_;
+  run.with_derivatives = !request.derivatives.empty();
+  run.with_angles = wants_angles(request);
+  run.start_s = request.start_s;
+  run.t_s = request.t_s.data();
+  run.count = static_cast<int>(request.t_s.size());
+  run.end_s = request.t_s.empty() ? request.start_s : request.t_s.back();
+  run.tolerance = request.tolerance;
+  work.prepare();
+  run_top_here(run, work.result);
+
+  Prediction prediction;
+  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
+  prediction.values.resize(rows);
+  prediction.jacobian.resize(rows, static_cast<Eigen::Index>(request.derivatives.size()));
+  for (std::size_t slot = 0; slot < request.observables.size(); ++slot)
+    fill_observable(work, static_cast<int>(slot), prediction);
+  if (request.want_end_state) fill_end(work, prediction);
+  prediction.outcome = outcome_of(static_cast<RunEnd>(work.result.end_reason));
+  prediction.valid_until_s = work.result.reached_s;
+  prediction.error_estimate = work.l_m * work.result.error_sum;
+  prediction.steps = work.result.steps;
+  return prediction;
+}
+
+double TopPredictor::derivative(const Work& work, Observable what, Parameter by, int n) const {
+  const int lane = lane_of(by);
+  const double kx = work.value(0, n), ky = work.value(1, n), kz = work.value(2, n);
+  switch (what) {
+    case Observable::x_m:
+      if (lane >= 0) return work.l_m * work.lane(0, n, lane);
+      return by == kL ? kx : by == kPhi ? -work.l_m * ky : by == kPivotX ? 1.0 : 0.0;
+    case Observable::y_m:
+      if (lane >= 0) return work.l_m * work.lane(1, n, lane);
+      return by == kL ? ky : by == kPhi ? work.l_m * kx : by == kPivotY ? 1.0 : 0.0;
+    case Observable::theta_rad: {
+      if (lane < 0) return 0.0;
+      const double s = std::hypot(kx, ky);
+      const double ds = (kx * work.lane(0, n, lane) + ky * work.lane(1, n, lane)) / s;
+      return kz * ds - s * work.lane(2, n, lane);
+    }
+    case Observable::phi_rad:
+      return lane >= 0 ? work.lane(3, n, lane) : by == kPhi ? 1.0 : 0.0;
+    case Observable::psi_rad: {
+      const Decay spin = decay(work.gamma3, work.request.t_s[n] - work.request.start_s);
+      double total = lane >= 0 ? work.lane(4, n, lane) : 0.0;
+      if (by == kGamma3) total += work.omega_s * spin.by_gamma;
+      if (by == kOmega) total += spin.integral;
+      if (by == kPsi) total += 1.0;
+      return total;
+    }
+  }
+  return 0.0;
+}
+
+void TopPredictor::fill_observable(const Work& work, int slot, Prediction& prediction) const {
+  const PredictRequest& request = work.request;
+  const auto stride = static_cast<int>(request.observables.size());
+  const Observable what = request.observables[static_cast<std::size_t>(slot)];
+  const auto value = [&](int n) {
+    switch (what) {
+      case Observable::x_m:
+        return work.pivot_x_m + work.l_m * work.value(0, n);
+      case Observable::y_m:
+        return work.pivot_y_m + work.l_m * work.value(1, n);
+      case Observable::theta_rad:
+        return std::atan2(std::hypot(work.value(0, n), work.value(1, n)), work.value(2, n));
+      case Observable::phi_rad:
+        return work.value(3, n);
+      case Observable::psi_rad:
+        break;
+    }
+    return work.psi_rad + work.value(4, n) +
+           work.omega_s * decay(work.gamma3, request.t_s[n] - request.start_s).integral;
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const int count = static_cast<int>(request.t_s.size()), reached = work.result.written;
+  for (int n = 0; n < count; ++n)
+    prediction.values[n * stride + slot] = n < reached ? value(n) : kNan;
+  for (std::size_t column = 0; column < request.derivatives.size(); ++column) {
+    const Parameter by = kinds_[static_cast<std::size_t>(request.derivatives[column])];
+    double* out = prediction.jacobian.col(static_cast<Eigen::Index>(column)).data() + slot;
+    for (int n = 0; n < count; ++n)
+      out[n * stride] = n < reached ? derivative(work, what, by, n) : kNan;
+  }
+}
+
+void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
+  const TopResult& result = work.result;
+  const Decay spin = decay(work.gamma3, result.reached_s - work.request.start_s);
+  const double left = std::exp(-work.gamma3 * (result.reached_s - work.request.start_s));
+  // In the order of the initial parameters: b, theta, phi, dtheta, dphi, psi, omega_s.
+  constexpr int kSource[] = {4, 0, 1, 2, 3, 5};
+  prediction.end_state.resize(7);
+  for (int i = 0; i < 6; ++i) prediction.end_state[i] = result.end[kSource[i]];
+  prediction.end_state[5] += work.psi_rad + work.omega_s * spin.integral;
+  prediction.end_state[6] = work.omega_s * left;
+  prediction.end_state_jacobian.setZero(7,
+                                        static_cast<Eigen::Index>(work.request.derivatives.size()));
+  for (std::size_t c = 0; c < work.request.derivatives.size(); ++c) {
+    const Parameter by = kinds_[static_cast<std::size_t>(work.request.derivatives[c])];
+    auto column = prediction.end_state_jacobian.col(static_cast<Eigen::Index>(c));
+    const int lane = lane_of(by);
+    for (int i = 0; i < 6 && lane >= 0; ++i) column[i] = result.end_derivative[kSource[i]][lane];
+    if (by == kPhi) column[2] = 1.0;
+    if (by == kPsi) column[5] = 1.0;
+    if (by == kOmega) {
+      column[5] = spin.integral;
+      column[6] = left;
+    }
+    if (by == kGamma3) {
+      column[5] += work.omega_s * spin.by_gamma;
+      column[6] = -work.omega_s * left * (result.reached_s - work.request.start_s);
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Predictor> make_top(const data::Scene& scene) {
+  return std::make_unique<TopPredictor>(top_for_prediction(scene));
+}
+
+}  // namespace trochoid::model

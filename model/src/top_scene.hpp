@@ -1,0 +1,28 @@
+#pragma once
+#include "trochoid/data/scene.hpp"
+
+namespace trochoid::model {
+
+/// What a scene says about a top, with the groups that enter its dynamics.
+struct TopSettings {
+  double a_1_s2 = 1.0;      ///< m g l / I
+  double b_1_s = 1.0;       ///< Is omega_s / I
+  double l_m = 0.1;         ///< pivot to CoM
+  double gamma1_1_s = 0.0;  ///< c1 / I
+  double gamma3_1_s = 0.0;  ///< c3 / Is
+  bool drag = false;
+  double omega_s_rad_s = 1.0;
+  double theta_rad = 0.0, phi_rad = 0.0, psi_rad = 0.0;
+  double dtheta_rad_s = 0.0, dphi_rad_s = 0.0;
+  double pivot_x_m = 0.0, pivot_y_m = 0.0;
+  /// For the energy; without mass and moments the energy is per unit I.
+  double I_kg_m2 = 1.0, Is_kg_m2 = 1.0, weight_times_l_J = 0.0;
+};
+
+/// For a fit: what is missing gets a value to start from.
+[[nodiscard]] TopSettings top_for_prediction(const data::Scene& scene);
+/// For a run: everything that moves the top must be said.
+/// @throws InputError naming the missing field.
+[[nodiscard]] TopSettings top_for_simulation(const data::Scene& scene);
+
+}  // namespace trochoid::model
