@@ -41,7 +41,7 @@ double TableReader::number(const std::string& key, const toml::node& node,
                            const Range& range) const {
   const auto value = node.value<double>();
   if (!node.is_number() || !value)
-    fail_at(node, fmt::format("{} must be a number {}", key, range.words));
+    fail_at(node, fmt::format("{} must be a number, {}", key, range.words));
   if (!std::isfinite(*value) || !range.holds(*value))
     fail_at(node, fmt::format("{} = {} must be {}", key, *value, range.words));
   return *value;

@@ -119,7 +119,7 @@ void read_header(const CsvReader& csv, const std::string& where, TrackFile& file
     } else if (key == "note") {
       file.notes.push_back(value);
     } else {
-      file.notes.push_back(value.empty() ? key : key + ": " + value);
+      file.notes.push_back(value.empty() ? key : fmt::format("{}: {}", key, value));
     }
   }
 }
