@@ -17,7 +17,8 @@ namespace {
 using RollingInAir = Rolling<double, LinearAir>;
 
 // Ring 30/27 mm, 2h = 8 mm, air couple c3 = 6 c1, rolling from near steady motion for 9 s; or the
-// disc of the same mass and radius with the couple scaled by its transverse moment.
+// disc of the same mass, radius and material (so 1.52 mm thick) with the couple scaled by its
+// transverse moment.
 RimBody ring_body() {
   return {.m = 0.03373693518837008,
           .A = 1.3919297176468351e-05,
@@ -64,6 +65,7 @@ TEST(MeanPath, OfARingInAirTurnsRetrogradeWhereTheReferenceSays) {
 
 TEST(MeanPath, OfADiscOfTheSameMassAndRadiusStaysPrograde) {
   RimBody disc = ring_body();
+  disc.h = 0.004 * (1.0 - 0.9 * 0.9);  // the bore of 0.9 R filled, the thickness reduced instead
   disc.A = disc.m * (3.0 * disc.R * disc.R + 4.0 * disc.h * disc.h) / 12.0;
   disc.C = 0.5 * disc.m * disc.R * disc.R;
   data::Body shape;
