@@ -15,19 +15,8 @@ Trajectory simulate_free(const data::Scene& scene);
 Trajectory simulate_top(const data::Scene& scene);
 Trajectory simulate_top_euler(const data::Scene& scene);
 
-/// How a run that an integrator ended is called to the outside.
-[[nodiscard]] inline Outcome outcome_of(RunEnd end) {
-  switch (end) {
-    case RunEnd::step_limit:
-      return Outcome::step_limit;
-    case RunEnd::rounding_limit:
-      return Outcome::tolerance_not_reachable;
-    case RunEnd::not_finite:
-      return Outcome::out_of_domain;
-    default:
-      return Outcome::reached_end;
-  }
-}
+/// What a run that an integrator ended is called to the outside.
+[[nodiscard]] Outcome outcome_of(RunEnd end);
 
 /// Checks what every predictor promises: as many finite values as parameters, each in its range,
 /// times ascending from start_s. @throws InputError.
@@ -36,5 +25,12 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
 
 /// The output times of a scene's [run]: 0, 1/rate, ... up to until_s. @throws InputError.
 [[nodiscard]] std::vector<double> output_times_s(const data::RunSettings& run);
+
+/// The columns every run with Euler angles begins with: t_s, phi_rad, ... energy_J.
+[[nodiscard]] const std::vector<std::string>& euler_columns();
+
+/// Tolerance of the second run an error estimate compares with: a hundredth, but not below what
+/// rounding leaves.
+[[nodiscard]] double finer(double tolerance);
 
 }  // namespace trochoid::model

@@ -49,8 +49,9 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
 std::unique_ptr<Predictor> make_predictor(const data::Scene& scene) {
   const std::string& name = scene.model.name;
   if (name == "top") return make_top(scene);
-  throw InputError(
-      fmt::format("model.name = \"{}\" cannot be predicted; models with a path are top", name));
+  if (name == "top-euler") return make_top_euler(scene);
+  throw InputError(fmt::format(
+      "model.name = \"{}\" cannot be predicted; models with a path are top, top-euler", name));
 }
 
 }  // namespace trochoid::model

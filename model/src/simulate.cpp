@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "factories.hpp"
@@ -28,13 +29,28 @@ std::vector<double> output_times_s(const data::RunSettings& run) {
   return t_s;
 }
 
+const std::vector<std::string>& euler_columns() {
+  static const std::vector<std::string> columns{
+      "t_s",        "phi_rad", "theta_rad", "psi_rad", "dphi_rad_s", "dtheta_rad_s",
+      "dpsi_rad_s", "x_m",     "y_m",       "z_m",     "energy_J"};
+  return columns;
+}
+
+double finer(double tolerance) {
+  return std::max(0.01 * tolerance, 2e-15);
+}
+
 Trajectory simulate(const data::Scene& scene) {
   if (!(scene.run.tolerance > 0.0) || scene.run.tolerance > 0.1) {
     throw InputError(
         fmt::format("run.tolerance = {} must lie between 0 and 0.1", scene.run.tolerance));
   }
   const std::string& name = scene.model.name;
-  throw InputError(fmt::format("model.name = \"{}\" cannot be simulated; none is ready", name));
+  if (name == "free") return simulate_free(scene);
+  if (name == "top") return simulate_top(scene);
+  if (name == "top-euler") return simulate_top_euler(scene);
+  throw InputError(fmt::format(
+      "model.name = \"{}\" cannot be simulated; models are free, top, top-euler", name));
 }
 
 }  // namespace trochoid::model

@@ -32,13 +32,15 @@ struct TopRun {
   int max_steps = 1000000;
 };
 
-/// Columns: 0..2 axis k, 3 phi (unwrapped), 4 psi without psi_0 and omega_s (zero at the start).
-inline constexpr int kTopColumns = 5;
+/// Columns: 0..2 axis k, 3 phi (unwrapped), 4 psi without psi_0 and omega_s (zero at the start),
+/// 5..7 angular momentum over I, 8 spin momentum b.
+inline constexpr int kTopColumns = 9;
+inline constexpr int kTopAxisColumns = 3, kTopAngleColumns = 5;
 /// End state: theta, phi, dtheta, dphi, b, psi as in column 4.
 inline constexpr int kTopEndValues = 6;
 
 struct TopResult {
-  double* value[kTopColumns] = {};       ///< count numbers each, or null
+  double* value[kTopColumns] = {};       ///< count numbers each; may be null from column 2 on
   double* derivative[kTopColumns] = {};  ///< count x kTopLanes, lane = TopVariable; or null
   double end[kTopEndValues] = {};
   double end_derivative[kTopEndValues][kTopLanes] = {};

@@ -1,5 +1,5 @@
 #pragma once
-#include "top_kernel.hpp"
+#include "top_kernel_store.hpp"
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/top.hpp"
 
@@ -12,34 +12,6 @@ constexpr double kPi = 3.14159265358979323846;
 
 TROCHOID_INLINE double wrapped(double angle) {
   return angle - 2.0 * kPi * __builtin_floor(angle / (2.0 * kPi) + 0.5);
-}
-
-template <class S>
-TROCHOID_INLINE S variable(const TopRun& run, TopVariable which) {
-  if constexpr (requires { S::kLanes; }) {
-    return S::variable(run.variable[which], which);
-  } else {
-    return run.variable[which];
-  }
-}
-
-TROCHOID_INLINE void store(double* value, double*, int n, double x) {
-  value[n] = x;
-}
-TROCHOID_INLINE void store(double* value, double* derivative, int n, const Dual<kTopLanes>& x) {
-  value[n] = x.value;
-  for (int lane = 0; lane < kTopLanes; ++lane) {
-    derivative[n * kTopLanes + lane] = x.derivative[lane];
-  }
-}
-TROCHOID_INLINE void store_end(TopResult& result, int i, double x) {
-  result.end[i] = x;
-}
-TROCHOID_INLINE void store_end(TopResult& result, int i, const Dual<kTopLanes>& x) {
-  result.end[i] = x.value;
-  for (int lane = 0; lane < kTopLanes; ++lane) {
-    result.end_derivative[i][lane] = x.derivative[lane];
-  }
 }
 
 /// Errors count where they matter: in the tilt of the axis, relative to how far it can move. Near
@@ -178,6 +150,25 @@ class Run {
       put(3, n, phi);
       put(4, n, spin_angle(stepper, phi, stepper.dense(System::kStates - 1, u)));
     }
+    if (result_.value[kTopAngleColumns] != nullptr) write_momentum(stepper, n, u);
+  }
+  void write_momentum(DormandPrince<System>& stepper, int n, double u) {
+    const auto y = stepper.dense_state(u);
+    const auto [state, b] = unpack(stepper.system(), y);
+    for (int i = 0; i < 3; ++i) put(kTopAngleColumns + i, n, state.L[i]);
+    put(kTopAngleColumns + 3, n, b);
+  }
+  struct Unpacked {
+    AxisAndMomentum<S> state;
+    S b;
+  };
+  [[nodiscard]] static Unpacked unpack(const System& system, const State<S, System::kStates>& y) {
+    if constexpr (kAngles) {
+      const auto base = System::base(y);
+      return {system.unpack(base), system.spin(base)};
+    } else {
+      return {system.unpack(y), system.spin(y)};
+    }
   }
   TROCHOID_INLINE void put(int column, int n, const S& x) {
     store(result_.value[column], result_.derivative[column], n, x);
@@ -215,18 +206,8 @@ class Run {
   }
   void store_end_state(DormandPrince<System>& stepper) {
     const auto& y = stepper.y();
-    const System& system = stepper.system();
-    AxisAndMomentum<S> state;
-    S b;
-    if constexpr (kAngles) {
-      const auto base = System::base(y);
-      state = system.unpack(base);
-      b = system.spin(base);
-    } else {
-      state = system.unpack(y);
-      b = system.spin(y);
-    }
-    const TopAngles<S> angles = angles_of(state, b);
+    const auto [state, b] = unpack(stepper.system(), y);
+    const TopAngles<S> angles = angles_of(state);
     S phi = angles.phi_rad;
     if constexpr (kAngles) {
       phi = azimuth(state.k[0], state.k[1],

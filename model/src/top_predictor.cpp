@@ -115,7 +115,9 @@ Decay decay(double gamma, double t) {
 
 class TopPredictor : public Predictor {
  public:
-  explicit TopPredictor(const TopSettings& top) : drag_(top.drag) {
+  using Kernel = void (*)(const TopRun&, TopResult&);
+  TopPredictor(std::string name, Kernel kernel, const TopSettings& top)
+      : name_(std::move(name)), kernel_(kernel), drag_(top.drag) {
     for (Entry& entry : entries(top)) {
       kinds_.push_back(entry.parameter);
       infos_.push_back(std::move(entry.info));
@@ -133,7 +135,8 @@ class TopPredictor : public Predictor {
   void fill_end(const Work& work, Prediction& prediction) const;
   [[nodiscard]] double derivative(const Work& work, Observable what, Parameter by, int n) const;
 
-  std::string name_ = "top";
+  std::string name_;
+  Kernel kernel_;
   bool drag_;
   std::vector<Parameter> kinds_;
   std::vector<ParameterInfo> infos_;
@@ -153,7 +156,7 @@ struct TopPredictor::Work {
   }
   void prepare() {
     const std::size_t count = request.t_s.size();
-    const int columns = run.with_angles ? kTopColumns : 3;
+    const int columns = run.with_angles ? kTopAngleColumns : kTopAxisColumns;
     values.resize(count * columns);
     if (run.with_derivatives) derivatives.resize(count * columns * kTopLanes);
     for (int c = 0; c < columns; ++c) {
@@ -204,7 +207,7 @@ Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   run.end_s = request.t_s.empty() ? request.start_s : request.t_s.back();
   run.tolerance = request.tolerance;
   work.prepare();
-  run_top_here(run, work.result);
+  kernel_(run, work.result);
 
   Prediction prediction;
   const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
@@ -315,7 +318,12 @@ void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
 }  // namespace
 
 std::unique_ptr<Predictor> make_top(const data::Scene& scene) {
-  return std::make_unique<TopPredictor>(top_for_prediction(scene));
+  return std::make_unique<TopPredictor>("top", run_top_here, top_for_prediction(scene));
+}
+
+std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene) {
+  return std::make_unique<TopPredictor>("top-euler", run_top_euler,
+                                        without_drag(top_for_prediction(scene)));
 }
 
 }  // namespace trochoid::model

@@ -134,4 +134,15 @@ TopSettings top_for_simulation(const data::Scene& scene) {
   return top;
 }
 
+TopSettings without_drag(const TopSettings& top) {
+  if (top.drag) {
+    throw InputError(
+        "model \"top-euler\" is the thesis' frictionless top; leave drag_transverse_N_m_s and "
+        "drag_spin_N_m_s out, or use model \"top\"");
+  }
+  if (top.theta_rad == 0.0 || top.theta_rad == M_PI)
+    throw InputError("model \"top-euler\" is singular at theta_rad = 0 and pi; use model \"top\"");
+  return top;
+}
+
 }  // namespace trochoid::model

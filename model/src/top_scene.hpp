@@ -25,4 +25,7 @@ struct TopSettings {
 /// @throws InputError naming the missing field.
 [[nodiscard]] TopSettings top_for_simulation(const data::Scene& scene);
 
+/// The thesis' own equations know no friction. @throws InputError if the scene asks for drag.
+[[nodiscard]] TopSettings without_drag(const TopSettings& top);
+
 }  // namespace trochoid::model

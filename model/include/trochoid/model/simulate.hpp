@@ -32,7 +32,9 @@ struct Trajectory {
   std::vector<Event> events;
   Outcome outcome = Outcome::reached_end;
   double end_s = 0.0;
-  double error_estimate_m = 0.0;
+  double error_estimate_m =
+      0.0;  ///< of the path, from a second run at a hundredth of the tolerance
+  double error_estimate_rad = 0.0;  ///< of the direction of the axis, likewise
   Statistics statistics;
 };
 

@@ -37,18 +37,20 @@ template <class S>
   return r;
 }
 
-/// (8): the way back; phi within (-pi, pi]. At the pole dphi is taken from the momentum's limit.
+/// (8): the way back; phi within (-pi, pi]. Rates come from k' = L x k, whose components stay exact
+/// relative to sin(theta) near the pole; only at the pole itself phi and its rate mean nothing.
 template <class S>
-[[nodiscard]] TopAngles<S> angles_of(const AxisAndMomentum<S>& state, const S& b_1_s) {
+[[nodiscard]] TopAngles<S> angles_of(const AxisAndMomentum<S>& state) {
   const auto& k = state.k;
   const auto& L = state.L;
+  const S dkx = L[1] * k[2] - L[2] * k[1], dky = L[2] * k[0] - L[0] * k[2];
   const S s2 = k[0] * k[0] + k[1] * k[1];
   const S s = sqrt(s2);
   TopAngles<S> angles;
   angles.theta_rad = atan2(s, k[2]);
   angles.phi_rad = atan2(k[0], -k[1]);
   angles.dtheta_rad_s = (L[1] * k[0] - L[0] * k[1]) / s;
-  angles.dphi_rad_s = (L[2] - b_1_s * k[2]) / s2;
+  angles.dphi_rad_s = (k[0] * dky - k[1] * dkx) / s2;
   return angles;
 }
 

@@ -1,0 +1,60 @@
+#include "solve.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+namespace trochoid::model {
+
+Choice choose_integrator(const std::string& asked) {
+  if (asked == "auto") {
+    return {
+        Method::dop853, "dop853",
+        "smooth equations: explicit order 8(5,3) needs the fewest evaluations at this tolerance"};
+  }
+  if (asked == "dop853") return {Method::dop853, asked, "asked for"};
+  if (asked == "cvode-adams") return {Method::cvode_adams, asked, "asked for"};
+  if (asked == "cvode-bdf") return {Method::cvode_bdf, asked, "asked for"};
+  if (asked == "arkode") return {Method::arkode, asked, "asked for"};
+  throw InputError(fmt::format(
+      "run.integrator = \"{}\" must be auto, dop853, cvode-adams, cvode-bdf or arkode", asked));
+}
+
+Outcome outcome_of(RunEnd end) {
+  switch (end) {
+    case RunEnd::step_limit:
+      return Outcome::step_limit;
+    case RunEnd::rounding_limit:
+      return Outcome::tolerance_not_reachable;
+    case RunEnd::not_finite:
+      return Outcome::out_of_domain;
+    case RunEnd::reached_end:
+    case RunEnd::event:
+      break;
+  }
+  return Outcome::reached_end;
+}
+
+SundialsOptions sundials_options(Method method, double rtol, const double* atol, int states) {
+  SundialsOptions options;
+  options.method = method == Method::cvode_adams ? SundialsMethod::cvode_adams
+                   : method == Method::cvode_bdf ? SundialsMethod::cvode_bdf
+                                                 : SundialsMethod::arkode_erk;
+  // Their multistep error control has no use for tolerances within rounding of the state.
+  constexpr double kFinest = 1e-14;
+  options.rtol = std::max(rtol, kFinest);
+  options.atol = Eigen::Map<const Eigen::VectorXd>(atol, states).cwiseMax(1e-300);
+  return options;
+}
+
+Solution from_sundials(SundialsRun run) {
+  Solution solution;
+  solution.states = std::move(run.states);
+  solution.outcome = run.outcome;
+  solution.end_s = run.end_s;
+  solution.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
+                         static_cast<int>(run.evaluations)};
+  return solution;
+}
+
+}  // namespace trochoid::model

@@ -1,0 +1,40 @@
+#pragma once
+#include "top_kernel.hpp"
+#include "trochoid/model/dual.hpp"
+
+/// Between the plain numbers of a TopRun and the scalars of the equations.
+namespace trochoid::model {
+inline namespace TROCHOID_ISA {
+namespace top_kernel {
+
+template <class S>
+TROCHOID_INLINE S variable(const TopRun& run, TopVariable which) {
+  if constexpr (requires { S::kLanes; }) {
+    return S::variable(run.variable[which], which);
+  } else {
+    return run.variable[which];
+  }
+}
+
+TROCHOID_INLINE void store(double* value, double*, int n, double x) {
+  value[n] = x;
+}
+TROCHOID_INLINE void store(double* value, double* derivative, int n, const Dual<kTopLanes>& x) {
+  value[n] = x.value;
+  for (int lane = 0; lane < kTopLanes; ++lane) {
+    derivative[n * kTopLanes + lane] = x.derivative[lane];
+  }
+}
+TROCHOID_INLINE void store_end(TopResult& result, int i, double x) {
+  result.end[i] = x;
+}
+TROCHOID_INLINE void store_end(TopResult& result, int i, const Dual<kTopLanes>& x) {
+  result.end[i] = x.value;
+  for (int lane = 0; lane < kTopLanes; ++lane) {
+    result.end_derivative[i][lane] = x.derivative[lane];
+  }
+}
+
+}  // namespace top_kernel
+}  // namespace TROCHOID_ISA
+}  // namespace trochoid::model

@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "factories.hpp"
+#include "solve.hpp"
+#include "top_dispatch.hpp"
+#include "top_scene.hpp"
+#include "trochoid/model/top.hpp"
+
+// A whole run of the top as a table. Our own steppers run in the kernel; SUNDIALS runs the same
+// system.
+namespace trochoid::model {
+namespace {
+
+/// The kernel's columns (top_kernel.hpp) with the storage they need.
+struct TopColumns {
+  std::vector<double> t_s;
+  std::array<std::vector<double>, kTopColumns> column;
+  TopResult result;
+  Outcome outcome = Outcome::reached_end;
+  int rows = 0;
+
+  explicit TopColumns(const std::vector<double>& times) : t_s(times) {
+    for (int c = 0; c < kTopColumns; ++c) {
+      column[c].resize(t_s.size());
+      result.value[c] = column[c].data();
+    }
+  }
+};
+
+TopRun kernel_run(const TopSettings& top, double tolerance) {
+  TopRun run;
+  run.variable[kTopA] = top.a_1_s2;
+  run.variable[kTopB] = top.b_1_s;
+  run.variable[kTopGamma1] = top.gamma1_1_s;
+  run.variable[kTopGamma3] = top.gamma3_1_s;
+  run.variable[kTopTheta] = top.theta_rad;
+  run.variable[kTopDtheta] = top.dtheta_rad_s;
+  run.variable[kTopDphi] = top.dphi_rad_s;
+  run.phi_rad = top.phi_rad;
+  run.drag = top.drag;
+  run.with_angles = true;
+  run.tolerance = tolerance;
+  return run;
+}
+
+using Kernel = void (*)(const TopRun&, TopResult&);
+
+TopColumns run_kernel(Kernel kernel, const TopSettings& top, const std::vector<double>& t_s,
+                      double tolerance) {
+  TopColumns columns(t_s);
+  TopRun run = kernel_run(top, tolerance);
+  run.t_s = t_s.data();
+  run.count = static_cast<int>(t_s.size());
+  run.end_s = t_s.back();
+  kernel(run, columns.result);
+  columns.rows = columns.result.written;
+  columns.outcome = outcome_of(static_cast<RunEnd>(columns.result.end_reason));
+  return columns;
+}
+
+/// Times between the outputs at which the azimuth is looked at, so that it can be followed.
+std::vector<double> refined(const std::vector<double>& t_s, double rate_rad_s, int& parts) {
+  constexpr double kLargestTurn = 0.25;
+  constexpr double kMostTimes = 2e7;
+  const double apart = t_s.size() > 1 ? t_s[1] - t_s[0] : 1.0;
+  const double wanted = std::ceil(apart * rate_rad_s / kLargestTurn);
+  if (wanted * static_cast<double>(t_s.size()) > kMostTimes)
+    throw InputError(
+        "run.until_s is too long for this spin with SUNDIALS; use integrator = \"auto\"");
+  parts = std::max(1, static_cast<int>(wanted));
+  std::vector<double> fine{t_s.front()};
+  for (std::size_t n = 1; n < t_s.size(); ++n) {
+    for (int i = 1; i < parts; ++i) fine.push_back(t_s[n - 1] + (t_s[n] - t_s[n - 1]) * i / parts);
+    fine.push_back(t_s[n]);
+  }
+  return fine;
+}
+
+template <class S>
+WithSpinAngle<TopWithDrag<S>> system_of(const TopSettings& top) {
+  WithSpinAngle<TopWithDrag<S>> system;
+  system.a_1_s2 = S(top.a_1_s2);
+  system.gamma1_1_s = S(top.gamma1_1_s);
+  system.gamma3_1_s = S(top.gamma3_1_s);
+  return system;
+}
+
+struct DualTop : WithSpinAngle<TopWithDrag<Dual<8>>> {
+  [[nodiscard]] WithSpinAngle<TopWithDrag<double>> values() const {
+    WithSpinAngle<TopWithDrag<double>> system;
+    system.a_1_s2 = a_1_s2.value;
+    system.gamma1_1_s = gamma1_1_s.value;
+    system.gamma3_1_s = gamma3_1_s.value;
+    return system;
+  }
+};
+
+TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, double tolerance,
+                        Method method) {
+  TopColumns columns(t_s);
+  const auto start = axis_and_momentum<double>(
+      {top.theta_rad, top.phi_rad, top.dtheta_rad_s, top.dphi_rad_s}, top.b_1_s);
+  const double rate = std::abs(top.b_1_s) + 2.0 * std::sqrt(std::abs(top.a_1_s2)) +
+                      std::abs(top.dphi_rad_s) + std::abs(top.dtheta_rad_s);
+  int parts = 1;
+  const std::vector<double> fine = refined(t_s, rate, parts);
+  StepControl<8> control = uniform_control<8>(tolerance);
+  for (int i = 0; i < 3; ++i) control.atol[i] *= rate;
+  const State<double, 8> y0{{start.L[0], start.L[1], start.L[2], start.k[0], start.k[1], start.k[2],
+                             top.b_1_s, top.phi_rad}};
+  DualTop duals;
+  static_cast<WithSpinAngle<TopWithDrag<Dual<8>>>&>(duals) = system_of<Dual<8>>(top);
+  const Solution solution = solve(system_of<double>(top), duals, y0, fine, control, method);
+  double phi = top.phi_rad;
+  for (Eigen::Index row = 0; row < solution.states.rows(); ++row) {
+    const auto y = solution.states.row(row);
+    const double raw = std::atan2(y[3], -y[4]);
+    if (y[3] != 0.0 || y[4] != 0.0) phi += std::remainder(raw - phi, 2.0 * M_PI);
+    if (row % parts != 0) continue;
+    const auto n = static_cast<std::size_t>(row / parts);
+    for (int i = 0; i < 3; ++i) {
+      columns.column[i][n] = y[3 + i];
+      columns.column[kTopAngleColumns + i][n] = y[i];
+    }
+    columns.column[3][n] = phi;
+    columns.column[4][n] = y[7] - phi;
+    columns.column[8][n] = y[6];
+    columns.rows = static_cast<int>(n) + 1;
+  }
+  columns.outcome = solution.outcome;
+  columns.result.reached_s = solution.end_s;
+  columns.result.steps = solution.statistics.steps;
+  columns.result.rejected = solution.statistics.rejected;
+  columns.result.evaluations = solution.statistics.evaluations;
+  return columns;
+}
+
+/// Largest difference of the axis between two runs.
+double axis_difference(const TopColumns& a, const TopColumns& b) {
+  double largest = 0.0;
+  for (int n = 0; n < std::min(a.rows, b.rows); ++n) {
+    for (int i = 0; i < 3; ++i)
+      largest = std::max(largest, std::abs(a.column[i][n] - b.column[i][n]));
+  }
+  return largest;
+}
+
+/// Integral of the spin rate omega_s exp(-gamma3 t).
+double turned_rad(const TopSettings& top, double t_s) {
+  const double x = top.gamma3_1_s * t_s;
+  return top.omega_s_rad_s * (x < 1e-9 ? t_s * (1.0 - 0.5 * x) : -std::expm1(-x) / top.gamma3_1_s);
+}
+
+/// One row: angles, rates and energy from axis and momentum, (8) and (11).
+void fill_row(const TopSettings& top, const TopColumns& run, int n, double pivot_z_m,
+              Eigen::Ref<Eigen::RowVectorXd> row) {
+  const auto& c = run.column;
+  const AxisAndMomentum<double> state{{c[0][n], c[1][n], c[2][n]}, {c[5][n], c[6][n], c[7][n]}};
+  TopAngles<double> angles = angles_of(state);
+  const double s = std::hypot(state.k[0], state.k[1]);
+  const double across[3] = {state.L[1] * state.k[2] - state.L[2] * state.k[1],
+                            state.L[2] * state.k[0] - state.L[0] * state.k[2],
+                            state.L[0] * state.k[1] - state.L[1] * state.k[0]};
+  const double speed2 = across[0] * across[0] + across[1] * across[1] + across[2] * across[2];
+  if (s == 0.0) {  // upright to rounding: no precession angle, the tilt grows as k moves
+    angles.dphi_rad_s = 0.0;
+    angles.dtheta_rad_s = std::sqrt(speed2);
+  }
+  const double left = std::exp(-top.gamma3_1_s * run.t_s[n]);
+  const double spin = top.omega_s_rad_s * left;
+  const double psi = top.psi_rad + c[4][n] + turned_rad(top, run.t_s[n]);
+  const double energy = 0.5 * top.I_kg_m2 * speed2 + 0.5 * top.Is_kg_m2 * spin * spin +
+                        top.weight_times_l_J * state.k[2];
+  row << run.t_s[n], c[3][n], angles.theta_rad, psi, angles.dphi_rad_s, angles.dtheta_rad_s,
+      spin - angles.dphi_rad_s * state.k[2], top.pivot_x_m + top.l_m * state.k[0],
+      top.pivot_y_m + top.l_m * state.k[1], pivot_z_m + top.l_m * state.k[2], energy;
+}
+
+template <class Runner>
+Trajectory tabulate(const data::Scene& scene, const TopSettings& top, const Choice& choice,
+                    const Runner& run) {
+  const std::vector<double> t_s = output_times_s(scene.run);
+  const TopColumns columns = run(t_s, scene.run.tolerance);
+  Trajectory trajectory;
+  trajectory.model = scene.model.name;
+  trajectory.integrator = choice.name;
+  trajectory.integrator_reason = choice.reason;
+  trajectory.columns = euler_columns();
+  trajectory.values.resize(columns.rows, static_cast<Eigen::Index>(trajectory.columns.size()));
+  const double pivot_z_m = scene.support.pivot_m ? scene.support.pivot_m->z() : 0.0;
+  Eigen::RowVectorXd row(trajectory.values.cols());
+  for (int n = 0; n < columns.rows; ++n) {
+    fill_row(top, columns, n, pivot_z_m, row);
+    trajectory.values.row(n) = row;
+  }
+  trajectory.outcome = columns.outcome;
+  trajectory.end_s = columns.result.reached_s;
+  trajectory.statistics = {columns.result.steps, columns.result.rejected,
+                           columns.result.evaluations};
+  trajectory.error_estimate_rad = axis_difference(columns, run(t_s, finer(scene.run.tolerance)));
+  trajectory.error_estimate_m = top.l_m * trajectory.error_estimate_rad;
+  return trajectory;
+}
+
+}  // namespace
+
+Trajectory simulate_top(const data::Scene& scene) {
+  const TopSettings top = top_for_simulation(scene);
+  const Choice choice = choose_integrator(scene.run.integrator);
+  return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
+    return choice.method == Method::dop853 ? run_kernel(run_top_here, top, t_s, tolerance)
+                                           : run_sundials(top, t_s, tolerance, choice.method);
+  });
+}
+
+Trajectory simulate_top_euler(const data::Scene& scene) {
+  const TopSettings top = without_drag(top_for_simulation(scene));
+  const Choice choice = choose_integrator(scene.run.integrator);
+  if (choice.method != Method::dop853)
+    throw InputError("model \"top-euler\" runs with integrator = \"auto\" or \"dop853\"");
+  return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
+    return run_kernel(run_top_euler, top, t_s, tolerance);
+  });
+}
+
+}  // namespace trochoid::model

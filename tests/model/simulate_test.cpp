@@ -1,0 +1,117 @@
+#include "trochoid/model/simulate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "reference_cases.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::model {
+namespace {
+
+Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
+  for (std::size_t i = 0; i < run.columns.size(); ++i)
+    if (run.columns[i] == name) return run.values.col(static_cast<Eigen::Index>(i));
+  throw InputError("no column " + name);
+}
+
+/// A run of the reference's scene on its (thinned) grid.
+Trajectory rerun(Reference& expected, double tolerance, const std::string& integrator = "auto") {
+  const Eigen::VectorXd t_s = expected.column("t");
+  data::Scene& scene = expected.posed.scene;
+  scene.run.rate_hz = 1.0 / (t_s[1] - t_s[0]);
+  scene.run.tolerance = tolerance;
+  scene.run.integrator = integrator;
+  return simulate(scene);
+}
+
+double largest_difference(const Trajectory& run, const std::string& ours, const Reference& expected,
+                          const char* theirs) {
+  const Eigen::VectorXd a = column(run, ours), b = expected.column(theirs);
+  EXPECT_EQ(a.size(), b.size());
+  return (a - b).cwiseAbs().maxCoeff();
+}
+
+struct Case {
+  const char* name;
+  double angle_rad, path_m;  // the reference's own uncertainty, rounded up
+};
+class FollowsReference : public testing::TestWithParam<Case> {};
+
+TEST_P(FollowsReference, InAnglesRatesPathAndEnergy) {
+  Reference expected = reference(GetParam().name);
+  const Trajectory run = rerun(expected, 1e-13);
+  EXPECT_EQ(run.outcome, Outcome::reached_end);
+  const double angle = GetParam().angle_rad;
+  EXPECT_LT(largest_difference(run, "theta_rad", expected, "theta"), angle);
+  EXPECT_LT(largest_difference(run, "phi_rad", expected, "phi"), angle);
+  EXPECT_LT(largest_difference(run, "psi_rad", expected, "psi"), 10 * angle);
+  EXPECT_LT(largest_difference(run, "dphi_rad_s", expected, "dphi"), 100 * angle);
+  EXPECT_LT(largest_difference(run, "dtheta_rad_s", expected, "dtheta"), 100 * angle);
+  EXPECT_LT(largest_difference(run, "dpsi_rad_s", expected, "dpsi"), 100 * angle);
+  EXPECT_LE(largest_difference(run, "x_m", expected, "x"), GetParam().path_m);
+  EXPECT_LE(largest_difference(run, "y_m", expected, "y"), GetParam().path_m);
+  EXPECT_LE(largest_difference(run, "z_m", expected, "z"), GetParam().path_m);
+  const Eigen::VectorXd energy = expected.column("energy");
+  EXPECT_LT(largest_difference(run, "energy_J", expected, "energy"), 1e-10 * energy.maxCoeff());
+}
+INSTANTIATE_TEST_SUITE_P(Simulate, FollowsReference,
+                         testing::Values(Case{"s01_free_thesis", 1e-10, 0.0},
+                                         Case{"s02_free_symmetric", 1e-10, 0.0},
+                                         Case{"s03_top_thesis_base", 2e-10, 2e-11},
+                                         Case{"s04_top_loops", 2e-10, 2e-11},
+                                         Case{"s11_top_drag", 2e-10, 2e-11}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+// Independent integrators through the same interface; 1e-11 asked, multistep methods deliver a few
+// thousand times that over 60 s (BDF, of order 5, most).
+class EveryIntegrator : public testing::TestWithParam<const char*> {};
+TEST_P(EveryIntegrator, GivesTheSameRun) {
+  constexpr double kAllowed = 3e-7;
+  for (const char* name : {"s01_free_thesis", "s03_top_thesis_base", "s11_top_drag"}) {
+    Reference expected = reference(name);
+    const Trajectory run = rerun(expected, 1e-11, GetParam());
+    EXPECT_EQ(run.integrator, GetParam());
+    EXPECT_LT(largest_difference(run, "theta_rad", expected, "theta"), kAllowed) << name;
+    EXPECT_LT(largest_difference(run, "phi_rad", expected, "phi"), kAllowed) << name;
+    EXPECT_LT(run.error_estimate_rad, kAllowed) << name;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Simulate, EveryIntegrator,
+                         testing::Values("dop853", "cvode-adams", "cvode-bdf", "arkode"));
+
+// The estimate is what people will believe: it must not promise more than the run keeps.
+TEST(Simulate, ErrorEstimateCoversTheTrueError) {
+  for (const double tolerance : {1e-5, 1e-7, 1e-9}) {
+    Reference expected = reference("s03_top_thesis_base");
+    const Trajectory run = rerun(expected, tolerance);
+    const double error = std::max(largest_difference(run, "x_m", expected, "x"),
+                                  largest_difference(run, "y_m", expected, "y"));
+    EXPECT_GT(3.0 * run.error_estimate_m, error) << tolerance;
+    EXPECT_LT(run.error_estimate_m, 100.0 * error + 1e-12) << tolerance;
+  }
+}
+
+TEST(Simulate, TheThesisFormGivesTheSameMotion) {
+  Reference expected = reference("s04_top_loops");
+  expected.posed.scene.model.name = "top-euler";
+  const Trajectory run = rerun(expected, 1e-12);
+  EXPECT_LT(largest_difference(run, "x_m", expected, "x"), 1e-10);
+  EXPECT_LT(largest_difference(run, "psi_rad", expected, "psi"), 1e-8);
+}
+
+TEST(Simulate, NamesWhatTheSceneLacks) {
+  data::Scene scene = reference("s03_top_thesis_base").posed.scene;
+  scene.body->mass_kg.reset();
+  EXPECT_THROW((void)simulate(scene), InputError);
+  scene = reference("s03_top_thesis_base").posed.scene;
+  scene.run.integrator = "euler";
+  EXPECT_THROW((void)simulate(scene), InputError);
+  scene = reference("s01_free_thesis").posed.scene;
+  scene.start.moments_kg_m2 = Eigen::Vector3d(1.0, 1.0, 3.0);  // no body has these
+  EXPECT_THROW((void)simulate(scene), InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::model
