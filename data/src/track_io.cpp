@@ -83,8 +83,10 @@ TrackSample read_sample(const CsvReader& csv, const TrackColumns& columns) {
   if (std::isnan(sample.t_s))
     throw InputError(fmt::format("{}: t_s is empty; every row needs its time", csv.place()));
   sample.centre_m = {csv.number(columns.x), csv.number(columns.y)};
-  const double sxy = csv.number(columns.sxy);
-  sample.covariance_m2 << csv.number(columns.sxx), sxy, sxy, csv.number(columns.syy);
+  // Read first: a refusal in the middle of Eigen's comma list would end in its assertion.
+  const double sxx = csv.number(columns.sxx), sxy = csv.number(columns.sxy),
+               syy = csv.number(columns.syy);
+  sample.covariance_m2 << sxx, sxy, sxy, syy;
   sample.centre_px = {csv.number(columns.x_px), csv.number(columns.y_px)};
   for (std::size_t i = 0; i < kAngles.size(); ++i)
     sample.*kAngles[i].member = read_angle(csv, columns.angles[i], kAngles[i]);

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <string>
 
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -10,6 +11,9 @@ namespace trochoid::model {
 
 std::unique_ptr<Predictor> make_top(const data::Scene& scene);
 std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene);
+std::unique_ptr<Predictor> make_rolling(const data::Scene& scene);
+std::unique_ptr<Predictor> make_smooth(const data::Scene& scene);
+std::unique_ptr<Predictor> make_sliding(const data::Scene& scene);
 
 Trajectory simulate_free(const data::Scene& scene);
 Trajectory simulate_top(const data::Scene& scene);
@@ -17,6 +21,9 @@ Trajectory simulate_top_euler(const data::Scene& scene);
 
 /// What a run that an integrator ended is called to the outside.
 [[nodiscard]] Outcome outcome_of(RunEnd end);
+
+/// The rung a scene means: its model.name, or for "auto" what its support and terms say.
+[[nodiscard]] std::string law_of(const data::Scene& scene);
 
 /// Checks what every predictor promises: as many finite values as parameters, each in its range,
 /// times ascending from start_s. @throws InputError.

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <string>
 
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
@@ -46,12 +47,37 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
   }
 }
 
+std::string law_of(const data::Scene& scene) {
+  const data::ModelSettings& model = scene.model;
+  if (model.name != "auto") return model.name;
+  switch (scene.support.kind) {
+    case data::SupportKind::none:
+      return "free";
+    case data::SupportKind::flat:
+      return "puck";
+    case data::SupportKind::pivot: {
+      // A disc that lies on its pivot spins down; one that leans on it is a top.
+      const bool leans = scene.start.theta_rad || (scene.body && scene.body->l_m);
+      return scene.body && scene.body->kind != data::BodyKind::top && !leans ? "pivot" : "top";
+    }
+    case data::SupportKind::floor:
+      break;
+  }
+  if (scene.body && scene.body->kind == data::BodyKind::top) return "top";
+  return model.friction ? "sliding" : "rolling";
+}
+
 std::unique_ptr<Predictor> make_predictor(const data::Scene& scene) {
-  const std::string& name = scene.model.name;
+  const std::string name = law_of(scene);
   if (name == "top") return make_top(scene);
   if (name == "top-euler") return make_top_euler(scene);
-  throw InputError(fmt::format(
-      "model.name = \"{}\" cannot be predicted; models with a path are top, top-euler", name));
+  if (name == "rolling") return make_rolling(scene);
+  if (name == "smooth") return make_smooth(scene);
+  if (name == "sliding") return make_sliding(scene);
+  throw InputError(
+      fmt::format("model.name = \"{}\" cannot be predicted; models with a path are top, top-euler, "
+                  "rolling, smooth, sliding",
+                  name));
 }
 
 }  // namespace trochoid::model

@@ -45,7 +45,7 @@ Trajectory simulate(const data::Scene& scene) {
     throw InputError(
         fmt::format("run.tolerance = {} must lie between 0 and 0.1", scene.run.tolerance));
   }
-  const std::string& name = scene.model.name;
+  const std::string name = law_of(scene);
   if (name == "free") return simulate_free(scene);
   if (name == "top") return simulate_top(scene);
   if (name == "top-euler") return simulate_top_euler(scene);

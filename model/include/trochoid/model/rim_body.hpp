@@ -14,10 +14,11 @@
 namespace trochoid::model {
 inline namespace TROCHOID_ISA {
 
-/// Order of the state of every model with rim contact. Rolling bodies have the first eight: their
-/// velocity follows from the rest.
+/// Order of the state of every model with rim contact. Rolling bodies have the first eight. Sliding
+/// ones add the velocity of the contact point along n and mh instead of that of the centre: near
+/// sticking it is small, and a step must resolve it by its own size.
 struct Rim {
-  enum Component : int { phi, theta, psi, w1, w2, w3, x, y, vx, vy };
+  enum Component : int { phi, theta, psi, w1, w2, w3, x, y, un, ut };
 };
 
 struct RimBody {
@@ -80,15 +81,37 @@ template <class S>
          body.m * body.g * q.at.z;
 }
 
-/// Horizontal velocity of the contact point along n and mh [m/s], (3).
+/// A horizontal vector: components along n and mh.
 template <class S>
-struct Slip {
+struct Horizontal {
   S along_n, along_mh;
 };
+/// ... and in the world's axes.
 template <class S>
-[[nodiscard]] TROCHOID_INLINE Slip<S> slip_velocity(const RimBody& body, const NodeMotion<S>& q) {
-  const S vt = q.v2 * q.at.c - q.v3 * q.at.s;
-  return {q.v1 + body.R * q.w3 - body.signed_h() * q.w2, vt + q.at.z * q.w1};
+struct World {
+  S x, y;
+};
+template <class S>
+[[nodiscard]] TROCHOID_INLINE World<S> world_from_node(const Horizontal<S>& a, const S& phi) {
+  const S c = cos(phi), s = sin(phi);
+  return {a.along_n * c - a.along_mh * s, a.along_n * s + a.along_mh * c};
+}
+template <class S>
+[[nodiscard]] TROCHOID_INLINE Horizontal<S> node_from_world(const World<S>& a, const S& phi) {
+  const S c = cos(phi), s = sin(phi);
+  return {a.x * c + a.y * s, a.y * c - a.x * s};
+}
+/// Horizontal velocity of the centre of mass.
+template <class S>
+[[nodiscard]] TROCHOID_INLINE Horizontal<S> horizontal_velocity(const NodeMotion<S>& q) {
+  return {q.v1, q.v2 * q.at.c - q.v3 * q.at.s};
+}
+/// Horizontal velocity of the contact point [m/s], (3).
+template <class S>
+[[nodiscard]] TROCHOID_INLINE Horizontal<S> slip_velocity(const RimBody& body,
+                                                          const NodeMotion<S>& q) {
+  const Horizontal<S> v = horizontal_velocity(q);
+  return {v.along_n + body.R * q.w3 - body.signed_h() * q.w2, v.along_mh + q.at.z * q.w1};
 }
 
 }  // namespace TROCHOID_ISA

@@ -24,10 +24,10 @@ struct Rolling {
 
   RimBody body;
   LossList losses;
-  double friction = 0.0;  ///< Coulomb coefficient that ends rolling, 0: any force is borne
+  S friction{0.0};  ///< Coulomb coefficient that ends rolling, 0: any force is borne
 
   [[nodiscard]] Rolling<double, Terms...> values() const {
-    return {body, losses.values(), friction};
+    return {body, losses.values(), value_of(friction)};
   }
   [[nodiscard]] TROCHOID_INLINE NodeMotion<S> motion(const State<S, kStates>& y) const {
     NodeMotion<S> q;
@@ -112,7 +112,7 @@ struct Rolling {
     g[rim] = body.h > 0.0 ? body.side * q.at.c : S(1.0);
     g[lift_off] = a.normal * (1.0 / (body.m * body.g));
     g[slip] = S(1.0);
-    if (friction > 0.0) {
+    if (value_of(friction) > 0.0) {
       const ContactForce<S> force = contact_force(q, a);
       const S demand =
           sqrt(force.along_n * force.along_n + force.along_mh * force.along_mh + 1e-300);

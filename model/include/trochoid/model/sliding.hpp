@@ -22,7 +22,7 @@ struct Coulomb {
   double eps_v = 0.0;  ///< [m/s]
   [[nodiscard]] Coulomb<double> values() const { return {value_of(mu), eps_v}; }
   /// Friction per unit normal force along n and mh.
-  [[nodiscard]] TROCHOID_INLINE Slip<S> per_normal(const Slip<S>& u) const {
+  [[nodiscard]] TROCHOID_INLINE Horizontal<S> per_normal(const Horizontal<S>& u) const {
     const S scale = mu / sqrt(u.along_n * u.along_n + u.along_mh * u.along_mh + eps_v * eps_v);
     return {-scale * u.along_n, -scale * u.along_mh};
   }
@@ -53,10 +53,9 @@ struct Sliding {
     q.w2 = y[Rim::w2];
     q.w3 = y[Rim::w3];
     q.precession_k = q.w2 * q.at.c / q.at.s;
-    const S cos_phi = cos(y[Rim::phi]), sin_phi = sin(y[Rim::phi]);
-    const S vt = y[Rim::vy] * cos_phi - y[Rim::vx] * sin_phi;
+    const S vt = y[Rim::ut] - q.at.z * q.w1;  // (S1)
     const S vz = q.at.slope * q.w1;
-    q.v1 = y[Rim::vx] * cos_phi + y[Rim::vy] * sin_phi;
+    q.v1 = y[Rim::un] - body.R * q.w3 + body.signed_h() * q.w2;
     q.v2 = vt * q.at.c + vz * q.at.s;
     q.v3 = vz * q.at.c - vt * q.at.s;
     return q;
@@ -87,7 +86,7 @@ struct Sliding {
       r.drag_n = load.d1;
       r.drag_mh = q.at.c * load.d2 - q.at.s * load.d3;
     }
-    Slip<S> f{S(0.0), S(0.0)};
+    Horizontal<S> f{S(0.0), S(0.0)};
     if constexpr (Friction<S>::kActive) {
       f = friction.per_normal(slip_velocity(body, q));
       g1 += q.at.z * f.along_mh;
@@ -117,16 +116,18 @@ struct Sliding {
     dy[Rim::w1] = r.a.w1;
     dy[Rim::w2] = r.a.w2;
     dy[Rim::w3] = r.a.w3;
-    dy[Rim::x] = y[Rim::vx];
-    dy[Rim::y] = y[Rim::vy];
+    const Horizontal<S> v = horizontal_velocity(q);
+    const World<S> v_world = world_from_node(v, y[Rim::phi]);
+    dy[Rim::x] = v_world.x;
+    dy[Rim::y] = v_world.y;
+    // Acceleration of the centre in the turning node frame (S9), then of the contact point (S10).
+    S an = dy[Rim::phi] * v.along_mh, at = -dy[Rim::phi] * v.along_n;
     if constexpr (Friction<S>::kActive || LossList::kLoad) {
-      const S cos_phi = cos(y[Rim::phi]), sin_phi = sin(y[Rim::phi]);
-      const S fn = r.force.along_n + r.drag_n, ft = r.force.along_mh + r.drag_mh;
-      dy[Rim::vx] = (fn * cos_phi - ft * sin_phi) * (1.0 / body.m);  // (S9)
-      dy[Rim::vy] = (fn * sin_phi + ft * cos_phi) * (1.0 / body.m);
-    } else {
-      dy[Rim::vx] = dy[Rim::vy] = S(0.0);
+      an += (r.force.along_n + r.drag_n) * (1.0 / body.m);
+      at += (r.force.along_mh + r.drag_mh) * (1.0 / body.m);
     }
+    dy[Rim::un] = an + body.R * r.a.w3 - body.signed_h() * r.a.w2;
+    dy[Rim::ut] = at + q.at.slope * q.w1 * q.w1 + q.at.z * r.a.w1;
   }
 
   [[nodiscard]] ContactForce<S> contact_force(const NodeMotion<S>& q) const {
@@ -144,7 +145,7 @@ struct Sliding {
     g[inconsistent] = r.consistency;
     g[stick] = S(1.0);
     if (stick_speed_m_s > 0.0) {
-      const Slip<S> u = slip_velocity(body, q);
+      const Horizontal<S> u = slip_velocity(body, q);
       g[stick] =
           sqrt(u.along_n * u.along_n + u.along_mh * u.along_mh + 1e-300) * (1.0 / stick_speed_m_s) -
           1.0;

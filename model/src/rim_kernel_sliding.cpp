@@ -1,0 +1,48 @@
+#include "rim_kernel.hpp"
+
+namespace trochoid::model {
+namespace {
+
+/// Sliding bodies have two compiled lists: no loss but friction, and every loss.
+template <class Visit>
+auto with_few_terms(const data::ModelSettings& model, Visit&& visit) {
+  const LossValues<double> losses = loss_values(model);
+  bool any = false;
+  for (const double value : losses.value) any = any || value > 0.0;
+  if (!any) return visit(TermList<>{});
+  return visit(TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                        PivotingFriction, ContourFriction>{});
+}
+
+}  // namespace
+
+template <class S>
+RimPath<S> run_smooth(const RimModel& model, const RimInput<S>& input, const RimRunOptions& options,
+                      std::span<const double> t_s) {
+  return with_few_terms(model.terms, [&](auto terms) {
+    return rim_path<S, NoFriction>(model, input, NoFriction<S>{}, S(0.0), Regime::sliding, options,
+                                   t_s, terms);
+  });
+}
+
+template <class S>
+RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input,
+                       const RimRunOptions& options, std::span<const double> t_s) {
+  const double eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
+  const S limit = eps_v > 0.0 ? S(0.0) : input.friction;
+  return with_few_terms(model.terms, [&](auto terms) {
+    return rim_path<S, Coulomb>(model, input, Coulomb<S>{input.friction, eps_v}, limit,
+                                Regime::sliding, options, t_s, terms);
+  });
+}
+
+template RimPath<double> run_smooth(const RimModel&, const RimInput<double>&, const RimRunOptions&,
+                                    std::span<const double>);
+template RimPath<Dual8> run_smooth(const RimModel&, const RimInput<Dual8>&, const RimRunOptions&,
+                                   std::span<const double>);
+template RimPath<double> run_sliding(const RimModel&, const RimInput<double>&, const RimRunOptions&,
+                                     std::span<const double>);
+template RimPath<Dual8> run_sliding(const RimModel&, const RimInput<Dual8>&, const RimRunOptions&,
+                                    std::span<const double>);
+
+}  // namespace trochoid::model

@@ -1,0 +1,319 @@
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "factories.hpp"
+#include "rim_kernel.hpp"
+#include "trochoid/data/error.hpp"
+
+// Rolling, sliding and smooth-floor bodies as functions of their parameters. Position and spin
+// angle are cyclic, and so is the azimuth of a rolling body: their derivatives need no lane.
+namespace trochoid::model {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using Role = ParameterInfo::Role;
+
+enum class Floor { rolling, smooth, sliding };
+
+/// Places of the parameters in RimInput: initial state, losses, friction.
+constexpr int kInitial = 10, kFriction = kInitial + kLosses, kSlots = kFriction + 1;
+enum Slot : int { kTheta, kPhi, kPsi, kW1, kW2, kW3, kX, kY, kVx, kVy };
+
+template <class S>
+S& slot(RimInput<S>& in, int index) {
+  S* const initial[kInitial] = {&in.theta, &in.phi, &in.psi, &in.w1, &in.w2,
+                                &in.w3,    &in.x,   &in.y,   &in.vx, &in.vy};
+  if (index < kInitial) return *initial[index];
+  return index < kFriction ? in.losses.value[index - kInitial] : in.friction;
+}
+
+ParameterInfo initial_parameter(const char* name, const char* unit, double value,
+                                const char* meaning) {
+  return {name, unit, Role::initial, -kInfinity, kInfinity, false, value, true, meaning};
+}
+
+struct Entries {
+  std::vector<ParameterInfo> infos;
+  std::vector<int> slots;
+  void add(const ParameterInfo& info, int slot) {
+    infos.push_back(info);
+    slots.push_back(slot);
+  }
+};
+
+void add_initial(const RimStart& start, Floor floor, Entries& entries) {
+  ParameterInfo theta = initial_parameter("theta_rad", "rad", start.theta_rad, "tilt of the axis");
+  theta.lower = Rolling<double>::kFlat_rad;
+  theta.upper = std::numbers::pi - theta.lower;
+  entries.add(theta, kTheta);
+  entries.add(initial_parameter("phi_rad", "rad", start.phi_rad, "precession angle"), kPhi);
+  ParameterInfo psi = initial_parameter("psi_rad", "rad", start.psi_rad, "spin angle");
+  psi.worth_fitting = false;  // only a mark shows it
+  entries.add(psi, kPsi);
+  entries.add(initial_parameter("w1_rad_s", "rad/s", start.w1_rad_s, "tilting rate"), kW1);
+  entries.add(
+      initial_parameter("w2_rad_s", "rad/s", start.w2_rad_s, "angular velocity up the disc plane"),
+      kW2);
+  entries.add(initial_parameter("w3_rad_s", "rad/s", start.w3_rad_s, "spin about the axis"), kW3);
+  entries.add(initial_parameter("x_m", "m", start.x_m, "centre of mass"), kX);
+  entries.add(initial_parameter("y_m", "m", start.y_m, "centre of mass"), kY);
+  if (floor == Floor::rolling) return;
+  entries.add(initial_parameter("vx_m_s", "m/s", start.vx_m_s, "velocity of the centre"), kVx);
+  entries.add(initial_parameter("vy_m_s", "m/s", start.vy_m_s, "velocity of the centre"), kVy);
+}
+
+void add_dynamics(const data::ModelSettings& model, Floor floor, Entries& entries) {
+  for (const ParameterInfo& info : loss_parameters(model)) {
+    int index = 0;
+    while (info.name != kLossNames[index]) ++index;
+    entries.add(info, kInitial + index);
+  }
+  if (floor != Floor::sliding) return;
+  if (!model.friction)
+    throw InputError("model.friction is missing: the sliding model needs the Coulomb coefficient");
+  entries.add({"friction", "1", Role::dynamics, 0.0, kInfinity, true, *model.friction, true,
+               "Coulomb coefficient of the floor"},
+              kFriction);
+}
+
+class RimPredictor : public Predictor {
+ public:
+  RimPredictor(const data::Scene& scene, Floor floor, const char* name)
+      : name_(name),
+        floor_(floor),
+        model_{rim_body(scene), scene.model},
+        fixed_(loss_values(scene.model)),
+        impact_(scene.run.rim_switch == "impact") {
+    const RimStart start = rim_start_or_typical(scene, model_.body);
+    add_initial(start, floor, entries_);
+    add_dynamics(scene.model, floor, entries_);
+  }
+  [[nodiscard]] const std::string& model_name() const override { return name_; }
+  [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override {
+    return entries_.infos;
+  }
+  [[nodiscard]] Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                   const PredictRequest& request) const override;
+
+ private:
+  struct Call;
+  template <class S>
+  [[nodiscard]] RimInput<S> input(const Eigen::Ref<const Eigen::VectorXd>& values) const;
+  template <class S>
+  [[nodiscard]] RimPath<S> run(const RimInput<S>& in, const Call& call) const;
+  template <class S>
+  void fill_values(const RimPath<S>& path, Call& call, Prediction& out) const;
+  void fill_lanes(const RimPath<Dual8>& path, const Call& call, const std::vector<int>& columns,
+                  Prediction& out) const;
+  void fill_cyclic(const Call& call, Prediction& out) const;
+  [[nodiscard]] bool cyclic(int parameter) const {
+    const int s = entries_.slots[static_cast<std::size_t>(parameter)];
+    return s == kX || s == kY || s == kPsi || (s == kPhi && floor_ == Floor::rolling);
+  }
+  [[nodiscard]] int initial_count() const { return floor_ == Floor::rolling ? 8 : kInitial; }
+
+  std::string name_;
+  Floor floor_;
+  RimModel model_;
+  LossValues<double> fixed_;
+  bool impact_;
+  Entries entries_;
+};
+
+/// One call: the request with times counted from its start.
+struct RimPredictor::Call {
+  const Eigen::Ref<const Eigen::VectorXd>& values;
+  const PredictRequest& request;
+  std::vector<double> t_s;
+  RimRunOptions options;
+  std::vector<World<double>> path_m;  ///< the centre at the times reached
+};
+
+int row_component(Observable what) {
+  switch (what) {
+    case Observable::phi_rad:
+      return 0;
+    case Observable::theta_rad:
+      return 1;
+    case Observable::psi_rad:
+      return 2;
+    case Observable::x_m:
+      return 3;
+    case Observable::y_m:
+      return 4;
+  }
+  return 0;
+}
+
+template <class S>
+RimInput<S> RimPredictor::input(const Eigen::Ref<const Eigen::VectorXd>& values) const {
+  RimInput<S> in{};
+  in.losses.air_ratio = fixed_.air_ratio;
+  in.losses.quadratic_ratio = fixed_.quadratic_ratio;
+  in.losses.eps_w = fixed_.eps_w;
+  for (std::size_t i = 0; i < entries_.slots.size(); ++i)
+    slot(in, entries_.slots[i]) = S(values[static_cast<Eigen::Index>(i)]);
+  return in;
+}
+
+template <class S>
+RimPath<S> RimPredictor::run(const RimInput<S>& in, const Call& call) const {
+  switch (floor_) {
+    case Floor::rolling:
+      return run_rolling(model_, in, call.options, call.t_s);
+    case Floor::smooth:
+      return run_smooth(model_, in, call.options, call.t_s);
+    case Floor::sliding:
+      break;
+  }
+  return run_sliding(model_, in, call.options, call.t_s);
+}
+
+/// Initial-state parameters that describe the state at the end of a run.
+template <class S>
+std::array<S, kInitial> end_parameters(const RimBody& given, const RimRunEnd<S>& end) {
+  RimBody body = given;
+  body.side = end.side;
+  const State<S, 10>& y = end.y;
+  const S vn = y[Rim::un] - body.R * y[Rim::w3] + body.signed_h() * y[Rim::w2];
+  const S vt = y[Rim::ut] - tilt(body, y[Rim::theta]).z * y[Rim::w1];
+  const World<S> v = world_from_node(Horizontal<S>{vn, vt}, y[Rim::phi]);
+  return {y[Rim::theta], y[Rim::phi], y[Rim::psi], y[Rim::w1], y[Rim::w2],
+          y[Rim::w3],    y[Rim::x],   y[Rim::y],   v.x,        v.y};
+}
+
+template <class S>
+void RimPredictor::fill_values(const RimPath<S>& path, Call& call, Prediction& out) const {
+  const auto& wanted = call.request.observables;
+  const auto stride = static_cast<Eigen::Index>(wanted.size());
+  for (const auto& row : path.rows) call.path_m.push_back({value_of(row[3]), value_of(row[4])});
+  for (std::size_t n = 0; n < path.rows.size(); ++n)
+    for (std::size_t o = 0; o < wanted.size(); ++o)
+      out.values[static_cast<Eigen::Index>(n) * stride + static_cast<Eigen::Index>(o)] =
+          value_of(path.rows[n][row_component(wanted[o])]);
+  out.outcome = path.end.outcome;
+  out.valid_until_s = call.request.start_s + path.end.end_s;
+  out.steps = path.end.statistics.steps;
+  // Local errors add up; those of the angles act on the path through its size.
+  const double reach_m = model_.body.R + std::hypot(value_of(path.end.y[Rim::x]) - call.values[kX],
+                                                    value_of(path.end.y[Rim::y]) - call.values[kY]);
+  out.error_estimate = call.request.tolerance * path.end.error_sum * reach_m;
+  if (!call.request.want_end_state) return;
+  const auto end = end_parameters(model_.body, path.end);
+  out.end_state.resize(initial_count());
+  for (int i = 0; i < initial_count(); ++i) out.end_state[i] = value_of(end[i]);
+}
+
+void RimPredictor::fill_lanes(const RimPath<Dual8>& path, const Call& call,
+                              const std::vector<int>& columns, Prediction& out) const {
+  const auto& wanted = call.request.observables;
+  const auto stride = static_cast<Eigen::Index>(wanted.size());
+  for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+    auto column = out.jacobian.col(columns[lane]);
+    for (std::size_t n = 0; n < path.rows.size(); ++n)
+      for (std::size_t o = 0; o < wanted.size(); ++o)
+        column[static_cast<Eigen::Index>(n) * stride + static_cast<Eigen::Index>(o)] =
+            path.rows[n][row_component(wanted[o])].derivative[lane];
+  }
+  if (!call.request.want_end_state) return;
+  const auto end = end_parameters(model_.body, path.end);
+  for (std::size_t lane = 0; lane < columns.size(); ++lane)
+    for (int i = 0; i < initial_count(); ++i)
+      out.end_state_jacobian(i, columns[lane]) = end[i].derivative[lane];
+}
+
+/// A shift of the start shifts the path, a turn of the start turns it about the start: derivative
+/// of what is seen by the cyclic parameter `by` when the centre is at `from_start` of its start.
+double cyclic_rate(int by, Observable what, const World<double>& from_start) {
+  if (by == kX) return what == Observable::x_m ? 1.0 : 0.0;
+  if (by == kY) return what == Observable::y_m ? 1.0 : 0.0;
+  if (by == kPsi) return what == Observable::psi_rad ? 1.0 : 0.0;
+  if (what == Observable::x_m) return -from_start.y;
+  if (what == Observable::y_m) return from_start.x;
+  return what == Observable::phi_rad ? 1.0 : 0.0;
+}
+
+void RimPredictor::fill_cyclic(const Call& call, Prediction& out) const {
+  const auto& wanted = call.request.observables;
+  const double x0 = call.values[kX], y0 = call.values[kY];
+  for (std::size_t c = 0; c < call.request.derivatives.size(); ++c) {
+    const int parameter = call.request.derivatives[c];
+    if (!cyclic(parameter)) continue;
+    const int by = entries_.slots[static_cast<std::size_t>(parameter)];
+    const auto column = static_cast<Eigen::Index>(c);
+    Eigen::Index row = 0;
+    for (const World<double>& at : call.path_m)
+      for (const Observable what : wanted)
+        out.jacobian(row++, column) = cyclic_rate(by, what, {at.x - x0, at.y - y0});
+    if (!call.request.want_end_state) continue;
+    out.end_state_jacobian.col(column).setZero();
+    const World<double> end{out.end_state[kX] - x0, out.end_state[kY] - y0};
+    constexpr std::pair<int, Observable> kSeen[] = {{kPhi, Observable::phi_rad},
+                                                    {kPsi, Observable::psi_rad},
+                                                    {kX, Observable::x_m},
+                                                    {kY, Observable::y_m}};
+    for (const auto& [index, what] : kSeen)
+      out.end_state_jacobian(index, column) = cyclic_rate(by, what, end);
+  }
+}
+
+unsigned components_of(const PredictRequest& request) {
+  constexpr int kState[] = {Rim::phi, Rim::theta, Rim::psi, Rim::x, Rim::y};
+  unsigned mask = 1u << Rim::x | 1u << Rim::y;  // the derivative by phi needs both
+  for (const Observable what : request.observables) mask |= 1u << kState[row_component(what)];
+  return mask;
+}
+
+Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                 const PredictRequest& request) const {
+  check_request(*this, values, request);
+  Call call{values, request, {}, {}, {}};
+  for (const double t : request.t_s) call.t_s.push_back(t - request.start_s);
+  call.options.tolerance = request.tolerance;
+  call.options.end_s = call.t_s.empty() ? 0.0 : call.t_s.back();
+  call.options.impact_at_rim = impact_;
+  call.options.components = components_of(request);
+
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
+  const auto width = static_cast<Eigen::Index>(request.derivatives.size());
+  Prediction out;
+  out.values.setConstant(rows, kNan);
+  out.jacobian.setConstant(rows, width, kNan);
+  if (request.want_end_state) out.end_state_jacobian.resize(initial_count(), width);
+  std::vector<int> active;  // columns that need a lane
+  for (std::size_t c = 0; c < request.derivatives.size(); ++c)
+    if (!cyclic(request.derivatives[c])) active.push_back(static_cast<int>(c));
+  if (active.empty()) fill_values(run(input<double>(values), call), call, out);
+  for (std::size_t from = 0; from < active.size(); from += Dual8::kLanes) {
+    const std::size_t to = std::min(active.size(), from + Dual8::kLanes);
+    const std::vector<int> columns(active.begin() + static_cast<std::ptrdiff_t>(from),
+                                   active.begin() + static_cast<std::ptrdiff_t>(to));
+    RimInput<Dual8> in = input<Dual8>(values);
+    for (std::size_t lane = 0; lane < columns.size(); ++lane) {
+      const int parameter = request.derivatives[static_cast<std::size_t>(columns[lane])];
+      slot(in, entries_.slots[static_cast<std::size_t>(parameter)]).derivative[lane] = 1.0;
+    }
+    const RimPath<Dual8> path = run(in, call);
+    if (from == 0) fill_values(path, call, out);
+    fill_lanes(path, call, columns, out);
+  }
+  fill_cyclic(call, out);
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Predictor> make_rolling(const data::Scene& scene) {
+  return std::make_unique<RimPredictor>(scene, Floor::rolling, "rolling");
+}
+std::unique_ptr<Predictor> make_smooth(const data::Scene& scene) {
+  return std::make_unique<RimPredictor>(scene, Floor::smooth, "smooth");
+}
+std::unique_ptr<Predictor> make_sliding(const data::Scene& scene) {
+  return std::make_unique<RimPredictor>(scene, Floor::sliding, "sliding");
+}
+
+}  // namespace trochoid::model

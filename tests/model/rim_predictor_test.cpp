@@ -1,0 +1,172 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/reference_case.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::model {
+namespace {
+
+constexpr Observable kEverything[] = {Observable::x_m, Observable::y_m, Observable::theta_rad,
+                                      Observable::phi_rad, Observable::psi_rad};
+
+std::string reference_path(const std::string& name, const char* ending) {
+  return std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ending;
+}
+data::Scene reference_scene(const std::string& name) {
+  return data::read_reference_case(reference_path(name, ".json")).scene;
+}
+
+Eigen::VectorXd defaults(const Predictor& predictor) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(predictor.parameters().size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    values[i] = predictor.parameters()[static_cast<std::size_t>(i)].value;
+  return values;
+}
+
+struct Errors {
+  double theta_rad = 0.0, phi_rad = 0.0, xy_m = 0.0, estimate_m = 0.0;
+  Outcome outcome = Outcome::reached_end;
+};
+
+Errors errors_against_reference(const std::string& name, double tolerance) {
+  const data::Table table = data::read_table(reference_path(name, ".csv"));
+  const auto predictor = make_predictor(reference_scene(name));
+  const Eigen::VectorXd t_s = table.column("t");
+  PredictRequest request;
+  request.t_s = {t_s.data(), static_cast<std::size_t>(t_s.size())};
+  request.observables.assign(std::begin(kEverything), std::end(kEverything));
+  request.tolerance = tolerance;
+  const Prediction run = predictor->predict(defaults(*predictor), request);
+  Errors errors;
+  for (Eigen::Index n = 0; n < t_s.size(); ++n) {
+    const auto at = [&](int o) { return run.values[5 * n + o]; };
+    errors.xy_m = std::max(errors.xy_m,
+                           std::hypot(at(0) - table.column("x")[n], at(1) - table.column("y")[n]));
+    errors.theta_rad = std::max(errors.theta_rad, std::abs(at(2) - table.column("theta")[n]));
+    errors.phi_rad = std::max(errors.phi_rad, std::abs(at(3) - table.column("phi")[n]));
+  }
+  errors.estimate_m = run.error_estimate;
+  errors.outcome = run.outcome;
+  return errors;
+}
+
+struct Bound {
+  const char* name;
+  double theta_rad, xy_m;  ///< what an ordinary integration reaches, from the folder's README
+};
+class AgainstReference : public testing::TestWithParam<Bound> {};
+
+TEST_P(AgainstReference, MeetsTheToleranceOfTheCase) {
+  const Errors errors = errors_against_reference(GetParam().name, 1e-13);
+  EXPECT_EQ(errors.outcome, Outcome::reached_end);
+  EXPECT_LE(errors.theta_rad, GetParam().theta_rad);
+  EXPECT_LE(errors.xy_m, GetParam().xy_m);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rim, AgainstReference,
+                         testing::Values(Bound{"s05_smooth_disc", 2e-7, 1e-12},
+                                         Bound{"s06_roll_disc", 4e-9, 5e-10},
+                                         Bound{"s07_roll_hoop_thin", 6e-9, 8e-10},
+                                         Bound{"s08_slide_disc", 4e-7, 4e-8},
+                                         Bound{"s09_ring_retrograde_drag", 3e-8, 4e-9},
+                                         Bound{"s10_stick_slip_event", 4e-5, 3e-6}));
+
+/// Scenes with every term, near the reference cases, at a random start.
+data::Scene random_scene(std::mt19937& draw, const std::string& name) {
+  std::uniform_real_distribution<double> u(0.0, 1.0);
+  data::Scene scene = reference_scene(name);
+  scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-6, 1e-6, 3e-6) * (0.5 + u(draw));
+  scene.model.air_quadratic_N_m_s2 = Eigen::Vector3d(2e-8, 2e-8, 1e-8) * (0.5 + u(draw));
+  scene.model.air_force_N_s_m = 1e-3 * u(draw);
+  scene.model.gap_viscosity_Pa_s = 1.8e-5;
+  scene.model.rolling_friction_m = 5e-5 * (0.5 + u(draw));
+  scene.model.pivoting_friction_m = 2e-4 * (0.5 + u(draw));
+  scene.model.contour_friction_m = 1e-4 * (0.5 + u(draw));
+  scene.start.phi_rad = 6.0 * u(draw);
+  *scene.start.theta_rad += 0.1 * (u(draw) - 0.5);
+  *scene.start.w2_rad_s *= 1.0 + 0.1 * (u(draw) - 0.5);
+  scene.start.x_m = 0.1;
+  scene.start.y_m = -0.2;
+  return scene;
+}
+
+/// Central differences of order four, step chosen so that truncation and rounding balance.
+void expect_derivatives_match(const Predictor& predictor, const Eigen::VectorXd& values,
+                              std::span<const double> t_s, double tolerance) {
+  PredictRequest request;
+  request.t_s = t_s;
+  request.observables.assign(std::begin(kEverything), std::end(kEverything));
+  request.tolerance = 1e-13;
+  request.want_end_state = true;
+  for (int i = 0; i < values.size(); ++i) request.derivatives.push_back(i);
+  const Prediction exact = predictor.predict(values, request);
+  ASSERT_EQ(exact.outcome, Outcome::reached_end);
+  request.derivatives.clear();
+  for (int i = 0; i < values.size(); ++i) {
+    const double h = 2e-4 * std::max(1e-3 * (values[i] == 0.0), std::abs(values[i]));
+    const auto at = [&](double offset) {
+      Eigen::VectorXd moved = values;
+      moved[i] += offset;
+      const Prediction run = predictor.predict(moved, request);
+      Eigen::VectorXd all(run.values.size() + run.end_state.size());
+      all << run.values, run.end_state;
+      return all;
+    };
+    const Eigen::VectorXd difference =
+        (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+    Eigen::VectorXd ours(difference.size());
+    ours << exact.jacobian.col(i), exact.end_state_jacobian.col(i);
+    const double scale = std::max(1e-3, difference.cwiseAbs().maxCoeff());
+    EXPECT_LE((ours - difference).cwiseAbs().maxCoeff(), tolerance * scale)
+        << predictor.model_name() << " by " << predictor.parameters()[i].name;
+  }
+}
+
+TEST(RimPredictor, DifferentiatesRollingByEveryParameter) {
+  std::mt19937 draw(3);
+  const std::vector<double> t_s{0.05, 0.3, 0.7, 1.0};
+  for (int i = 0; i < 3; ++i) {
+    const auto predictor = make_predictor(random_scene(draw, "s06_roll_disc"));
+    expect_derivatives_match(*predictor, defaults(*predictor), t_s, 1e-6);
+  }
+}
+
+TEST(RimPredictor, DifferentiatesSmoothMotionByEveryParameter) {
+  std::mt19937 draw(4);
+  data::Scene scene = reference_scene("s05_smooth_disc");
+  scene.start.phi_rad = 0.4;
+  const auto predictor = make_predictor(scene);
+  expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.1, 0.5}, 1e-6);
+}
+
+TEST(RimPredictor, DifferentiatesRegularisedSlidingByEveryParameter) {
+  std::mt19937 draw(5);
+  const auto predictor = make_predictor(random_scene(draw, "s08_slide_disc"));
+  expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.02, 0.3}, 1e-5);
+}
+
+TEST(RimPredictor, DifferentiatesAcrossStickAndSlip) {
+  std::mt19937 draw(6);
+  const auto predictor = make_predictor(random_scene(draw, "s10_stick_slip_event"));
+  expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.02, 0.2, 0.5, 0.8},
+                           1e-4);
+}
+
+TEST(RimPredictor, AsksForTheMassOnlyWhenATermNeedsIt) {
+  data::Scene scene = reference_scene("s06_roll_disc");
+  scene.body->mass_kg.reset();
+  scene.body->I_kg_m2.reset();
+  scene.body->Is_kg_m2.reset();
+  scene.model.rolling_friction_m = 1e-4;
+  EXPECT_NO_THROW((void)make_predictor(scene));
+  scene.model.air_force_N_s_m = 1e-3;
+  EXPECT_THROW((void)make_predictor(scene), InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::model
