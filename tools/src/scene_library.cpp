@@ -1,0 +1,32 @@
+#include "scene_library.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::tools {
+
+std::string_view BundledScene::summary() const {
+  if (!toml.starts_with("# ")) return {};
+  return toml.substr(2, toml.find('\n') - 2);
+}
+
+data::Scene load_scene(const std::string& file_or_name) {
+  if (std::filesystem::exists(file_or_name)) return data::read_scene(file_or_name);
+  const auto& scenes = bundled_scenes();
+  const auto found = std::find_if(scenes.begin(), scenes.end(), [&](const BundledScene& scene) {
+    return scene.name == file_or_name;
+  });
+  if (found != scenes.end())
+    return data::parse_scene(std::string(found->toml), std::string(found->name));
+  throw InputError(fmt::format(
+      "{}: neither a scene file nor a bundled scene; `trochoid simulate --list` names those",
+      file_or_name));
+}
+
+}  // namespace trochoid::tools

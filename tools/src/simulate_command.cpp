@@ -1,0 +1,155 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "animation.hpp"
+#include "commands.hpp"
+#include "progress.hpp"
+#include "scene_library.hpp"
+#include "thesis_quantities.hpp"
+#include "trajectory_plots.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/model/simulate.hpp"
+#include "trochoid/model/steady.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string scene;
+  fs::path output, plots, animation;
+  std::optional<double> until_s, rate_hz, tolerance;
+  std::string model, integrator;
+  bool list = false, steady = false, thesis = false;
+};
+
+void apply_overrides(const Options& options, data::Scene& scene) {
+  if (options.until_s) scene.run.until_s = *options.until_s;
+  if (options.rate_hz) scene.run.rate_hz = *options.rate_hz;
+  if (options.tolerance) scene.run.tolerance = *options.tolerance;
+  if (!options.model.empty()) scene.model.name = options.model;
+  if (!options.integrator.empty()) scene.run.integrator = options.integrator;
+}
+
+data::Table as_table(const model::Trajectory& run) {
+  data::Table table;
+  table.header = {
+      {"trochoid trajectory 1", ""},
+      {"made by", "trochoid " TROCHOID_VERSION},
+      {"model", run.model},
+      {"integrator", fmt::format("{}: {}", run.integrator, run.integrator_reason)},
+      {"outcome", fmt::format("{} at t = {} s: {}", model::name(run.outcome), run.end_s,
+                              model::sentence(run.outcome))},
+      {"error estimate [m]", fmt::format("{:.1e}", run.error_estimate_m)},
+      {"steps", fmt::format("{} accepted, {} rejected, {} evaluations", run.statistics.steps,
+                            run.statistics.rejected, run.statistics.evaluations)}};
+  for (const model::Event& event : run.events)
+    table.header.emplace_back("event", fmt::format("{} at t = {} s", event.name, event.t_s));
+  table.columns = run.columns;
+  table.values = run.values;
+  return table;
+}
+
+void list_scenes() {
+  for (const BundledScene& scene : bundled_scenes())
+    fmt::print("{:<28} {}\n", scene.name, scene.summary());
+}
+
+void print_steady(const data::Scene& scene) {
+  if (!scene.body) throw InputError("--steady needs a [body] in the scene");
+  std::vector<double> tilts_rad;
+  for (int degrees = 10; degrees <= 80; degrees += 10)
+    tilts_rad.push_back(degrees * std::numbers::pi / 180.0);
+  fmt::print("{:<7} {:<17} {:>9} {:>14} {:>10} {:>11} {:>9} {:>8} {:>16}  {}\n", "floor", "motion",
+             "tilt_deg", "dphi_rad_s", "w3_rad_s", "radius_m", "N_N", "demand", "nutation_rad_s",
+             "stability");
+  for (const model::SteadyMotion& motion :
+       model::steady_catalogue(*scene.body, scene.model.gravity_m_s2, tilts_rad)) {
+    const double nu2 = motion.nutation2_1_s2;
+    const std::string nutation =
+        std::isnan(nu2) ? "-" : fmt::format("{:.4f}", std::sqrt(std::abs(nu2)));
+    fmt::print("{:<7} {:<17} {:>9.1f} {:>14.4f} {:>10.4f} {:>11.5g} {:>9.4g} {:>8.4f} {:>16}  {}\n",
+               model::name(motion.floor), model::name(motion.kind),
+               motion.theta_rad * 180.0 / std::numbers::pi, motion.precession_rad_s,
+               motion.w3_rad_s, motion.circle_radius_m, motion.normal_force_N,
+               motion.friction_demand, nutation,
+               std::isnan(nu2)   ? "rests on a line or a face"
+               : motion.stable() ? "stable"
+                                 : "unstable, grows at this rate");
+  }
+}
+
+void simulate_scene(const Options& options) {
+  data::Scene scene = load_scene(options.scene);
+  apply_overrides(options, scene);
+  if (options.steady) return print_steady(scene);
+  const model::Trajectory run = model::simulate(scene);
+  data::Table table = as_table(run);
+  if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
+  const fs::path output = options.output.empty()
+                              ? fs::path(options.scene).stem().string() + ".trajectory.csv"
+                              : options.output;
+  data::write_table(table, output);
+  fmt::print("{}: {} rows, {}\n", output.string(), table.values.rows(),
+             model::sentence(run.outcome));
+  note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
+                   run.integrator, run.integrator_reason, run.error_estimate_m));
+  if (!options.plots.empty())
+    for (const fs::path& plot : write_trajectory_plots(table, stem.string(), options.plots))
+      fmt::print("{}\n", plot.string());
+#ifdef TROCHOID_HAS_TRACKING
+  if (!options.animation.empty()) {
+    write_animation(table, options.animation);
+    fmt::print("{}\n", options.animation.string());
+  }
+#endif
+}
+
+void run(const Options& options) {
+  if (options.list) return list_scenes();
+  if (options.scene.empty())
+    throw InputError(
+        "simulate: name a scene with --scene FILE or --scene NAME (--list shows names)");
+  simulate_scene(options);
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("simulate", "Run a scene's model and write its trajectory");
+  command->add_option("--scene", options->scene,
+                      "Scene file (TOML), or the name of a bundled scene");
+  command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
+  command->add_option("--until", options->until_s, "End time [s]")->check(CLI::PositiveNumber);
+  command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(CLI::PositiveNumber);
+  command->add_option("--tolerance", options->tolerance, "Integration tolerance")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--model", options->model, "Model, instead of the scene's");
+  command->add_option("--integrator", options->integrator,
+                      "auto, dop853, taylor, cvode-adams, cvode-bdf or arkode");
+  command->add_flag("--thesis", options->thesis,
+                    "Add body rates, angular momentum, wrapped angles and running integrals");
+  command->add_option("--plots", options->plots,
+                      "Draw angles, rates, path and energy into this folder");
+#ifdef TROCHOID_HAS_TRACKING
+  command->add_option("--animate", options->animation,
+                      "Write a clip of the path being drawn (.mp4)");
+#endif
+  command->add_flag("--steady", options->steady,
+                    "List the steady motions of the scene's body instead of running it");
+  command->add_flag("--list", options->list, "List the bundled scenes");
+  command->footer("Example: trochoid simulate --scene thesis_base -o base.csv --plots plots/");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools
