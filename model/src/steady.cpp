@@ -81,9 +81,10 @@ SteadyMotion rolling_motion(const RimBody& body, double theta, double W, double 
   result.theta_rad = theta;
   result.precession_rad_s = W;
   result.w3_rad_s = w3;
-  result.circle_radius_m = std::abs(motion.v1 / W);  // (3)
-  result.kind = result.circle_radius_m < 1e-12 * body.R ? SteadyKind::tilted_spinning
-                                                        : SteadyKind::circular_rolling;
+  const double radius = std::abs(motion.v1 / W);  // (3)
+  const bool at_rest = radius < 1e-12 * body.R;   // rounding of the two terms of v1
+  result.circle_radius_m = at_rest ? 0.0 : radius;
+  result.kind = at_rest ? SteadyKind::tilted_spinning : SteadyKind::circular_rolling;
   result.normal_force_N = force.normal;
   result.friction_demand = std::hypot(force.along_n, force.along_mh) / force.normal;
   result.nutation2_1_s2 = nutation2(system, y, RollingAcceleration{});

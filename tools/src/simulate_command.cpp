@@ -94,16 +94,17 @@ void simulate_scene(const Options& options) {
   const model::Trajectory run = model::simulate(scene);
   data::Table table = as_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
-  const fs::path output = options.output.empty()
-                              ? fs::path(options.scene).stem().string() + ".trajectory.csv"
-                              : options.output;
+  const fs::path named(options.scene);
+  const std::string stem = named.extension() == ".toml" ? named.stem().string() : options.scene;
+  const fs::path output =
+      options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
   data::write_table(table, output);
   fmt::print("{}: {} rows, {}\n", output.string(), table.values.rows(),
              model::sentence(run.outcome));
   note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
                    run.integrator, run.integrator_reason, run.error_estimate_m));
   if (!options.plots.empty())
-    for (const fs::path& plot : write_trajectory_plots(table, stem.string(), options.plots))
+    for (const fs::path& plot : write_trajectory_plots(table, stem, options.plots))
       fmt::print("{}\n", plot.string());
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) {
@@ -148,7 +149,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_flag("--steady", options->steady,
                     "List the steady motions of the scene's body instead of running it");
   command->add_flag("--list", options->list, "List the bundled scenes");
-  command->footer("Example: trochoid simulate --scene thesis_base -o base.csv --plots plots/");
+  command->footer("Example: trochoid simulate --scene thesis-base -o base.csv --plots plots/");
   command->callback([options] { run(*options); });
 }
 
