@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -44,6 +45,8 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
     if (index < 0 || index >= values.size())
       throw InputError(
           fmt::format("derivative by parameter {}: there are {}", index, values.size()));
+    if (std::count(request.derivatives.begin(), request.derivatives.end(), index) > 1)
+      throw InputError(fmt::format("derivative by parameter {} is asked for twice", index));
   }
 }
 

@@ -9,15 +9,17 @@ namespace trochoid::model {
 Choice choose_integrator(const std::string& asked) {
   if (asked == "auto") {
     return {
-        Method::dop853, "dop853",
-        "smooth equations: explicit order 8(5,3) needs the fewest evaluations at this tolerance"};
+        Method::taylor, "taylor",
+        "polynomial equations without events: a Taylor series of order 16 needs the fewest steps"};
   }
+  if (asked == "taylor") return {Method::taylor, asked, "asked for"};
   if (asked == "dop853") return {Method::dop853, asked, "asked for"};
   if (asked == "cvode-adams") return {Method::cvode_adams, asked, "asked for"};
   if (asked == "cvode-bdf") return {Method::cvode_bdf, asked, "asked for"};
   if (asked == "arkode") return {Method::arkode, asked, "asked for"};
   throw InputError(fmt::format(
-      "run.integrator = \"{}\" must be auto, dop853, cvode-adams, cvode-bdf or arkode", asked));
+      "run.integrator = \"{}\" must be auto, taylor, dop853, cvode-adams, cvode-bdf or arkode",
+      asked));
 }
 
 Outcome outcome_of(RunEnd end) {

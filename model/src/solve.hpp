@@ -8,6 +8,7 @@
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/sundials.hpp"
+#include "trochoid/model/taylor.hpp"
 
 /// Smooth runs on a time grid by any of the integrators, for simulate().
 namespace trochoid::model {
@@ -20,11 +21,11 @@ struct Solution {
   Statistics statistics;
 };
 
-enum class Method { dop853, cvode_adams, cvode_bdf, arkode };
+enum class Method { taylor, dop853, cvode_adams, cvode_bdf, arkode };
 
-/// What a scene's run.integrator means for a smooth model, with the reason in words.
+/// What a scene's run.integrator means for a smooth polynomial model, with the reason in words.
 struct Choice {
-  Method method = Method::dop853;
+  Method method = Method::taylor;
   std::string name, reason;
 };
 /// @throws InputError for an unknown name.
@@ -34,15 +35,15 @@ struct Choice {
 [[nodiscard]] SundialsOptions sundials_options(Method method, double rtol, const double* atol,
                                                int states);
 
-template <class System>
-[[nodiscard]] Solution solve_dop853(const System& system,
-                                    const State<double, System::kStates>& start,
-                                    const std::vector<double>& t_s,
-                                    const StepControl<System::kStates>& control) {
+template <template <class> class Stepper, class System>
+[[nodiscard]] Solution solve_stepwise(const System& system,
+                                      const State<double, System::kStates>& start,
+                                      const std::vector<double>& t_s,
+                                      const StepControl<System::kStates>& control) {
   constexpr int n = System::kStates;
   Solution solution;
   solution.states.resize(static_cast<Eigen::Index>(t_s.size()), n);
-  DormandPrince<System> stepper(system, control);
+  Stepper<System> stepper(system, control);
   stepper.start(t_s.front(), start);
   int reached = 0;
   const auto run = integrate(stepper, t_s.back(), t_s.data(), static_cast<int>(t_s.size()),
@@ -68,7 +69,8 @@ template <class System, class DualSystem>
                              const State<double, System::kStates>& start,
                              const std::vector<double>& t_s,
                              const StepControl<System::kStates>& control, Method method) {
-  if (method == Method::dop853) return solve_dop853(system, start, t_s, control);
+  if (method == Method::taylor) return solve_stepwise<Taylor>(system, start, t_s, control);
+  if (method == Method::dop853) return solve_stepwise<DormandPrince>(system, start, t_s, control);
   constexpr int n = System::kStates;
   const Eigen::VectorXd y0 = Eigen::Map<const Eigen::VectorXd>(start.v, n);
   return from_sundials(integrate_sundials(make_ode(duals), t_s.front(), y0, t_s,

@@ -3,8 +3,11 @@
 
 namespace trochoid::model {
 
-/// Runs the copy of the top's kernel made for the widest vectors of this machine.
+/// By Taylor series, with the copy of the kernel made for the widest vectors of this machine.
 void run_top_here(const TopRun& run, TopResult& result);
+
+/// By DOP853, values only.
+void run_top_dop853(const TopRun& run, TopResult& result);
 
 /// The thesis' Euler-angle equations; drag is not in them.
 void run_top_euler(const TopRun& run, TopResult& result);

@@ -10,14 +10,10 @@ namespace {
 using namespace top_kernel;
 
 template <class S>
-void write(const TopRun& run, TopResult& result, int n, const State<S, 5>& y, const S& b) {
+void write(TopResult& result, int n, const State<S, 5>& y, const S& b) {
   const auto state = axis_and_momentum<S>({y[1], y[0], y[3], y[2]}, b);
-  const auto put = [&](int column, const S& x) {
-    if (result.value[column] != nullptr)
-      store(result.value[column], result.derivative[column], n, x);
-  };
+  const auto put = [&](int column, const S& x) { store(result, column, n, x); };
   for (int i = 0; i < 3; ++i) put(i, state.k[i]);
-  if (!run.with_angles) return;
   put(3, y[0]);
   put(4, y[4]);
   for (int i = 0; i < 3; ++i) put(kTopAngleColumns + i, state.L[i]);
@@ -39,7 +35,7 @@ void run_with(const TopRun& run, TopResult& result) {
   const auto end =
       integrate(stepper, run.end_s, run.t_s, run.count, [&](const auto& step, int first, int last) {
         for (int n = first; n < last; ++n)
-          write<S>(run, result, n, step.dense_state(step.fraction(run.t_s[n])), b);
+          write<S>(result, n, step.dense_state(step.fraction(run.t_s[n])), b);
         result.written = last;
       });
   result.end_reason = static_cast<int>(end.end);

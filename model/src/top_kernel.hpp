@@ -39,9 +39,20 @@ inline constexpr int kTopAxisColumns = 3, kTopAngleColumns = 5;
 /// End state: theta, phi, dtheta, dphi, b, psi as in column 4.
 inline constexpr int kTopEndValues = 6;
 
+/// The observation most fits want, written whole by the kernel: x and y interleaved (x0, y0, x1,
+/// ...), and columns of their derivatives laid out likewise.
+struct TopPath {
+  double l_m = 0.0, pivot_x_m = 0.0, pivot_y_m = 0.0;
+  double* xy = nullptr;                 ///< 2 x count; null: the columns of TopResult are wanted
+  double* by_variable[kTopLanes] = {};  ///< indexed by TopVariable; null: not wanted
+  double* by_l = nullptr;
+  double* by_phi = nullptr;
+};
+
 struct TopResult {
-  double* value[kTopColumns] = {};       ///< count numbers each; may be null from column 2 on
-  double* derivative[kTopColumns] = {};  ///< count x kTopLanes, lane = TopVariable; or null
+  double* value[kTopColumns] = {};                  ///< count numbers each; may be null
+  double* derivative[kTopColumns][kTopLanes] = {};  ///< likewise, by TopVariable
+  TopPath path;
   double end[kTopEndValues] = {};
   double end_derivative[kTopEndValues][kTopLanes] = {};
   int written = 0;     ///< times that have been reached

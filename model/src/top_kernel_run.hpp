@@ -1,4 +1,5 @@
 #pragma once
+#include "top_kernel_path.hpp"
 #include "top_kernel_store.hpp"
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/top.hpp"
@@ -64,10 +65,11 @@ TROCHOID_INLINE S azimuth(const S& kx, const S& ky, double near) {
 /// Samples between outputs at which the azimuth is followed within one step.
 constexpr int kLooks = 16;
 
-template <class System>
+template <template <class> class Method, class System>
 class Run {
  public:
   using S = typename System::Scalar;
+  using Stepper = Method<System>;
   static constexpr bool kAngles = requires(System system) { system.side; };
 
   Run(const TopRun& run, TopResult& result) : run_(run), result_(result) {}
@@ -79,7 +81,7 @@ class Run {
     const auto start = axis_and_momentum(angles, b);
     State<S, System::kStates> y;
     const System system = make_system(b, start, y);
-    DormandPrince<System> stepper(system, control(start));
+    Stepper stepper(system, control(start));
     azimuth_.start(run_.phi_rad);
     stepper.start(run_.start_s, y);
     stepper.prepare_dense();
@@ -118,7 +120,7 @@ class Run {
     return control_for<System>(run_, values);
   }
 
-  void after_step(DormandPrince<System>& stepper) {
+  void after_step(Stepper& stepper) {
     const double t = stepper.t_s();
     const bool outputs = next_ < run_.count && run_.t_s[next_] <= t;
     if (outputs || kAngles) stepper.prepare_dense();
@@ -135,28 +137,34 @@ class Run {
       if (outputs) hand_out(stepper, t);
     }
   }
-  void hand_out(DormandPrince<System>& stepper, double until) {
-    for (; next_ < run_.count && run_.t_s[next_] <= until; ++next_) {
-      write(stepper, next_, stepper.fraction(run_.t_s[next_]));
+  void hand_out(Stepper& stepper, double until) {
+    const int first = next_;
+    while (next_ < run_.count && run_.t_s[next_] <= until) ++next_;
+    if constexpr (requires { stepper.series(0); }) {
+      if (result_.path.xy != nullptr) {
+        write_path(stepper.series(System::kAxis), stepper.series(System::kAxis + 1),
+                   stepper.t_previous_s(), run_.t_s, first, next_, result_.path);
+        return;
+      }
     }
+    for (int n = first; n < next_; ++n) write(stepper, n, stepper.fraction(run_.t_s[n]));
   }
-  void write(DormandPrince<System>& stepper, int n, double u) {
+  void write(Stepper& stepper, int n, double u) {
     const S kx = stepper.dense(System::kAxis, u), ky = stepper.dense(System::kAxis + 1, u);
-    put(0, n, kx);
-    put(1, n, ky);
-    if (result_.value[2] != nullptr) put(2, n, stepper.dense(System::kAxis + 2, u));
+    store(result_, 0, n, kx);
+    store(result_, 1, n, ky);
+    store(result_, 2, n, stepper.dense(System::kAxis + 2, u));
     if constexpr (kAngles) {
       const S phi = azimuth(kx, ky, azimuth_.follow(value_of(kx), value_of(ky)));
-      put(3, n, phi);
-      put(4, n, spin_angle(stepper, phi, stepper.dense(System::kStates - 1, u)));
+      store(result_, 3, n, phi);
+      store(result_, 4, n, spin_angle(stepper, phi, stepper.dense(System::kStates - 1, u)));
     }
     if (result_.value[kTopAngleColumns] != nullptr) write_momentum(stepper, n, u);
   }
-  void write_momentum(DormandPrince<System>& stepper, int n, double u) {
-    const auto y = stepper.dense_state(u);
-    const auto [state, b] = unpack(stepper.system(), y);
-    for (int i = 0; i < 3; ++i) put(kTopAngleColumns + i, n, state.L[i]);
-    put(kTopAngleColumns + 3, n, b);
+  void write_momentum(Stepper& stepper, int n, double u) {
+    const auto [state, b] = unpack(stepper.system(), stepper.dense_state(u));
+    for (int i = 0; i < 3; ++i) store(result_, kTopAngleColumns + i, n, state.L[i]);
+    store(result_, kTopAngleColumns + 3, n, b);
   }
   struct Unpacked {
     AxisAndMomentum<S> state;
@@ -170,15 +178,11 @@ class Run {
       return {system.unpack(y), system.spin(y)};
     }
   }
-  TROCHOID_INLINE void put(int column, int n, const S& x) {
-    store(result_.value[column], result_.derivative[column], n, x);
-  }
-  [[nodiscard]] S spin_angle(const DormandPrince<System>& stepper, const S& phi,
-                             const S& combined) const {
+  [[nodiscard]] S spin_angle(const Stepper& stepper, const S& phi, const S& combined) const {
     return stepper.system().side > 0.0 ? combined - phi : phi - combined;
   }
   /// Below -0.5 use phi - psi, above +0.5 phi + psi: each is regular there (9).
-  void change_side(DormandPrince<System>& stepper) {
+  void change_side(Stepper& stepper) {
     const double kz = value_of(stepper.y()[System::kAxis + 2]);
     const double side = stepper.system().side;
     if (side * kz > -0.5) return;
@@ -190,7 +194,7 @@ class Run {
     stepper.start(stepper.t_s(), y);
   }
 
-  void finish(DormandPrince<System>& stepper, StepEnd end) {
+  void finish(Stepper& stepper, StepEnd end) {
     result_.written = next_;
     result_.end_reason = static_cast<int>(end == StepEnd::accepted         ? RunEnd::reached_end
                                           : end == StepEnd::step_limit     ? RunEnd::step_limit
@@ -204,7 +208,7 @@ class Run {
     result_.error_sum = counts.error_sum * run_.tolerance;
     store_end_state(stepper);
   }
-  void store_end_state(DormandPrince<System>& stepper) {
+  void store_end_state(Stepper& stepper) {
     const auto& y = stepper.y();
     const auto [state, b] = unpack(stepper.system(), y);
     const TopAngles<S> angles = angles_of(state);
@@ -227,30 +231,31 @@ class Run {
   int next_ = 0;
 };
 
-template <class S>
+template <template <class> class Method, class S>
 void run_with(const TopRun& run, TopResult& result) {
   if (run.drag) {
     if (run.with_angles) {
-      Run<WithSpinAngle<TopWithDrag<S>>>(run, result)();
+      Run<Method, WithSpinAngle<TopWithDrag<S>>>(run, result)();
     } else {
-      Run<TopWithDrag<S>>(run, result)();
+      Run<Method, TopWithDrag<S>>(run, result)();
     }
   } else {
     if (run.with_angles) {
-      Run<WithSpinAngle<Top<S>>>(run, result)();
+      Run<Method, WithSpinAngle<Top<S>>>(run, result)();
     } else {
-      Run<Top<S>>(run, result)();
+      Run<Method, Top<S>>(run, result)();
     }
   }
 }
 
 }  // namespace top_kernel
 
+/// By Taylor series.
 void run_top(const TopRun& run, TopResult& result) {
   if (run.with_derivatives) {
-    top_kernel::run_with<Dual<kTopLanes>>(run, result);
+    top_kernel::run_with<Taylor, Dual<kTopLanes>>(run, result);
   } else {
-    top_kernel::run_with<double>(run, result);
+    top_kernel::run_with<Taylor, double>(run, result);
   }
 }
 

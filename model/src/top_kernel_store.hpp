@@ -16,13 +16,14 @@ TROCHOID_INLINE S variable(const TopRun& run, TopVariable which) {
   }
 }
 
-TROCHOID_INLINE void store(double* value, double*, int n, double x) {
-  value[n] = x;
+TROCHOID_INLINE void store(TopResult& result, int column, int n, double x) {
+  if (result.value[column] != nullptr) result.value[column][n] = x;
 }
-TROCHOID_INLINE void store(double* value, double* derivative, int n, const Dual<kTopLanes>& x) {
-  value[n] = x.value;
+TROCHOID_INLINE void store(TopResult& result, int column, int n, const Dual<kTopLanes>& x) {
+  store(result, column, n, x.value);
   for (int lane = 0; lane < kTopLanes; ++lane) {
-    derivative[n * kTopLanes + lane] = x.derivative[lane];
+    double* out = result.derivative[column][lane];
+    if (out != nullptr) out[n] = x.derivative[lane];
   }
 }
 TROCHOID_INLINE void store_end(TopResult& result, int i, double x) {

@@ -116,8 +116,8 @@ Decay decay(double gamma, double t) {
 class TopPredictor : public Predictor {
  public:
   using Kernel = void (*)(const TopRun&, TopResult&);
-  TopPredictor(std::string name, Kernel kernel, const TopSettings& top)
-      : name_(std::move(name)), kernel_(kernel), drag_(top.drag) {
+  TopPredictor(std::string name, Kernel kernel, bool writes_path, const TopSettings& top)
+      : name_(std::move(name)), kernel_(kernel), writes_path_(writes_path), drag_(top.drag) {
     for (Entry& entry : entries(top)) {
       kinds_.push_back(entry.parameter);
       infos_.push_back(std::move(entry.info));
@@ -131,12 +131,15 @@ class TopPredictor : public Predictor {
  private:
   struct Work;
   [[nodiscard]] double get(const Eigen::Ref<const Eigen::VectorXd>& values, Parameter which) const;
+  void point_at_path(Work& work, Prediction& prediction) const;
+  void finish_path(const Work& work, Prediction& prediction) const;
   void fill_observable(const Work& work, int slot, Prediction& prediction) const;
   void fill_end(const Work& work, Prediction& prediction) const;
   [[nodiscard]] double derivative(const Work& work, Observable what, Parameter by, int n) const;
 
   std::string name_;
   Kernel kernel_;
+  bool writes_path_;  ///< the kernel knows TopPath
   bool drag_;
   std::vector<Parameter> kinds_;
   std::vector<ParameterInfo> infos_;
@@ -152,7 +155,7 @@ struct TopPredictor::Work {
 
   [[nodiscard]] double value(int column, int n) const { return result.value[column][n]; }
   [[nodiscard]] double lane(int column, int n, int i) const {
-    return result.derivative[column][static_cast<std::ptrdiff_t>(n) * kTopLanes + i];
+    return result.derivative[column][i][n];
   }
   void prepare() {
     const std::size_t count = request.t_s.size();
@@ -161,7 +164,8 @@ struct TopPredictor::Work {
     if (run.with_derivatives) derivatives.resize(count * columns * kTopLanes);
     for (int c = 0; c < columns; ++c) {
       result.value[c] = values.data() + c * count;
-      if (run.with_derivatives) result.derivative[c] = derivatives.data() + c * count * kTopLanes;
+      for (int i = 0; i < kTopLanes && run.with_derivatives; ++i)
+        result.derivative[c][i] = derivatives.data() + (c * kTopLanes + i) * count;
     }
   }
 };
@@ -171,6 +175,10 @@ double TopPredictor::get(const Eigen::Ref<const Eigen::VectorXd>& values, Parame
     if (kinds_[i] == which) return values[static_cast<Eigen::Index>(i)];
   }
   return 0.0;
+}
+
+bool wants_path(const PredictRequest& request) {
+  return request.observables == std::vector<Observable>{Observable::x_m, Observable::y_m};
 }
 
 bool wants_angles(const PredictRequest& request) {
@@ -206,21 +214,57 @@ Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   run.count = static_cast<int>(request.t_s.size());
   run.end_s = request.t_s.empty() ? request.start_s : request.t_s.back();
   run.tolerance = request.tolerance;
-  work.prepare();
-  kernel_(run, work.result);
-
   Prediction prediction;
   const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
   prediction.values.resize(rows);
   prediction.jacobian.resize(rows, static_cast<Eigen::Index>(request.derivatives.size()));
-  for (std::size_t slot = 0; slot < request.observables.size(); ++slot)
-    fill_observable(work, static_cast<int>(slot), prediction);
+  if (writes_path_ && wants_path(request)) {
+    point_at_path(work, prediction);
+    kernel_(run, work.result);
+    finish_path(work, prediction);
+  } else {
+    work.prepare();
+    kernel_(run, work.result);
+    for (std::size_t slot = 0; slot < request.observables.size(); ++slot)
+      fill_observable(work, static_cast<int>(slot), prediction);
+  }
   if (request.want_end_state) fill_end(work, prediction);
   prediction.outcome = outcome_of(static_cast<RunEnd>(work.result.end_reason));
   prediction.valid_until_s = work.result.reached_s;
   prediction.error_estimate = work.l_m * work.result.error_sum;
   prediction.steps = work.result.steps;
   return prediction;
+}
+
+/// Lets the kernel write straight into the prediction.
+void TopPredictor::point_at_path(Work& work, Prediction& prediction) const {
+  TopPath& path = work.result.path;
+  path.l_m = work.l_m;
+  path.pivot_x_m = work.pivot_x_m;
+  path.pivot_y_m = work.pivot_y_m;
+  path.xy = prediction.values.data();
+  for (std::size_t c = 0; c < work.request.derivatives.size(); ++c) {
+    const Parameter by = kinds_[static_cast<std::size_t>(work.request.derivatives[c])];
+    double* column = prediction.jacobian.col(static_cast<Eigen::Index>(c)).data();
+    if (by == kL) path.by_l = column;
+    if (by == kPhi) path.by_phi = column;
+    if (lane_of(by) >= 0) path.by_variable[lane_of(by)] = column;
+  }
+}
+
+/// Columns the kernel does not know, and what was not reached.
+void TopPredictor::finish_path(const Work& work, Prediction& prediction) const {
+  for (std::size_t c = 0; c < work.request.derivatives.size(); ++c) {
+    const Parameter by = kinds_[static_cast<std::size_t>(work.request.derivatives[c])];
+    if (lane_of(by) >= 0 || by == kL || by == kPhi) continue;
+    auto column = prediction.jacobian.col(static_cast<Eigen::Index>(c));
+    for (Eigen::Index n = 0; n < column.size(); ++n)
+      column[n] = by == (n % 2 == 0 ? kPivotX : kPivotY) ? 1.0 : 0.0;
+  }
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Index missing = prediction.values.size() - 2 * work.result.written;
+  prediction.values.tail(missing).setConstant(kNan);
+  prediction.jacobian.bottomRows(missing).setConstant(kNan);
 }
 
 double TopPredictor::derivative(const Work& work, Observable what, Parameter by, int n) const {
@@ -318,11 +362,11 @@ void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
 }  // namespace
 
 std::unique_ptr<Predictor> make_top(const data::Scene& scene) {
-  return std::make_unique<TopPredictor>("top", run_top_here, top_for_prediction(scene));
+  return std::make_unique<TopPredictor>("top", run_top_here, true, top_for_prediction(scene));
 }
 
 std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene) {
-  return std::make_unique<TopPredictor>("top-euler", run_top_euler,
+  return std::make_unique<TopPredictor>("top-euler", run_top_euler, false,
                                         without_drag(top_for_prediction(scene)));
 }
 

@@ -210,16 +210,17 @@ Trajectory simulate_top(const data::Scene& scene) {
   const TopSettings top = top_for_simulation(scene);
   const Choice choice = choose_integrator(scene.run.integrator);
   return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
-    return choice.method == Method::dop853 ? run_kernel(run_top_here, top, t_s, tolerance)
-                                           : run_sundials(top, t_s, tolerance, choice.method);
+    if (choice.method == Method::taylor) return run_kernel(run_top_here, top, t_s, tolerance);
+    if (choice.method == Method::dop853) return run_kernel(run_top_dop853, top, t_s, tolerance);
+    return run_sundials(top, t_s, tolerance, choice.method);
   });
 }
 
 Trajectory simulate_top_euler(const data::Scene& scene) {
   const TopSettings top = without_drag(top_for_simulation(scene));
-  const Choice choice = choose_integrator(scene.run.integrator);
-  if (choice.method != Method::dop853)
+  if (scene.run.integrator != "auto" && scene.run.integrator != "dop853")
     throw InputError("model \"top-euler\" runs with integrator = \"auto\" or \"dop853\"");
+  const Choice choice{Method::dop853, "dop853", "the only one for the thesis' form"};
   return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
     return run_kernel(run_top_euler, top, t_s, tolerance);
   });

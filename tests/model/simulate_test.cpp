@@ -79,7 +79,7 @@ TEST_P(EveryIntegrator, GivesTheSameRun) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(Simulate, EveryIntegrator,
-                         testing::Values("dop853", "cvode-adams", "cvode-bdf", "arkode"));
+                         testing::Values("taylor", "dop853", "cvode-adams", "cvode-bdf", "arkode"));
 
 // The estimate is what people will believe: it must not promise more than the run keeps.
 TEST(Simulate, ErrorEstimateCoversTheTrueError) {

@@ -140,6 +140,7 @@ class DormandPrince {
   /// Makes the last step's polynomials of the components in the bit mask; three more evaluations
   /// the first time. Before any step the polynomials are the constant start.
   void prepare_dense(unsigned components = kAll) {
+    components &= kAll;
     if ((dense_ready_ & components) == components) return;
     if (step_ <= 0.0) {
       for (int c = 0; c < kN; ++c) {

@@ -191,10 +191,9 @@ struct NoEventReport {
 /// @param rules       one per event of the system, nullptr: all terminal in both directions.
 /// @param fired       the event this arc starts on, -1: none.
 /// @param report      report(event, t_s) at each event that does not stop the run.
-template <class System, class Sink, class Report = NoEventReport>
-RunResult<System> integrate(DormandPrince<System>& stepper, double t_end_s, const double* t_s,
-                            int count, Sink&& sink,
-                            unsigned components = DormandPrince<System>::kAll,
+template <template <class> class Stepper, class System, class Sink, class Report = NoEventReport>
+RunResult<System> integrate(Stepper<System>& stepper, double t_end_s, const double* t_s, int count,
+                            Sink&& sink, unsigned components = ~0u,
                             const EventRule* rules = nullptr, int fired = -1,
                             Report&& report = {}) {
   RunResult<System> result;

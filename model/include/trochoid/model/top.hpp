@@ -1,6 +1,7 @@
 #pragma once
 #include "trochoid/model/dormand_prince.hpp"
 #include "trochoid/model/dual.hpp"
+#include "trochoid/model/taylor.hpp"
 
 /// The heavy symmetric top (rung M2, the thesis' "inclined disc"): equation numbers of
 /// model/theory/top.md. The singularity-free form has the symmetry axis k and the angular momentum
@@ -68,6 +69,17 @@ struct Top {
     dy[3] = lz_1_s * y[2] - y[0] * y[4];
     dy[4] = y[0] * y[3] - y[1] * y[2];
   }
+  void series(const Series<T>* y, int n, State<T, 5>& dy) const {
+    dy[0] = -a_1_s2 * y[3][n];
+    dy[1] = a_1_s2 * y[2][n];
+    dy[2] = product(y[1], y[4], n) - lz_1_s * y[3][n];
+    dy[3] = lz_1_s * y[2][n] - product(y[0], y[4], n);
+    dy[4] = product(y[0], y[3], n) - product(y[1], y[2], n);
+  }
+  /// Coefficient n of turning().
+  [[nodiscard]] T turning_series(const Series<T>* y, int n) const {
+    return n == 0 ? lz_1_s - b_1_s * y[4][0] : -b_1_s * y[4][n];
+  }
   [[nodiscard]] static Top at(const T& a, const T& b, const T&, const T&,
                               const AxisAndMomentum<T>& start, State<T, 5>& y) {
     y = {{start.L[0], start.L[1], start.k[0], start.k[1], start.k[2]}};
@@ -99,6 +111,19 @@ struct TopWithDrag {
     dy[5] = y[0] * y[4] - y[1] * y[3];
     dy[6] = -gamma3_1_s * y[6];
   }
+  void series(const Series<T>* y, int n, State<T, 7>& dy) const {
+    const T relative = gamma1_1_s - gamma3_1_s;
+    dy[0] = relative * product(y[6], y[3], n) - a_1_s2 * y[4][n] - gamma1_1_s * y[0][n];
+    dy[1] = relative * product(y[6], y[4], n) + a_1_s2 * y[3][n] - gamma1_1_s * y[1][n];
+    dy[2] = relative * product(y[6], y[5], n) - gamma1_1_s * y[2][n];
+    dy[3] = product(y[1], y[5], n) - product(y[2], y[4], n);
+    dy[4] = product(y[2], y[3], n) - product(y[0], y[5], n);
+    dy[5] = product(y[0], y[4], n) - product(y[1], y[3], n);
+    dy[6] = -gamma3_1_s * y[6][n];
+  }
+  [[nodiscard]] T turning_series(const Series<T>* y, int n) const {
+    return y[2][n] - product(y[6], y[5], n);
+  }
   [[nodiscard]] static TopWithDrag at(const T& a, const T& b, const T& gamma1, const T& gamma3,
                                       const AxisAndMomentum<T>& start, State<T, 7>& y) {
     y = {{start.L[0], start.L[1], start.L[2], start.k[0], start.k[1], start.k[2], b}};
@@ -128,6 +153,18 @@ struct WithSpinAngle : Base {
     Base::derivative(t_s, y_base, dy_base);
     for (int i = 0; i < Base::kStates; ++i) dy[i] = dy_base[i];
     dy[Base::kStates] = Base::turning(y_base) / (1.0 + side * y_base[Base::kAxis + 2]);
+  }
+  /// The quotient q of (9) obeys (1 + side kz) q = turning; its coefficients are those of the
+  /// angle, q_j = (j + 1) angle_(j+1).
+  void series(const Series<T>* y, int n, State<T, kStates>& dy) const {
+    State<T, Base::kStates> dy_base;
+    Base::series(y, n, dy_base);
+    for (int i = 0; i < Base::kStates; ++i) dy[i] = dy_base[i];
+    T rest = Base::turning_series(y, n);
+    for (int j = 0; j < n; ++j) {
+      rest -= y[Base::kAxis + 2][n - j] * y[Base::kStates][j + 1] * (side * (j + 1));
+    }
+    dy[Base::kStates] = rest / (1.0 + side * y[Base::kAxis + 2][0]);
   }
   [[nodiscard]] static State<T, Base::kStates> base(const State<T, kStates>& y) {
     State<T, Base::kStates> y_base;
