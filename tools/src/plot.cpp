@@ -16,7 +16,7 @@ namespace {
 // Okabe and Ito's palette without yellow, which is faint on white.
 constexpr std::array<const char*, 7> kColours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                               "#E69F00", "#56B4E9", "#000000"};
-constexpr int kWidth_px = 900, kPanelHeight_px = 420;
+constexpr int kWidth_px = 900, kPanelHeight_px = 420, kSquareHeight_px = 760;
 
 std::string quoted(const std::string& text) {
   std::string result = "\"";
@@ -27,8 +27,9 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
-std::string terminal(const std::filesystem::path& path, std::size_t panels) {
-  const auto height = kPanelHeight_px * static_cast<int>(panels);
+std::string terminal(const std::filesystem::path& path, const std::vector<Axes>& panels) {
+  int height = 0;
+  for (const Axes& axes : panels) height += axes.equal ? kSquareHeight_px : kPanelHeight_px;
   if (path.extension() == ".svg")
     return fmt::format("svg size {},{} dynamic background rgb 'white' font 'sans-serif,14'",
                        kWidth_px, height);
@@ -45,7 +46,9 @@ void add_settings(const Axes& axes, std::back_insert_iterator<std::string> out) 
                  axes.log_y ? "" : "un");
   fmt::format_to(out, "set format x '{0}'\nset format y '{1}'\n", axes.log_x ? "10^{%T}" : "%g",
                  axes.log_y ? "10^{%T}" : "%g");
-  fmt::format_to(out, "set size {}\n", axes.equal ? "ratio -1" : "noratio");
+  // One legend entry says nothing that the title does not.
+  fmt::format_to(out, "set size {}\nset key {}\n", axes.equal ? "ratio -1" : "noratio",
+                 axes.series.size() > 1 ? "on" : "off");
 }
 
 void add_data(const Axes& axes, std::size_t panel, std::back_insert_iterator<std::string> out) {
@@ -82,9 +85,9 @@ std::string script(const std::vector<Axes>& panels, const std::filesystem::path&
   std::string text;
   const auto out = std::back_inserter(text);
   fmt::format_to(out, "set encoding utf8\nset terminal {}\nset output {}\n",
-                 terminal(target, panels.size()), quoted(output.string()));
+                 terminal(target, panels), quoted(output.string()));
   fmt::format_to(out,
-                 "set grid lc rgb '#dddddd'\nset key outside right top\nset border 3\n"
+                 "set grid lc rgb '#cccccc'\nset key outside right top\nset border 3\n"
                  "set xtics nomirror\nset ytics nomirror\n");
   for (std::size_t p = 0; p < panels.size(); ++p) add_data(panels[p], p, out);
   if (panels.size() > 1) fmt::format_to(out, "set multiplot layout {},1\n", panels.size());
