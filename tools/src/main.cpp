@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/fitting/fit.hpp"
 
 namespace {
 
@@ -25,6 +26,7 @@ int run(int argc, char** argv) {
   app.add_flag_callback(
       "-v,--verbose", [] { trochoid::tools::set_talk(trochoid::tools::Talk::verbose); },
       "Say on stderr what is being done and why");
+  trochoid::fitting::silence_solver_log();
   using namespace trochoid::tools;
   add_simulate_command(app);
   add_fit_command(app);

@@ -1,25 +1,33 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 
 #include "trochoid/data/fit.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/data/track.hpp"
+#include "trochoid/model/predictor.hpp"
 
 namespace trochoid::fitting {
 
 struct FitOptions {
-  std::string model;          ///< overrides the scene's; "auto" compares the rungs
+  std::string model;  ///< overrides the scene's; "auto" compares the rungs
   bool free_pivot = false;
-  std::string from, to;       ///< seconds or "f" frames
-  double hold_back = 0.0;     ///< fraction at the end predicted, not fitted (model comparison uses 1/3)
-  bool profile = false;       ///< profile likelihood of the dynamics parameters
-  int bootstrap = 0;          ///< block bootstrap draws, 0 = off
+  std::string from, to;  ///< seconds or "f" frames
+  double hold_back =
+      0.0;               ///< fraction at the end predicted, not fitted (model comparison uses 1/3)
+  bool profile = false;  ///< profile likelihood of the dynamics parameters
+  int bootstrap = 0;     ///< block bootstrap draws, 0 = off
   std::uint64_t seed = 1;
-  int threads = 0;            ///< 0 = all cores; the result does not depend on it
-  double tolerance = 0.0;     ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
+  int threads = 0;         ///< 0 = all cores; the result does not depend on it
+  double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
+  /// auto: data-driven starts, then the given one, then multiple shooting. For comparisons, from
+  /// the given start alone: single (single shooting), growing (windows), multiple (multiple
+  /// shooting).
+  std::string strategy = "auto";
+  std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   std::function<void(const std::string& stage, double fraction)> progress;
 };
 
@@ -28,5 +36,13 @@ struct FitOptions {
 /// @throws InputError if the scene lacks what the model needs or a track is unusable.
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
                             const FitOptions& options = {});
+
+/// The same for a predictor of one's own. The scene contributes [fit], [body] and the pivot only.
+[[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
+                            const data::Scene& scene, const FitOptions& options = {});
+
+/// The minimiser's library logs rejected steps to stderr; a program that does not want that calls
+/// this once before the first fit.
+void silence_solver_log();
 
 }  // namespace trochoid::fitting

@@ -1,0 +1,50 @@
+#include "arcs.hpp"
+
+#include <fmt/core.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+struct Bound {
+  double value = 0.0;
+  bool frame = false;
+};
+
+Bound parse_bound(const std::string& text, const char* option) {
+  Bound bound{0.0, text.starts_with("f")};
+  const char* first = text.data() + (bound.frame ? 1 : 0);
+  const char* last = text.data() + text.size();
+  const auto [end, code] = std::from_chars(first, last, bound.value);
+  if (code != std::errc{} || end != last || !std::isfinite(bound.value))
+    throw InputError(fmt::format("--{} {}: give seconds (1.5) or a frame (f120)", option, text));
+  return bound;
+}
+
+double coordinate(const data::TrackSample& sample, const Bound& bound) {
+  return bound.frame ? static_cast<double>(sample.frame) : sample.t_s;
+}
+
+}  // namespace
+
+SampleRange chosen_range(const data::Track& track, const std::string& from, const std::string& to) {
+  int first = 0, last = static_cast<int>(track.samples.size());
+  if (!from.empty()) {
+    const Bound bound = parse_bound(from, "from");
+    while (first < last && coordinate(track.samples[first], bound) < bound.value) ++first;
+  }
+  if (!to.empty()) {
+    const Bound bound = parse_bound(to, "to");
+    while (last > first && coordinate(track.samples[last - 1], bound) > bound.value) --last;
+  }
+  if (first >= last)
+    throw InputError(
+        fmt::format("no sample of object {} lies between '{}' and '{}'", track.object, from, to));
+  return {first, last};
+}
+
+}  // namespace trochoid::fitting

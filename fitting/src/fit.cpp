@@ -1,0 +1,349 @@
+#include "trochoid/fitting/fit.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "arcs.hpp"
+#include "derived.hpp"
+#include "problem.hpp"
+#include "smoothing.hpp"
+#include "statistics.hpp"
+#include "strategy.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+ChannelChoice channels_of(const std::string& model) {
+  if (model == "pivot") return {.position = false, .psi = true};
+  if (model == "puck") return {.position = true, .psi = true};
+  return {.position = true, .theta = true, .phi = true, .psi = true};
+}
+
+std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
+                             const data::Scene& scene, const FitOptions& options) {
+  const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
+                      scene.body->faces_look_alike() && model != "top";
+  std::vector<ArcData> arcs;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    data::check(tracks[i], fmt::format("track {}", i + 1));
+    const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
+    ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
+    arc.track = static_cast<int>(i);
+    if (arc.readings.empty())
+      throw InputError(fmt::format(
+          "track {}: no sample has positions in metres; track with a scale or a camera file",
+          i + 1));
+    arcs.push_back(std::move(arc));
+  }
+  return arcs;
+}
+
+// 0.02 sigma of a typical sample over the size of the path, within what the integrators do well.
+double tolerance_for(const std::vector<ArcData>& arcs, double share) {
+  double least = 1e-5;
+  for (const ArcData& arc : arcs) {
+    if (arc.observable_index(model::Observable::x_m) < 0) continue;
+    const Eigen::MatrixX2d xy = arc.positions_m();
+    const double extent = (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    std::vector<double> weights;
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == Channel::position) weights.push_back(reading.whitener.norm());
+    const double sigma = 1.0 / std::max(median(std::move(weights)), 1e-300);
+    if (extent > 0.0) least = std::min(least, share * sigma / extent);
+  }
+  return std::clamp(least, 1e-11, 1e-5);
+}
+
+Starter starter_for(const model::Predictor& predictor, bool free_pivot) {
+  const int px = predictor.index_of("pivot_x_m"), py = predictor.index_of("pivot_y_m");
+  if (predictor.model_name().starts_with("top")) {
+    const Eigen::Vector2d known(px >= 0 ? predictor.parameters()[px].value : 0.0,
+                                py >= 0 ? predictor.parameters()[py].value : 0.0);
+    return [=](const ArcData& window) {
+      if (!free_pivot) return top_starts(window, known);
+      std::vector<Start> all;
+      for (const Eigen::Vector2d& pivot : pivot_guesses(window))
+        for (Start& start : top_starts(window, pivot)) all.push_back(std::move(start));
+      return all;
+    };
+  }
+  return [](const ArcData&) { return std::vector<Start>{}; };
+}
+
+// Turns parameters on that only some measurements show, and off those nothing shows.
+void suit_to_data(Problem& problem, const data::Scene& scene) {
+  const auto is_free = [&](int index, int arc) {
+    return std::any_of(problem.free.begin(), problem.free.end(), [&](const FreeParameter& p) {
+      return p.index == index && (p.arc == arc || p.arc < 0);
+    });
+  };
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    if (problem.arcs[arc].observable_index(model::Observable::psi_rad) < 0) continue;
+    for (const char* name : {"psi_rad", "omega_s_rad_s"}) {
+      const int index = problem.predictor->index_of(name);
+      if (index >= 0 && !is_free(index, arc) && !scene.fit.fixed.contains(name))
+        problem.free.push_back({index, arc, {}, std::nullopt});
+    }
+  }
+  std::stable_sort(problem.free.begin(), problem.free.end(),
+                   [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
+}
+
+Problem single_arc(const Problem& problem, int arc) {
+  Problem part = problem;
+  part.arcs = {problem.arcs[arc]};
+  part.base = {problem.base[arc]};
+  part.row_weights = {Eigen::VectorXd()};
+  part.free.clear();
+  for (FreeParameter parameter : problem.free)
+    if (parameter.arc < 0 || parameter.arc == arc) {
+      parameter.arc = std::min(parameter.arc, 0);
+      part.free.push_back(parameter);
+    }
+  return part;
+}
+
+Found find_arc(const Problem& problem, const Starter& starter, const FitOptions& options,
+               bool start_given) {
+  const Start given{"given", options.start};
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  if (options.strategy == "single") return grow(problem, given, all);
+  if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
+  if (options.strategy != "auto")
+    throw InputError(
+        fmt::format("strategy '{}' is unknown; it is auto, single or growing", options.strategy));
+  Found best = search(problem, starter);
+  if (best.passed || !start_given) return best;
+  Found from_given = grow(problem, given, std::max(24, all / 8));
+  return from_given.solution.usable &&
+                 (!best.solution.usable || from_given.reduced_chi2 < best.reduced_chi2)
+             ? from_given
+             : best;
+}
+
+// Every arc alone, then all together from each arc's idea of the shared parameters.
+Found find(Problem& problem, const Starter& starter, const FitOptions& options, bool start_given) {
+  if (problem.arcs.size() == 1) return find_arc(problem, starter, options, start_given);
+  std::vector<Problem> alone;
+  Found best;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    alone.push_back(single_arc(problem, arc));
+    const Found found = find_arc(alone.back(), starter, options, start_given);
+    if (!found.solution.usable) return found;
+    alone.back().set_base(found.solution.u);
+    problem.base[arc] = alone.back().base[0];
+    if (best.path == "none" || best.path == found.path)
+      best.path = found.path;
+    else
+      best.path = "mixed";
+  }
+  const std::string path = best.path;
+  for (const Problem& leader : alone) {
+    Problem trial = problem;
+    for (const FreeParameter& parameter : problem.free)
+      if (parameter.arc < 0)
+        for (Eigen::VectorXd& base : trial.base)
+          base[parameter.index] = leader.base[0][parameter.index];
+    const Solution solution = solve(trial, trial.start());
+    if (!solution.usable || (best.solution.usable && solution.chi2 >= best.solution.chi2)) continue;
+    best.solution = solution;
+    problem.base = trial.base;
+  }
+  best.path = path;
+  return best;
+}
+
+// Robust weights and noise until they settle; the tolerance tightened until integration is silent.
+Solution polish(Problem& problem, Solution solution, double fixed_tolerance) {
+  for (int round = 0; round < 6; ++round) {
+    const double change = reweight(problem, solution.u, true);
+    if (round > 0 && change < 1e-3) break;
+    if (round == 0 && change < 1e-3 && fixed_tolerance <= 0.0) break;
+    const Solution next = solve(problem, solution.u);
+    if (!next.usable) break;
+    solution = next;
+  }
+  return solution;
+}
+
+std::string outcome_word(const data::Fit& fit) {
+  return fit.converged ? "converged" : "no_convergence";
+}
+
+void report_parameters(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  const auto& infos = problem.predictor->parameters();
+  fit.covariance = error.covariance;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    fit.covariance_names.push_back(problem.name(i));
+    const FreeParameter& free = problem.free[i];
+    const int arc = std::max(0, free.arc);
+    data::FitParameter parameter;
+    parameter.name = problem.name(i);
+    parameter.value = problem.base[arc][free.index];
+    parameter.sigma = std::sqrt(error.covariance(i, i));
+    parameter.unit = infos[free.index].unit;
+    parameter.identifiable = error.identifiable[i];
+    parameter.note = infos[free.index].meaning;
+    if (free.prior && parameter.sigma > 0.9 * free.prior->sigma)
+      parameter.status = data::ParameterStatus::prior;
+    if (!std::isfinite(parameter.sigma)) parameter.identifiable = false;
+    fit.parameters.push_back(parameter);
+  }
+  for (int index = 0; index < static_cast<int>(infos.size()); ++index) {
+    const bool is_free = std::any_of(problem.free.begin(), problem.free.end(),
+                                     [&](const FreeParameter& p) { return p.index == index; });
+    // An unseen spin angle is not a fixed value, it is simply absent.
+    if (is_free || (infos[index].role == model::ParameterInfo::Role::initial)) continue;
+    fit.parameters.push_back({infos[index].name, problem.base[0][index], 0.0, infos[index].unit,
+                              data::ParameterStatus::fixed, true, infos[index].meaning});
+  }
+}
+
+void report_arcs(const Problem& problem, data::Fit& fit) {
+  for (const ArcData& arc : problem.arcs)
+    fit.arcs.push_back(
+        {arc.track, arc.object, arc.t_s.front(), arc.t_s.back(), static_cast<int>(arc.t_s.size())});
+  fit.time_origin_s = problem.arcs.front().start_s;
+}
+
+void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  for (const data::NullVector& vector : fit.null_vectors) fit.warnings.push_back(vector.words);
+  for (const ArcData& arc : problem.arcs)
+    if (arc.sigma_unknown) {
+      fit.warnings.push_back("the track has no covariances: sigma is estimated from the residuals");
+      break;
+    }
+  if (error.whiteness.inflation > 1.0)
+    fit.warnings.push_back(
+        fmt::format("residuals hang together over {:.3g} s: error bars widened by {:.2f}",
+                    error.whiteness.correlation_time_s, std::sqrt(error.whiteness.inflation)));
+}
+
+// Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes.
+void warn_short_top(const Problem& problem, data::Fit& fit) {
+  const auto* b = fit.find("b_1_s");
+  const auto* rate = fit.find("dphi_rad_s");
+  const auto* theta = fit.find("theta_rad");
+  if (b == nullptr || rate == nullptr || theta == nullptr) return;
+  const double frequency = std::abs(b->value - 2.0 * rate->value * std::cos(theta->value));
+  const double periods = problem.arcs[0].duration_s() * frequency / (2.0 * 3.14159265358979323846);
+  if (periods >= 1.0) return;
+  fit.warnings.push_back(fmt::format(
+      "the track is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
+      periods));
+}
+
+// A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
+// samples scatter far less about a smooth curve.
+bool explains_path(const Problem& problem, const Solution& solution) {
+  double residual = 0.0, motion = 0.0, scatter = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    if (data.observable_index(model::Observable::x_m) < 0) continue;
+    Problem plain = problem;
+    plain.noise_scale.fill(1.0);
+    Eigen::VectorXd r;
+    if (!evaluate(plain, arc, solution.u, r, nullptr)) return false;
+    const Eigen::MatrixX2d xy = data.positions_m();
+    const Eigen::RowVector2d mean = xy.colwise().mean();
+    const double noise_m = noise_about_smooth_curve(data.t_s, xy);
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != Channel::position) continue;
+      const Eigen::Matrix2d wt = reading.whitener.transpose();
+      residual += r.segment<2>(reading.row).squaredNorm();
+      motion += (wt * (reading.value - mean.transpose())).squaredNorm();
+      scatter += wt.squaredNorm() * noise_m * noise_m;
+    }
+  }
+  return residual <= 0.03 * motion || residual <= 4.0 * scatter;
+}
+
+}  // namespace
+
+data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
+              const data::Scene& given_scene, const FitOptions& options) {
+  if (tracks.empty()) throw InputError("no track to fit");
+  data::Scene scene = given_scene;
+  scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
+  const std::string model = predictor.model_name();
+  Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
+  suit_to_data(problem, scene);
+  const int needed = static_cast<int>(problem.free.size());
+  if (problem.rows() <= needed)
+    throw InputError(fmt::format("{} measurements cannot determine {} parameters of model '{}'",
+                                 problem.rows(), needed, model));
+  for (const auto& [name, value] : options.start)
+    if (const int index = predictor.index_of(name); index >= 0)
+      for (Eigen::VectorXd& base : problem.base) base[index] = value;
+  problem.tolerance =
+      options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
+
+  const Starter starter = starter_for(predictor, scene.fit.free_pivot);
+  data::Fit result;
+  result.model = model;
+  result.seed = options.seed;
+  const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
+  const Found found = find(problem, starter, options, start_given);
+  Solution solution = found.solution;
+  result.start_path = found.path;
+  if (!solution.usable) {
+    result.outcome = "no_convergence";
+    result.reason = "no start led to a prediction of the whole track";
+    report_arcs(problem, result);
+    return result;
+  }
+  solution = polish(problem, solution, options.tolerance);
+  result.integration_error_sigma = integration_error_sigma(problem, solution.u);
+  while (options.tolerance <= 0.0 && result.integration_error_sigma > 0.01 &&
+         problem.tolerance > 1e-12) {
+    problem.tolerance *= 1e-2;
+    const Solution finer = solve(problem, solution.u);
+    if (!finer.usable) break;
+    solution = finer;
+    result.integration_error_sigma = integration_error_sigma(problem, solution.u);
+  }
+  problem.set_base(solution.u);
+  solution.u = problem.start();
+
+  const Uncertainty error = uncertainty(problem, solution.u);
+  const Criteria score = criteria(problem, solution.u, error.whiteness.inflation);
+  result.chi2 = score.chi2;
+  result.dof = score.rows - needed;
+  result.aicc = score.aicc;
+  result.bic = score.bic;
+  result.noise_scale =
+      problem.noise_scale[problem.arcs[0].observables[0] == model::Observable::x_m ? 0 : 3];
+  result.whiteness_p = error.whiteness.p_value;
+  result.correlation_time_s = error.whiteness.correlation_time_s;
+  result.rank = error.rank;
+  result.condition = error.condition;
+  result.null_vectors = error.null_vectors;
+  report_parameters(problem, error, result);
+  report_arcs(problem, result);
+  warn(problem, error, result);
+  if (model.starts_with("top")) {
+    add_derived_top(problem, solution.u, error.covariance, scene, result);
+    warn_short_top(problem, result);
+  }
+  result.converged = solution.converged && explains_path(problem, solution);
+  result.outcome = outcome_word(result);
+  result.reason = result.converged
+                      ? fmt::format("{} iterations from {}", solution.iterations, result.start_path)
+                  : solution.converged ? "the best path found leaves most of the motion unexplained"
+                                       : solution.message;
+  return result;
+}
+
+data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scene,
+              const FitOptions& options) {
+  data::Scene scene = given_scene;
+  if (!options.model.empty()) scene.model.name = options.model;
+  const auto predictor = model::make_predictor(scene);
+  return fit(tracks, *predictor, scene, options);
+}
+
+}  // namespace trochoid::fitting

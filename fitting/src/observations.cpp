@@ -1,0 +1,172 @@
+#include "observations.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+
+#include "smoothing.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+using model::Observable;
+
+double wrapped(double angle_rad) {
+  return std::remainder(angle_rad, 2.0 * std::numbers::pi);
+}
+
+Observable observable_of(Channel channel) {
+  switch (channel) {
+    case Channel::theta:
+      return Observable::theta_rad;
+    case Channel::phi:
+      return Observable::phi_rad;
+    case Channel::psi:
+      return Observable::psi_rad;
+    default:
+      return Observable::x_m;
+  }
+}
+
+void add_angle(ArcData& arc, int sample, Channel channel,
+               const std::optional<data::MeasuredAngle>& angle) {
+  if (!angle || !(angle->sigma_rad > 0.0)) return;
+  Reading reading{.sample = sample, .channel = channel};
+  reading.value = {angle->value_rad, 0.0};
+  reading.whitener(0, 0) = 1.0 / angle->sigma_rad;
+  arc.readings.push_back(reading);
+}
+
+void number_rows(ArcData& arc) {
+  arc.rows = 0;
+  for (Reading& reading : arc.readings) {
+    reading.row = arc.rows;
+    arc.rows += reading.channel == Channel::position ? 2 : 1;
+  }
+}
+
+// W with W W^T = inverse covariance: the inverse of the transposed Cholesky factor.
+Eigen::Matrix2d whitener_of(const Eigen::Matrix2d& covariance) {
+  const Eigen::LLT<Eigen::Matrix2d> cholesky(covariance);
+  if (cholesky.info() != Eigen::Success)
+    throw InputError("a sample's covariance is not positive definite; give sxx_m2, syy_m2 > 0");
+  const Eigen::Matrix2d lower = cholesky.matrixL();
+  return lower.inverse().transpose();
+}
+
+void guess_position_noise(ArcData& arc) {
+  const double sigma_m = noise_about_smooth_curve(arc.t_s, arc.positions_m());
+  for (Reading& reading : arc.readings)
+    if (reading.channel == Channel::position)
+      reading.whitener = Eigen::Matrix2d::Identity() / sigma_m;
+  arc.sigma_unknown = true;
+}
+
+}  // namespace
+
+int ArcData::observable_index(Observable observable) const {
+  for (std::size_t i = 0; i < observables.size(); ++i)
+    if (observables[i] == observable) return static_cast<int>(i);
+  return -1;
+}
+
+Eigen::MatrixX2d ArcData::positions_m() const {
+  Eigen::MatrixX2d positions(t_s.size(), 2);
+  for (const Reading& reading : readings)
+    if (reading.channel == Channel::position)
+      positions.row(reading.sample) = reading.value.transpose();
+  return positions;
+}
+
+ArcData ArcData::slice(int first, int last, int step) const {
+  ArcData part = *this;
+  part.t_s.clear();
+  part.readings.clear();
+  std::vector<int> renumbered(t_s.size(), -1);
+  for (int i = first; i < last; i += step) {
+    renumbered[i] = static_cast<int>(part.t_s.size());
+    part.t_s.push_back(t_s[i]);
+  }
+  for (Reading reading : readings) {
+    reading.sample = renumbered[reading.sample];
+    if (reading.sample >= 0) part.readings.push_back(reading);
+  }
+  number_rows(part);
+  return part;
+}
+
+ArcData make_arc(const data::Track& track, int first, int last, const ChannelChoice& choice,
+                 bool folded) {
+  ArcData arc;
+  arc.object = track.object;
+  arc.folded = folded;
+  if (choice.position) arc.observables = {Observable::x_m, Observable::y_m};
+  bool any_covariance_missing = false;
+  for (int i = first; i < last; ++i) {
+    const data::TrackSample& sample = track.samples[i];
+    if (choice.position && !sample.has_metres()) continue;
+    const int index = static_cast<int>(arc.t_s.size());
+    if (choice.position) {
+      Reading reading{.sample = index, .channel = Channel::position, .value = sample.centre_m};
+      if (sample.has_covariance())
+        reading.whitener = whitener_of(sample.covariance_m2);
+      else
+        any_covariance_missing = true;
+      arc.readings.push_back(reading);
+    }
+    if (choice.theta) add_angle(arc, index, Channel::theta, sample.theta);
+    if (choice.phi) add_angle(arc, index, Channel::phi, sample.phi);
+    if (choice.psi) add_angle(arc, index, Channel::psi, sample.psi);
+    arc.t_s.push_back(sample.t_s);
+  }
+  for (const Channel channel : {Channel::theta, Channel::phi, Channel::psi}) {
+    bool present = false;
+    for (const Reading& reading : arc.readings) present |= reading.channel == channel;
+    if (present) arc.observables.push_back(observable_of(channel));
+  }
+  number_rows(arc);
+  if (!arc.t_s.empty()) arc.start_s = arc.t_s.front();
+  if (any_covariance_missing && arc.t_s.size() >= 3) guess_position_noise(arc);
+  return arc;
+}
+
+void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,
+            Eigen::VectorXd& out, Eigen::MatrixXd* out_jacobian) {
+  const int width = static_cast<int>(arc.observables.size());
+  std::array<int, kChannels> column{};
+  for (int c = 0; c < kChannels; ++c)
+    column[c] = arc.observable_index(observable_of(static_cast<Channel>(c)));
+  out.resize(arc.rows);
+  if (out_jacobian != nullptr) out_jacobian->resize(arc.rows, jacobian.cols());
+  for (const Reading& reading : arc.readings) {
+    const int source = reading.sample * width + column[static_cast<int>(reading.channel)];
+    if (reading.channel == Channel::position) {
+      const Eigen::Matrix2d wt = reading.whitener.transpose();
+      out.segment<2>(reading.row) = wt * (values.segment<2>(source) - reading.value);
+      if (out_jacobian != nullptr)
+        out_jacobian->middleRows<2>(reading.row).noalias() = wt * jacobian.middleRows<2>(source);
+      continue;
+    }
+    double predicted = values[source];
+    double weight = reading.whitener(0, 0);
+    double sign = 1.0;
+    if (arc.folded && column[static_cast<int>(Channel::theta)] >= 0) {
+      // Equal faces: (theta, phi) and (pi - theta, phi + pi) are the same picture.
+      const double theta =
+          values[reading.sample * width + column[static_cast<int>(Channel::theta)]];
+      const bool other_face = theta > 0.5 * std::numbers::pi;
+      if (other_face && reading.channel == Channel::theta) {
+        predicted = std::numbers::pi - predicted;
+        sign = -1.0;
+      }
+      if (other_face && reading.channel == Channel::phi) predicted += std::numbers::pi;
+    }
+    out[reading.row] = weight * wrapped(predicted - reading.value.x());
+    if (out_jacobian != nullptr)
+      out_jacobian->row(reading.row) = sign * weight * jacobian.row(source);
+  }
+}
+
+}  // namespace trochoid::fitting

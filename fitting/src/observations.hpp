@@ -1,0 +1,61 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "trochoid/data/track.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+/// What was measured; each channel has its own noise scale.
+enum class Channel { position, theta, phi, psi };
+inline constexpr int kChannels = 4;
+
+/// One measurement: two residual rows for a position, one for an angle.
+struct Reading {
+  int sample = 0;
+  Channel channel = Channel::position;
+  Eigen::Vector2d value = Eigen::Vector2d::Zero();  ///< [m], or [rad] in the first entry
+  Eigen::Matrix2d whitener =
+      Eigen::Matrix2d::Identity();  ///< W W^T = inverse covariance; r = W^T d
+  int row = 0;                      ///< first residual row
+};
+
+/// The measurements of one arc, ready for residuals.
+struct ArcData {
+  int track = 0;
+  int object = 0;
+  std::vector<double> t_s;
+  double start_s = 0.0;  ///< the initial state of the arc belongs to this instant
+  std::vector<model::Observable> observables;
+  std::vector<Reading> readings;
+  int rows = 0;
+  bool folded = false;         ///< faces look alike: theta measured as min(theta, pi - theta)
+  bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
+
+  [[nodiscard]] int observable_index(model::Observable observable) const;  ///< -1 if absent
+  [[nodiscard]] double duration_s() const { return t_s.empty() ? 0.0 : t_s.back() - t_s.front(); }
+  /// Positions as n x 2 [m]; every sample must have one.
+  [[nodiscard]] Eigen::MatrixX2d positions_m() const;
+  /// The same arc with the samples first, first + step, ... below last only.
+  [[nodiscard]] ArcData slice(int first, int last, int step = 1) const;
+};
+
+/// Which measurements a model can use.
+struct ChannelChoice {
+  bool position = true, theta = false, phi = false, psi = false;
+};
+
+/// Reads samples [first, last) of a track. Samples without metres are left out when positions are
+/// wanted. Unknown covariances are replaced by a guess from the scatter about a smooth curve.
+[[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
+                               const ChannelChoice& choice, bool folded);
+
+/// Whitened differences prediction - measurement and their derivatives.
+/// @param values as Prediction::values for arc.t_s and arc.observables.
+/// @param jacobian as Prediction::jacobian, or empty; whitened rows are written to `out_jacobian`.
+void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,
+            Eigen::VectorXd& out, Eigen::MatrixXd* out_jacobian);
+
+}  // namespace trochoid::fitting

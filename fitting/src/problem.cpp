@@ -1,0 +1,332 @@
+#include "problem.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "smoothing.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+
+using model::ParameterInfo;
+
+double Transform::value(double u) const {
+  switch (kind) {
+    case Kind::log:
+      return std::exp(u);
+    case Kind::between:
+      return lower + 0.5 * (upper - lower) * (1.0 + std::tanh(u));
+    default:
+      return u;
+  }
+}
+
+double Transform::slope(double u) const {
+  switch (kind) {
+    case Kind::log:
+      return std::exp(u);
+    case Kind::between: {
+      const double t = std::tanh(u);
+      return 0.5 * (upper - lower) * (1.0 - t * t);
+    }
+    default:
+      return 1.0;
+  }
+}
+
+double Transform::inverse(double value) const {
+  switch (kind) {
+    case Kind::log:
+      return std::log(std::max(value, 1e-300));
+    case Kind::between: {
+      const double t = 2.0 * (value - lower) / (upper - lower) - 1.0;
+      return std::atanh(std::clamp(t, -0.999, 0.999));  // a start on the bound could never leave it
+    }
+    default:
+      return value;
+  }
+}
+
+int Problem::shared_count() const {
+  return static_cast<int>(
+      std::count_if(free.begin(), free.end(), [](const FreeParameter& p) { return p.arc < 0; }));
+}
+
+std::string Problem::name(int free_index) const {
+  const FreeParameter& parameter = free[free_index];
+  const std::string& plain = predictor->parameters()[parameter.index].name;
+  return parameter.arc > 0 ? fmt::format("{}@{}", plain, parameter.arc) : plain;
+}
+
+std::vector<int> Problem::columns_of(int arc) const {
+  std::vector<int> columns;
+  for (int i = 0; i < static_cast<int>(free.size()); ++i)
+    if (free[i].arc < 0 || free[i].arc == arc) columns.push_back(i);
+  return columns;
+}
+
+Eigen::VectorXd Problem::start() const {
+  Eigen::VectorXd u(free.size());
+  for (int i = 0; i < static_cast<int>(free.size()); ++i)
+    u[i] = free[i].transform.inverse(base[std::max(0, free[i].arc)][free[i].index]);
+  return u;
+}
+
+Eigen::VectorXd Problem::values(int arc, const Eigen::VectorXd& u) const {
+  Eigen::VectorXd values = base[arc];
+  for (const int i : columns_of(arc)) values[free[i].index] = free[i].transform.value(u[i]);
+  return values;
+}
+
+double Problem::value(int free_index, const Eigen::VectorXd& u) const {
+  return free[free_index].transform.value(u[free_index]);
+}
+
+void Problem::set_base(const Eigen::VectorXd& u) {
+  for (int arc = 0; arc < static_cast<int>(arcs.size()); ++arc) {
+    Eigen::VectorXd sign;
+    base[arc] = values(arc, u);
+    fold_tilt(*predictor, base[arc], sign);
+  }
+}
+
+int Problem::rows() const {
+  int rows = 0;
+  for (const ArcData& arc : arcs) rows += arc.rows;
+  return rows;
+}
+
+namespace {
+
+bool listed(const std::vector<std::string>& names, const std::string& name) {
+  // A group such as "air_linear_N_m_s" covers its components "air_linear_N_m_s[1]".
+  return std::any_of(names.begin(), names.end(), [&](const std::string& entry) {
+    return name == entry || (name.starts_with(entry) && name.substr(entry.size()).starts_with("["));
+  });
+}
+
+void check_names(const model::Predictor& predictor, const data::FitSettings& settings) {
+  const auto known = [&](const std::string& name) {
+    return std::any_of(predictor.parameters().begin(), predictor.parameters().end(),
+                       [&](const ParameterInfo& info) { return listed({name}, info.name); });
+  };
+  const auto complain = [&](const std::string& key, const std::string& name) {
+    std::string all;
+    for (const ParameterInfo& info : predictor.parameters())
+      all += (all.empty() ? "" : ", ") + info.name;
+    throw InputError(fmt::format("[fit] {}: model '{}' has no parameter '{}'; it has {}", key,
+                                 predictor.model_name(), name, all));
+  };
+  for (const std::string& name : settings.free)
+    if (!known(name)) complain("free", name);
+  for (const auto& [name, value] : settings.fixed)
+    if (!known(name)) complain("fixed", name);
+  for (const auto& [name, bounds] : settings.bounds)
+    if (!known(name)) complain("bounds", name);
+}
+
+Transform transform_of(const ParameterInfo& info, const data::FitSettings& settings) {
+  const auto bounds = settings.bounds.find(info.name);
+  if (bounds != settings.bounds.end())
+    return {Transform::Kind::between, bounds->second.first, bounds->second.second};
+  return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
+}
+
+bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
+  if (settings.fixed.contains(info.name)) return false;
+  if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
+    return settings.free_pivot || listed(settings.free, info.name);
+  if (settings.free.empty() || info.role == ParameterInfo::Role::initial)
+    return info.worth_fitting || listed(settings.free, info.name);
+  return listed(settings.free, info.name);
+}
+
+}  // namespace
+
+Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
+                     const data::Scene& scene) {
+  check_names(predictor, scene.fit);
+  Problem problem;
+  problem.predictor = &predictor;
+  problem.arcs = std::move(arcs);
+  const auto& parameters = predictor.parameters();
+  const int count = static_cast<int>(parameters.size());
+  Eigen::VectorXd values(count);
+  for (int i = 0; i < count; ++i) {
+    const auto fixed = scene.fit.fixed.find(parameters[i].name);
+    values[i] = fixed != scene.fit.fixed.end() ? fixed->second : parameters[i].value;
+  }
+  problem.base.assign(problem.arcs.size(), values);
+  problem.row_weights.resize(problem.arcs.size());
+  const auto add = [&](int index, int arc) {
+    const ParameterInfo& info = parameters[index];
+    FreeParameter parameter{index, arc, transform_of(info, scene.fit), std::nullopt};
+    const auto prior = scene.fit.prior.find(info.name);
+    if (prior != scene.fit.prior.end()) parameter.prior = prior->second;
+    problem.free.push_back(parameter);
+  };
+  for (int i = 0; i < count; ++i)
+    if (parameters[i].role != ParameterInfo::Role::initial && is_free(parameters[i], scene.fit))
+      add(i, -1);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    for (int i = 0; i < count; ++i)
+      if (parameters[i].role == ParameterInfo::Role::initial && is_free(parameters[i], scene.fit))
+        add(i, arc);
+  return problem;
+}
+
+void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen::VectorXd& sign) {
+  sign = Eigen::VectorXd::Ones(values.size());
+  const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
+  if (theta < 0 || phi < 0) return;
+  const double turn = 2.0 * std::numbers::pi;
+  double tilt = std::fmod(values[theta], turn);
+  if (tilt < 0.0) tilt += turn;
+  const bool folded = tilt > std::numbers::pi;
+  values[theta] = folded ? turn - tilt : tilt;
+  if (!folded) return;
+  // (-theta, phi) and (theta, phi + pi) point the axis the same way; the node line turns over.
+  values[phi] += std::numbers::pi;
+  sign[theta] = -1.0;
+  for (const char* rate : {"dtheta_rad_s", "w1_rad_s", "w2_rad_s"})
+    if (const int i = predictor.index_of(rate); i >= 0) {
+      values[i] = -values[i];
+      sign[i] = -1.0;
+    }
+  if (const int psi = predictor.index_of("psi_rad"); psi >= 0) values[psi] -= std::numbers::pi;
+}
+
+bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
+              Eigen::MatrixXd* jacobian) {
+  const ArcData& data = problem.arcs[arc];
+  Eigen::VectorXd values = problem.values(arc, u);
+  if (!values.allFinite()) return false;
+  Eigen::VectorXd sign;
+  fold_tilt(*problem.predictor, values, sign);
+  const std::vector<int> columns = problem.columns_of(arc);
+  model::PredictRequest request;
+  request.t_s = data.t_s;
+  request.start_s = data.start_s;
+  request.observables = data.observables;
+  request.tolerance = problem.tolerance;
+  if (jacobian != nullptr)
+    for (const int i : columns) request.derivatives.push_back(problem.free[i].index);
+  model::Prediction prediction;
+  try {
+    prediction = problem.predictor->predict(values, request);
+  } catch (const Error&) {  // outside the model's range: a rejected step
+    return false;
+  }
+  whiten(data, prediction.values, prediction.jacobian, residuals, jacobian);
+  if (!residuals.allFinite()) return false;
+  if (jacobian != nullptr) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const FreeParameter& parameter = problem.free[columns[c]];
+      jacobian->col(c) *= sign[parameter.index] * parameter.transform.slope(u[columns[c]]);
+    }
+    if (!jacobian->allFinite()) return false;
+  }
+  for (const Reading& reading : data.readings) {
+    const int width = reading.channel == Channel::position ? 2 : 1;
+    double weight = 1.0 / problem.noise_scale[static_cast<int>(reading.channel)];
+    if (problem.row_weights[arc].size() > 0) weight *= problem.row_weights[arc][reading.row];
+    if (weight == 1.0) continue;
+    residuals.segment(reading.row, width) *= weight;
+    if (jacobian != nullptr) jacobian->middleRows(reading.row, width) *= weight;
+  }
+  return true;
+}
+
+namespace {
+
+// Sizes of the raw (unweighted) residuals: per reading, the whitened length over sqrt(its rows).
+struct RawResiduals {
+  std::vector<Eigen::VectorXd> per_arc;
+  bool ok = true;
+};
+
+RawResiduals raw_residuals(Problem problem, const Eigen::VectorXd& u) {
+  RawResiduals raw;
+  problem.noise_scale.fill(1.0);
+  for (auto& weights : problem.row_weights) weights.resize(0);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd residuals;
+    raw.ok = raw.ok && evaluate(problem, arc, u, residuals, nullptr);
+    raw.per_arc.push_back(std::move(residuals));
+  }
+  return raw;
+}
+
+double length(const Reading& reading, const Eigen::VectorXd& residuals) {
+  return reading.channel == Channel::position ? residuals.segment<2>(reading.row).norm()
+                                              : std::abs(residuals[reading.row]);
+}
+
+// Scale of a channel from the weighted squares of its inliers; robust start from the median.
+double channel_scale(const Problem& problem, const RawResiduals& raw, Channel channel) {
+  std::vector<double> lengths;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings)
+      if (reading.channel == channel) lengths.push_back(length(reading, raw.per_arc[arc]));
+  if (lengths.size() < 5) return 1.0;
+  const bool planar = channel == Channel::position;
+  // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
+  double scale = median(lengths) / (planar ? 1.1774 : 0.6745);
+  for (int round = 0; round < 5; ++round) {
+    double squares = 0.0;
+    int inliers = 0;
+    for (const double d : lengths)
+      if (d <= 3.5 * scale) {
+        squares += d * d;
+        ++inliers;
+      }
+    // Share of the variance that lies within 3.5 sigma.
+    const double kept =
+        planar ? 2.0 * (1.0 - std::exp(-6.125) * (1.0 + 6.125)) / (1.0 - std::exp(-6.125))
+               : 0.99390;
+    scale = std::sqrt(squares / std::max(1.0, kept * inliers));
+  }
+  const double rows = static_cast<double>(lengths.size()) * (planar ? 2.0 : 1.0);
+  const double share = rows / std::max(1.0, static_cast<double>(problem.rows()));
+  const double used = share * static_cast<double>(problem.free.size());
+  return std::max(scale * std::sqrt(rows / std::max(1.0, rows - used)), 1e-12);
+}
+
+}  // namespace
+
+double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
+  const RawResiduals raw = raw_residuals(problem, u);
+  if (!raw.ok) return 0.0;
+  double change = 0.0;
+  std::array<double, kChannels> spread = problem.noise_scale;
+  for (int c = 0; c < kChannels; ++c)
+    spread[c] = channel_scale(problem, raw, static_cast<Channel>(c));
+  if (rescale) {
+    for (int c = 0; c < kChannels; ++c)
+      change = std::max(change, std::abs(std::log(spread[c] / problem.noise_scale[c])));
+    problem.noise_scale = spread;
+  }
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    Eigen::VectorXd weights = Eigen::VectorXd::Ones(problem.arcs[arc].rows);
+    for (const Reading& reading : problem.arcs[arc].readings) {
+      const double d =
+          length(reading, raw.per_arc[arc]) / spread[static_cast<int>(reading.channel)];
+      if (d <= 3.5) continue;
+      // Influence falls like 1/d: a glitch far away does not pull.
+      const double weight = 3.5 * 3.5 / (d * d);
+      weights.segment(reading.row, reading.channel == Channel::position ? 2 : 1)
+          .setConstant(weight);
+    }
+    const Eigen::VectorXd& before = problem.row_weights[arc];
+    change = std::max(change, before.size() == weights.size()
+                                  ? (before - weights).cwiseAbs().maxCoeff()
+                                  : (weights.array() - 1.0).abs().maxCoeff());
+    problem.row_weights[arc] = std::move(weights);
+  }
+  return change;
+}
+
+}  // namespace trochoid::fitting

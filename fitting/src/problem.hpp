@@ -1,0 +1,95 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "observations.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+/// How a free parameter is handed to the minimiser, so that it stays in its range.
+///   identity  value = u
+///   log       value = exp(u): positive, over decades
+///   between   value = lower + (upper - lower) (1 + tanh u)/2
+struct Transform {
+  enum class Kind { identity, log, between };
+  Kind kind = Kind::identity;
+  double lower = 0.0, upper = 0.0;
+  [[nodiscard]] double value(double u) const;
+  [[nodiscard]] double slope(double u) const;  ///< d value / d u
+  [[nodiscard]] double inverse(double value) const;
+};
+
+struct FreeParameter {
+  int index = 0;  ///< into Predictor::parameters()
+  int arc = -1;   ///< -1: shared by all arcs
+  Transform transform;
+  std::optional<data::Prior> prior;
+};
+
+/// A predictor, the arcs it has to explain and what may vary. The vector u holds one entry per free
+/// parameter, shared ones first.
+struct Problem {
+  const model::Predictor* predictor = nullptr;
+  std::vector<ArcData> arcs;
+  std::vector<FreeParameter> free;
+  std::vector<Eigen::VectorXd> base;  ///< per arc, all predictor parameters; free ones are starts
+  std::vector<Eigen::VectorXd> row_weights;  ///< per arc, sqrt of the robust weights; empty = 1
+  std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
+  double tolerance = 1e-8;
+
+  [[nodiscard]] int shared_count() const;
+  [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0
+  [[nodiscard]] std::vector<int> columns_of(int arc) const;  ///< free indices seen by an arc
+  [[nodiscard]] Eigen::VectorXd start() const;               ///< u of the values in `base`
+  [[nodiscard]] Eigen::VectorXd values(int arc, const Eigen::VectorXd& u) const;
+  [[nodiscard]] double value(int free_index, const Eigen::VectorXd& u) const;
+  void set_base(const Eigen::VectorXd& u);  ///< writes the values of u back into `base`
+  [[nodiscard]] int rows() const;
+};
+
+/// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it
+/// names none) are free, those of role `initial` once per arc.
+/// `held` names parameters that stay fixed whatever the scene says.
+/// @throws InputError for a free or fixed name the model does not have.
+[[nodiscard]] Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
+                                   const data::Scene& scene);
+
+/// Whitened, weighted residuals of one arc and their derivatives by u (columns_of order).
+/// Returns false if the model has no prediction there (never leaves NaN behind).
+[[nodiscard]] bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u,
+                            Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian);
+
+/// Angle coordinates outside [0, pi] name the same attitude as folded ones: brings theta back and
+/// turns phi, psi and the rates accordingly. `sign` receives the derivative of each folded value.
+void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen::VectorXd& sign);
+
+struct Solution {
+  Eigen::VectorXd u;
+  double chi2 = 0.0;  ///< twice the final cost: weighted residuals and priors
+  bool usable = false;
+  bool converged = false;
+  int iterations = 0;
+  std::string message;
+};
+
+struct SolveOptions {
+  int iterations = 60;
+  double function_tolerance = 1e-9;
+  double initial_radius = 1e4;
+};
+
+/// Levenberg-Marquardt (Ceres, dense QR) from u.
+[[nodiscard]] Solution solve(const Problem& problem, const Eigen::VectorXd& u,
+                             const SolveOptions& options = {});
+
+/// Sets noise_scale (per channel, if `rescale`) and robust weights from the residuals at u.
+/// Points within 3.5 scaled sigma keep weight 1, so that clean Gaussian data are left alone.
+/// @returns the largest change of any weight or scale.
+double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale);
+
+}  // namespace trochoid::fitting

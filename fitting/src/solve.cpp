@@ -1,0 +1,139 @@
+#include <ceres/ceres.h>
+#include <glog/logging.h>
+
+#include "problem.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// All residuals of one arc, so that one integration serves them all. Blocks: shared, own (those
+// that exist). Returns false where the model has no prediction: a rejected step.
+class ArcCost : public ceres::CostFunction {
+ public:
+  ArcCost(const Problem& problem, int arc) : problem_(problem), arc_(arc) {
+    columns_ = problem.columns_of(arc);
+    shared_ = problem.shared_count();
+    own_ = static_cast<int>(columns_.size()) - shared_;
+    set_num_residuals(problem.arcs[arc].rows);
+    if (shared_ > 0) mutable_parameter_block_sizes()->push_back(shared_);
+    if (own_ > 0) mutable_parameter_block_sizes()->push_back(own_);
+  }
+
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(problem_.free.size());
+    for (int c = 0; c < static_cast<int>(columns_.size()); ++c)
+      u[columns_[c]] = c < shared_ ? blocks[0][c] : blocks[shared_ > 0 ? 1 : 0][c - shared_];
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    if (!evaluate(problem_, arc_, u, r, jacobians != nullptr ? &j : nullptr)) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, r.size()) = r;
+    if (jacobians == nullptr) return true;
+    write(j.leftCols(shared_), shared_ > 0 ? jacobians[0] : nullptr);
+    write(j.rightCols(own_), own_ > 0 ? jacobians[shared_ > 0 ? 1 : 0] : nullptr);
+    return true;
+  }
+
+ private:
+  static void write(const Eigen::Ref<const Eigen::MatrixXd>& part, double* target) {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    if (target == nullptr || part.cols() == 0) return;
+    if (part.cols() == 1)
+      Eigen::Map<Eigen::VectorXd>(target, part.rows()) = part.col(0);
+    else
+      Eigen::Map<RowMajor>(target, part.rows(), part.cols()) = part;
+  }
+
+  const Problem& problem_;
+  int arc_;
+  std::vector<int> columns_;
+  int shared_ = 0, own_ = 0;
+};
+
+// What is known from outside: (value - prior)/sigma.
+class PriorCost : public ceres::CostFunction {
+ public:
+  PriorCost(const FreeParameter& parameter, int size, int entry)
+      : parameter_(parameter), size_(size), entry_(entry) {
+    set_num_residuals(1);
+    mutable_parameter_block_sizes()->push_back(size);
+  }
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
+    const double u = blocks[0][entry_];
+    residuals[0] =
+        (parameter_.transform.value(u) - parameter_.prior->value) / parameter_.prior->sigma;
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      std::fill_n(jacobians[0], size_, 0.0);
+      jacobians[0][entry_] = parameter_.transform.slope(u) / parameter_.prior->sigma;
+    }
+    return true;
+  }
+
+ private:
+  FreeParameter parameter_;
+  int size_, entry_;
+};
+
+// Positions of the blocks in u: shared parameters first, then arc by arc.
+struct Blocks {
+  std::vector<int> first, size;
+  explicit Blocks(const Problem& problem) {
+    first.push_back(0);
+    size.push_back(problem.shared_count());
+    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+      first.push_back(first.back() + size.back());
+      size.push_back(static_cast<int>(problem.columns_of(arc).size()) - size.front());
+    }
+  }
+};
+
+void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
+               ceres::Problem& ceres_problem) {
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    std::vector<double*> used;
+    if (blocks.size[0] > 0) used.push_back(u.data());
+    if (blocks.size[arc + 1] > 0) used.push_back(u.data() + blocks.first[arc + 1]);
+    ceres_problem.AddResidualBlock(new ArcCost(problem, arc), nullptr, used);
+  }
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    if (!problem.free[i].prior) continue;
+    const int block = problem.free[i].arc + 1;
+    ceres_problem.AddResidualBlock(
+        new PriorCost(problem.free[i], blocks.size[block], i - blocks.first[block]), nullptr,
+        u.data() + blocks.first[block]);
+  }
+}
+
+}  // namespace
+
+void silence_solver_log() {
+  FLAGS_minloglevel = google::GLOG_FATAL;
+}
+
+Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options) {
+  Solution solution;
+  solution.u = u;
+  ceres::Problem ceres_problem;
+  add_costs(problem, Blocks(problem), solution.u, ceres_problem);
+  ceres::Solver::Options ceres_options;
+  ceres_options.linear_solver_type =
+      problem.arcs.size() > 8 ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
+  ceres_options.max_num_iterations = options.iterations;
+  ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.parameter_tolerance = 1e-11;
+  ceres_options.gradient_tolerance = 1e-12;
+  ceres_options.initial_trust_region_radius = options.initial_radius;
+  ceres_options.max_num_consecutive_invalid_steps = 20;
+  ceres_options.logging_type = ceres::SILENT;
+  ceres_options.num_threads = 1;  // sums in one order: the same bits whatever the machine
+  ceres::Solver::Summary summary;
+  ceres::Solve(ceres_options, &ceres_problem, &summary);
+  solution.chi2 = 2.0 * summary.final_cost;
+  solution.usable = summary.IsSolutionUsable() && std::isfinite(solution.chi2);
+  solution.converged = summary.termination_type == ceres::CONVERGENCE;
+  solution.iterations = static_cast<int>(summary.iterations.size()) - 1;
+  solution.message = summary.message;
+  return solution;
+}
+
+}  // namespace trochoid::fitting

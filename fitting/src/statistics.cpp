@@ -1,0 +1,247 @@
+#include "statistics.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+
+double chi2_upper_tail(double chi2, double dof) {
+  if (!(chi2 > 0.0) || !(dof > 0.0)) return 1.0;
+  const double spread = 2.0 / (9.0 * dof);
+  const double z = (std::cbrt(chi2 / dof) - (1.0 - spread)) / std::sqrt(spread);
+  return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
+
+Whiteness whiteness(const Eigen::MatrixXd& series, double step_s) {
+  Whiteness result;
+  const Eigen::Index n = series.rows();
+  const double power = series.squaredNorm();
+  if (n < 20 || !(power > 0.0)) return result;
+  const auto correlation = [&](Eigen::Index lag) {
+    return series.topRows(n - lag).cwiseProduct(series.bottomRows(n - lag)).sum() / power;
+  };
+  const Eigen::Index tested = std::min<Eigen::Index>(20, n / 5);
+  double statistic = 0.0;
+  for (Eigen::Index lag = 1; lag <= tested; ++lag) {
+    const double rho = correlation(lag);
+    statistic += rho * rho / static_cast<double>(n - lag);
+  }
+  const double columns = static_cast<double>(series.cols());
+  statistic *= columns * static_cast<double>(n) * static_cast<double>(n + 2);
+  result.p_value = chi2_upper_tail(statistic, static_cast<double>(tested));
+  if (result.p_value > 0.01) return result;  // white as far as can be told: no inflation
+  double sum = 0.0;
+  const double noise = 2.0 / std::sqrt(columns * static_cast<double>(n));
+  for (Eigen::Index lag = 1; lag < n / 3; ++lag) {
+    const double rho = correlation(lag);
+    if (rho < noise) break;
+    sum += rho;
+  }
+  result.inflation = 1.0 + 2.0 * sum;
+  result.correlation_time_s = sum * step_s;
+  return result;
+}
+
+namespace {
+
+// The size at which a parameter counts as "known to 100 %".
+double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u) {
+  const FreeParameter& parameter = problem.free[index];
+  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+  const double value = std::abs(problem.value(index, u));
+  const ArcData& arc = problem.arcs[std::max(0, parameter.arc)];
+  const double duration = std::max(arc.duration_s(), 1e-9);
+  if (info.unit == "rad") return 1.0;
+  if (parameter.transform.kind == Transform::Kind::log) return std::max(value, 1e-300);
+  if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);
+  double extent = 1.0;
+  if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1) {
+    const Eigen::MatrixX2d xy = arc.positions_m();
+    extent = std::max((xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff(), 1e-9);
+  }
+  if (info.unit == "m") return std::max(value, extent);
+  if (info.unit == "m/s") return std::max(value, extent / duration);
+  return value > 0.0 ? value : 1.0;
+}
+
+// All arcs' residual derivatives by the values, priors as extra rows.
+struct Linearised {
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd residuals;
+  std::vector<Channel> channel;  // of each row; priors are counted to no channel
+  std::vector<int> arc;          // -1 for priors
+};
+
+Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
+  const int count = static_cast<int>(problem.free.size());
+  int priors = 0;
+  for (const FreeParameter& p : problem.free) priors += p.prior.has_value();
+  Linearised all;
+  all.jacobian.setZero(problem.rows() + priors, count);
+  all.residuals.setZero(all.jacobian.rows());
+  all.channel.assign(all.jacobian.rows(), Channel::position);
+  all.arc.assign(all.jacobian.rows(), -1);
+  int first = 0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    if (!evaluate(problem, arc, u, r, &j))
+      throw NumericalError("the model has no prediction at the solution");
+    const std::vector<int> columns = problem.columns_of(arc);
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      all.jacobian.col(columns[c]).segment(first, r.size()) =
+          j.col(c) / problem.free[columns[c]].transform.slope(u[columns[c]]);
+    all.residuals.segment(first, r.size()) = r;
+    for (const Reading& reading : problem.arcs[arc].readings)
+      for (int k = 0; k < (reading.channel == Channel::position ? 2 : 1); ++k) {
+        all.channel[first + reading.row + k] = reading.channel;
+        all.arc[first + reading.row + k] = arc;
+      }
+    first += static_cast<int>(r.size());
+  }
+  for (int i = 0; i < count; ++i)
+    if (problem.free[i].prior) all.jacobian(first++, i) = 1.0 / problem.free[i].prior->sigma;
+  return all;
+}
+
+// Residuals of a channel over all arcs as a series (arcs of one channel are tested separately and
+// the worst counts).
+Whiteness channel_whiteness(const Problem& problem, const Linearised& all, Channel channel) {
+  Whiteness worst;
+  const int width = channel == Channel::position ? 2 : 1;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < all.arc.size(); ++row)
+      if (all.arc[row] == arc && all.channel[row] == channel) values.push_back(all.residuals[row]);
+    const Eigen::Index n = static_cast<Eigen::Index>(values.size()) / width;
+    if (n < 2) continue;
+    const Eigen::MatrixXd series = Eigen::Map<Eigen::MatrixXd>(values.data(), width, n).transpose();
+    const Whiteness one =
+        whiteness(series, problem.arcs[arc].duration_s() / static_cast<double>(n - 1));
+    if (one.p_value < worst.p_value) worst.p_value = one.p_value;
+    if (one.inflation > worst.inflation) {
+      worst.inflation = one.inflation;
+      worst.correlation_time_s = one.correlation_time_s;
+    }
+  }
+  return worst;
+}
+
+data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
+  data::NullVector vector;
+  std::string list;
+  for (Eigen::Index i = 0; i < direction.size(); ++i) {
+    const std::string name = problem.name(static_cast<int>(i));
+    vector.components[name] = direction[i];
+    if (std::abs(direction[i]) < 0.25) continue;
+    list += fmt::format("{}{} ({:+.2f})", list.empty() ? "" : ", ", name, direction[i]);
+  }
+  vector.words = fmt::format(
+      "the data hardly see the direction {}: moved together they are uncertain by {:.3g} of their "
+      "size",
+      list, sd);
+  return vector;
+}
+
+}  // namespace
+
+Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
+  const Linearised all = linearise(problem, u);
+  const int count = static_cast<int>(problem.free.size());
+  Uncertainty result;
+  Eigen::VectorXd size(count);
+  for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  Eigen::MatrixXd triangle = scaled;
+  if (scaled.rows() > count)
+    triangle = Eigen::HouseholderQR<Eigen::MatrixXd>(scaled)
+                   .matrixQR()
+                   .topRows(count)
+                   .triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
+  Eigen::VectorXd singular = Eigen::VectorXd::Zero(count);
+  singular.head(svd.singularValues().size()) = svd.singularValues();
+  const double largest = std::max(singular.maxCoeff(), 1e-300);
+  // 1e-9: below that the derivatives themselves (integrated at ~1e-8) are rounding.
+  const double floor = 1e-9 * largest;
+  Eigen::VectorXd inverse(count);
+  for (int i = 0; i < count; ++i) {
+    inverse[i] = 1.0 / std::max(singular[i], floor);
+    if (singular[i] > std::max(1.0, floor)) {
+      ++result.rank;
+    } else {
+      result.null_vectors.push_back(
+          null_vector(problem, svd.matrixV().col(i), singular[i] > floor ? inverse[i] : INFINITY));
+    }
+  }
+  result.condition = largest / std::max(singular.minCoeff(), 1e-300);
+  const Eigen::MatrixXd bread =
+      svd.matrixV() * inverse.cwiseAbs2().asDiagonal() * svd.matrixV().transpose();
+
+  Eigen::VectorXd row_scale = Eigen::VectorXd::Ones(all.jacobian.rows());
+  bool correlated = false;
+  for (int c = 0; c < kChannels; ++c) {
+    const Whiteness one = channel_whiteness(problem, all, static_cast<Channel>(c));
+    correlated |= one.inflation > 1.0;
+    for (std::size_t row = 0; row < all.arc.size(); ++row)
+      if (all.arc[row] >= 0 && all.channel[row] == static_cast<Channel>(c))
+        row_scale[row] = std::sqrt(one.inflation);
+    if (one.p_value < result.whiteness.p_value) result.whiteness.p_value = one.p_value;
+    if (one.inflation > result.whiteness.inflation) {
+      result.whiteness.inflation = one.inflation;
+      result.whiteness.correlation_time_s = one.correlation_time_s;
+    }
+  }
+  Eigen::MatrixXd covariance = bread;
+  if (correlated) {
+    const Eigen::MatrixXd filling = row_scale.asDiagonal() * scaled * bread;
+    covariance = filling.transpose() * filling;
+  }
+  result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
+  result.identifiable.resize(count);
+  for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
+  return result;
+}
+
+double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u) {
+  Problem finer = problem;
+  finer.tolerance = std::max(problem.tolerance * 1e-2, 1e-13);
+  double worst = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd coarse, fine;
+    if (!evaluate(problem, arc, u, coarse, nullptr) || !evaluate(finer, arc, u, fine, nullptr))
+      return std::numeric_limits<double>::infinity();
+    worst = std::max(worst, (coarse - fine).cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double inflation) {
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  Criteria result;
+  for (int arc = 0; arc < static_cast<int>(plain.arcs.size()); ++arc) {
+    Eigen::VectorXd r;
+    if (!evaluate(plain, arc, u, r, nullptr)) {
+      result.chi2 = std::numeric_limits<double>::infinity();
+      return result;
+    }
+    result.chi2 += r.squaredNorm();
+    result.rows += static_cast<int>(r.size());
+  }
+  const double n = std::max(static_cast<double>(result.rows) / inflation, 2.0);
+  const double k = static_cast<double>(problem.free.size()) + 1.0;
+  const double fit = n * std::log(std::max(result.chi2 / result.rows, 1e-300));
+  result.aicc = fit + 2.0 * k + (n > k + 1.0 ? 2.0 * k * (k + 1.0) / (n - k - 1.0) : INFINITY);
+  result.bic = fit + k * std::log(n);
+  return result;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,49 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "problem.hpp"
+#include "trochoid/data/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// Upper tail of the chi-square distribution with `dof` degrees of freedom (Wilson-Hilferty, good
+/// to 0.002 for dof >= 5).
+[[nodiscard]] double chi2_upper_tail(double chi2, double dof);
+
+/// How residuals of one channel hang together in time.
+struct Whiteness {
+  double p_value = 1.0;    ///< Ljung-Box test of being white
+  double inflation = 1.0;  ///< variance factor of a mean: 1 + 2 sum of autocorrelations, >= 1
+  double correlation_time_s = 0.0;
+};
+/// @param series one column per coordinate, rows in time order with mean spacing step_s.
+[[nodiscard]] Whiteness whiteness(const Eigen::MatrixXd& series, double step_s);
+
+/// What the data say about the free parameters at a solution.
+struct Uncertainty {
+  Eigen::MatrixXd covariance;  ///< of the values (not of u), order of Problem::free
+  std::vector<bool> identifiable;
+  int rank = 0;  ///< directions known to better than 100 % (1 rad for angles)
+  double condition = 0.0;
+  std::vector<data::NullVector> null_vectors;
+  Whiteness whiteness;  ///< of the worst channel
+  std::vector<std::string> remarks;
+};
+/// Singular values of the Jacobian scaled by each parameter's natural size decide the rank;
+/// correlated residuals widen the covariance by their effective sample size, channel by channel
+/// (a sandwich of the channels' information matrices).
+[[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
+
+/// Largest change of a whitened residual when the integrator works a hundred times finer.
+[[nodiscard]] double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u);
+
+struct Criteria {
+  double chi2 = 0.0;  ///< with the track's own sigmas, robust weights
+  int rows = 0;
+  double aicc = 0.0, bic = 0.0;
+};
+/// AICc and BIC with the noise as an estimated parameter; `inflation` shrinks the sample size.
+[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double inflation);
+
+}  // namespace trochoid::fitting

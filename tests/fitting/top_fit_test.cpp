@@ -1,0 +1,209 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/fitting/fit.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+using Values = std::map<std::string, double>;
+
+// The thesis' base case, its length in metres.
+const Values kThesis{{"a_1_s2", 0.098},       {"b_1_s", 0.75},  {"l_m", 0.1},
+                     {"theta_rad", M_PI / 3}, {"phi_rad", 0.0}, {"dtheta_rad_s", 0.0},
+                     {"dphi_rad_s", 0.0}};
+
+struct Planted {
+  Values values = kThesis;
+  double duration_s = 10.0;
+  int samples = 300;
+  double sigma_m = 1e-3;
+  Eigen::Vector2d pivot_m{0.0, 0.0};
+  std::uint64_t seed = 1;
+  bool with_covariance = true;
+};
+
+data::Scene top_scene(const Eigen::Vector2d& pivot_m = {0.0, 0.0}) {
+  data::Scene scene;
+  scene.model.name = "top";
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m = Eigen::Vector3d(pivot_m.x(), pivot_m.y(), 0.0);
+  return scene;
+}
+
+data::Track track_of(const Planted& planted) {
+  const auto predictor = model::make_predictor(top_scene(planted.pivot_m));
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const auto& info = predictor->parameters()[i];
+    const auto given = planted.values.find(info.name);
+    values[i] = given != planted.values.end() ? given->second : info.value;
+  }
+  std::vector<double> t_s;
+  for (int i = 0; i < planted.samples; ++i)
+    t_s.push_back(planted.duration_s * i / (planted.samples - 1));
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.tolerance = 1e-10;
+  const model::Prediction exact = predictor->predict(values, request);
+  std::mt19937_64 generator(planted.seed);
+  std::normal_distribution<double> normal(0.0, planted.sigma_m);
+  data::Track track;
+  for (int i = 0; i < planted.samples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = t_s[i];
+    sample.centre_m = exact.values.segment<2>(2 * i);
+    sample.centre_m.x() += normal(generator);
+    sample.centre_m.y() += normal(generator);
+    if (planted.with_covariance)
+      sample.covariance_m2 = Eigen::Matrix2d::Identity() * planted.sigma_m * planted.sigma_m;
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+data::Fit fit_one(const data::Track& track, const data::Scene& scene = top_scene(),
+                  const FitOptions& options = {}) {
+  return fit(std::span(&track, 1), scene, options);
+}
+
+// Deviation from the truth in the fit's own sigmas.
+double pull(const data::Fit& result, const std::string& name, double truth) {
+  const data::FitParameter* parameter = result.find(name);
+  if (parameter == nullptr) return INFINITY;
+  return std::abs(parameter->value - truth) / parameter->sigma;
+}
+
+TEST(TopFit, FindsTheThesisCaseWithoutAGuess) {
+  const data::Fit result = fit_one(track_of({}));
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_EQ(result.start_path, "integral_matching");
+  // 4 sigma of 3 numbers: once in 5000 seeds.
+  for (const char* name : {"a_1_s2", "b_1_s", "l_m"})
+    EXPECT_LT(pull(result, name, kThesis.at(name)), 4.0) << name;
+  EXPECT_NEAR(result.chi2 / result.dof, 1.0, 0.25);  // 4 sigma of 593 degrees of freedom
+  EXPECT_EQ(result.rank, 7);
+  EXPECT_LT(result.integration_error_sigma, 0.01);
+}
+
+TEST(TopFit, NeedsNeitherCovarianceNorSceneNorAFirstTimeOfZero) {
+  Planted planted;
+  planted.with_covariance = false;
+  data::Track track = track_of(planted);
+  for (data::TrackSample& sample : track.samples) sample.t_s += 17.0;
+  FitOptions options;
+  options.model = "top";
+  const data::Fit result = fit_one(track, {}, options);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_DOUBLE_EQ(result.time_origin_s, 17.0);
+  EXPECT_LT(pull(result, "l_m", 0.1), 4.0);
+  EXPECT_LT(result.find("l_m")->sigma, 0.02 * 0.1);
+  EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("no covariances")));
+}
+
+TEST(TopFit, FollowsAClockwiseSpinAndAxesBelowTheHorizon) {
+  for (const double b : {-0.75, 0.75}) {
+    Planted planted;
+    planted.values["b_1_s"] = b;
+    planted.values["a_1_s2"] = 0.3;  // swings past theta = pi/2
+    planted.values["dphi_rad_s"] = 0.1;
+    const data::Fit result = fit_one(track_of(planted));
+    ASSERT_TRUE(result.converged) << result.reason;
+    EXPECT_LT(pull(result, "b_1_s", b), 4.0);
+    EXPECT_LT(pull(result, "a_1_s2", 0.3), 4.0);
+  }
+}
+
+TEST(TopFit, FindsAPivotNobodyToldItAbout) {
+  Planted planted;
+  planted.pivot_m = {0.02, -0.03};
+  planted.duration_s = 25.0;
+  planted.samples = 500;
+  planted.sigma_m = 5e-4;
+  FitOptions options;
+  options.free_pivot = true;
+  const data::Fit result = fit_one(track_of(planted), top_scene(), options);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "pivot_x_m", 0.02), 4.0);
+  EXPECT_LT(pull(result, "pivot_y_m", -0.03), 4.0);
+  EXPECT_LT(pull(result, "l_m", 0.1), 4.0);
+}
+
+TEST(TopFit, ShrugsOffGlitches) {
+  data::Track track = track_of({});
+  for (std::size_t i = 7; i < track.samples.size(); i += 31) track.samples[i].centre_m.x() += 0.02;
+  const data::Fit result = fit_one(track);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "l_m", 0.1), 4.0);
+  // 3 % of glitches of 20 sigma must not widen the noise by more than a fifth.
+  EXPECT_LT(result.noise_scale, 1.2);
+}
+
+TEST(TopFit, SaysThatAShortTrackIsShort) {
+  Planted planted;
+  planted.duration_s = 3.0;  // a third of a nutation
+  planted.samples = 90;
+  const data::Fit result = fit_one(track_of(planted));
+  EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("nutation")));
+}
+
+TEST(TopFit, WidensTheErrorBarsOfCorrelatedResiduals) {
+  data::Track track = track_of({});
+  // Every error repeated over five samples: a fifth of the information.
+  const data::Track exact = [] {
+    Planted planted;
+    planted.sigma_m = 1e-12;
+    return track_of(planted);
+  }();
+  for (std::size_t i = 0; i < track.samples.size(); ++i) {
+    const std::size_t j = i - i % 5;
+    track.samples[i].centre_m =
+        exact.samples[i].centre_m + (track.samples[j].centre_m - exact.samples[j].centre_m);
+  }
+  Planted plain;
+  const data::Fit white = fit_one(track_of(plain)), coloured = fit_one(track);
+  ASSERT_TRUE(coloured.converged);
+  EXPECT_LT(coloured.whiteness_p, 0.01);
+  // sqrt(5) = 2.2 in the limit of many samples.
+  const double ratio = coloured.find("l_m")->sigma / white.find("l_m")->sigma;
+  EXPECT_GT(ratio, 1.6);
+  EXPECT_LT(ratio, 2.9);
+}
+
+TEST(TopFit, DerivesTheSpinOnlyFromWhatIsGiven) {
+  const data::Track track = track_of({});
+  EXPECT_EQ(fit_one(track).find("omega_s_rad_s"), nullptr);
+  data::Scene scene = top_scene();
+  scene.fit.prior["I_kg_m2"] = {1.0, 0.01};
+  scene.fit.prior["Is_kg_m2"] = {1.5, 0.03};
+  const data::Fit result = fit_one(track, scene);
+  const data::FitParameter* spin = result.find("omega_s_rad_s");
+  ASSERT_NE(spin, nullptr);
+  EXPECT_EQ(spin->status, data::ParameterStatus::derived);
+  EXPECT_LT(std::abs(spin->value - 0.5) / spin->sigma, 4.0);
+  // 1 % and 2 % of the priors in quadrature, plus what b adds.
+  EXPECT_NEAR(spin->sigma / spin->value, std::hypot(0.01, 0.02), 0.005);
+  EXPECT_NE(result.find("mass_kg"), nullptr);
+}
+
+TEST(TopFit, IsTheSameBitForBitWhenRepeated) {
+  const data::Track track = track_of({});
+  const data::Fit first = fit_one(track), second = fit_one(track);
+  for (std::size_t i = 0; i < first.parameters.size(); ++i)
+    EXPECT_EQ(first.parameters[i].value, second.parameters[i].value) << first.parameters[i].name;
+}
+
+TEST(TopFit, RefusesUnknownParameterNames) {
+  data::Scene scene = top_scene();
+  scene.fit.fixed["length"] = 0.1;
+  EXPECT_THROW((void)fit_one(track_of({}), scene), InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting

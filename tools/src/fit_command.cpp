@@ -1,0 +1,120 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+// trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
+namespace trochoid::tools {
+namespace {
+
+struct FitCommand {
+  std::vector<std::string> tracks;
+  std::string scene, output;
+  std::optional<int> object;
+  fitting::FitOptions options;
+};
+
+// Value and error to the error's second digit.
+std::string with_error(double value, double sigma) {
+  if (!(sigma > 0.0) || !std::isfinite(sigma)) return fmt::format("{:.6g}", value);
+  const int digits =
+      std::max(0, static_cast<int>(std::floor(std::log10(std::max(std::abs(value), sigma)))) -
+                      static_cast<int>(std::floor(std::log10(sigma))) + 2);
+  return fmt::format("{:.{}g} +- {:.2g}", value, std::min(digits, 15), sigma);
+}
+
+const char* word(data::ParameterStatus status) {
+  switch (status) {
+    case data::ParameterStatus::fixed:
+      return "fixed";
+    case data::ParameterStatus::derived:
+      return "derived";
+    case data::ParameterStatus::prior:
+      return "prior";
+    default:
+      return "fitted";
+  }
+}
+
+void print(const data::Fit& fit) {
+  fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
+  for (const data::FitParameter& p : fit.parameters)
+    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
+               word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
+  fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3f}, whiteness p {:.2g}\n",
+             fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
+  fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
+             fit.covariance_names.size(), fit.integration_error_sigma);
+  for (const data::ModelScore& m : fit.comparison)
+    fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {:8.2f} sigma  {} parameters\n",
+               m.recommended ? "*" : " ", m.model, m.aicc, m.bic, m.held_back_rms_sigma,
+               m.parameters);
+  for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
+}
+
+std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
+  std::vector<data::Track> tracks;
+  for (const std::string& path : command.tracks) {
+    const data::TrackFile file = data::read_track(path);
+    provenance.inputs[std::filesystem::path(path).filename().string()] = data::sha256_of_file(path);
+    for (const data::Track& track : file.tracks)
+      if (!command.object || track.object == *command.object) tracks.push_back(track);
+  }
+  if (tracks.empty())
+    throw InputError(fmt::format("--object {}: no track has it", command.object.value_or(0)));
+  return tracks;
+}
+
+void run(const FitCommand& command) {
+  data::Fit provenance;
+  const std::vector<data::Track> tracks = read_tracks(command, provenance);
+  data::Scene scene;
+  if (!command.scene.empty()) {
+    scene = data::read_scene(command.scene);
+    provenance.inputs[std::filesystem::path(command.scene).filename().string()] =
+        data::sha256_of_file(command.scene);
+  } else if (command.options.model.empty()) {
+    throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
+  }
+  data::Fit fit = fitting::fit(tracks, scene, command.options);
+  fit.inputs = provenance.inputs;
+  fit.versions["trochoid"] = TROCHOID_VERSION;
+  if (!command.options.model.empty()) scene.model.name = fit.model;
+  if (scene.model.name == "auto") scene.model.name = fit.model;
+  fit.scene_toml = data::to_toml(scene);
+  if (!command.output.empty()) data::write_fit(fit, command.output);
+  print(fit);
+  if (!fit.converged) throw NotGood(fmt::format("the fit did not converge: {}", fit.reason));
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app) {
+  auto command = std::make_shared<FitCommand>();
+  auto* fit = app.add_subcommand("fit", "Fit model parameters to one or more tracks of a body");
+  fit->add_option("track", command->tracks,
+                  "Track CSV files (docs/formats.md); t_s,x_m,y_m will do")
+      ->required()
+      ->check(CLI::ExistingFile);
+  fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors")
+      ->check(CLI::ExistingFile);
+  fit->add_option("--model,-m", command->options.model,
+                  "top, rolling, sliding, puck, pivot or auto; overrides the scene's");
+  fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
+  fit->add_option("--object", command->object, "Fit this object of the track only");
+  fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
+  fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
+  fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
+  fit->add_option("--seed", command->options.seed, "Seed of everything random");
+  fit->callback([command] { run(*command); });
+}
+
+}  // namespace trochoid::tools
