@@ -14,10 +14,14 @@ std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene);
 std::unique_ptr<Predictor> make_rolling(const data::Scene& scene);
 std::unique_ptr<Predictor> make_smooth(const data::Scene& scene);
 std::unique_ptr<Predictor> make_sliding(const data::Scene& scene);
+std::unique_ptr<Predictor> make_puck(const data::Scene& scene);
+std::unique_ptr<Predictor> make_pivot(const data::Scene& scene);
 
 Trajectory simulate_free(const data::Scene& scene);
 Trajectory simulate_top(const data::Scene& scene);
 Trajectory simulate_top_euler(const data::Scene& scene);
+Trajectory simulate_puck(const data::Scene& scene);
+Trajectory simulate_pivot(const data::Scene& scene);
 
 /// What a run that an integrator ended is called to the outside.
 [[nodiscard]] Outcome outcome_of(RunEnd end);

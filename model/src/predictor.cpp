@@ -77,9 +77,11 @@ std::unique_ptr<Predictor> make_predictor(const data::Scene& scene) {
   if (name == "rolling") return make_rolling(scene);
   if (name == "smooth") return make_smooth(scene);
   if (name == "sliding") return make_sliding(scene);
+  if (name == "puck") return make_puck(scene);
+  if (name == "pivot") return make_pivot(scene);
   throw InputError(
       fmt::format("model.name = \"{}\" cannot be predicted; models with a path are top, top-euler, "
-                  "rolling, smooth, sliding",
+                  "rolling, smooth, sliding, puck, pivot",
                   name));
 }
 

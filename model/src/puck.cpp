@@ -1,0 +1,269 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "factories.hpp"
+#include "puck_run.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/model/inertia.hpp"
+
+// The puck as a function of its parameters and as a table; position and spin angle are cyclic.
+namespace trochoid::model {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using Role = ParameterInfo::Role;
+using Dual8 = Dual<8>;
+
+enum Parameter : int { kX, kY, kVx, kVy, kPsi, kW3, kInitial, kFriction = kInitial, kDrag };
+
+struct PuckScene {
+  double gravity = 9.81, radius_m = 0.0, bore = 0.0, gyration = 0.5;
+  double mass_kg = 1.0, height_m = 0.0;
+  bool mass_known = false, drag = false;
+  double value[8] = {};  ///< by Parameter
+};
+
+PuckScene puck_scene(const data::Scene& scene) {
+  if (!scene.body) throw InputError("[body] is missing: the puck model needs kind and radius_m");
+  if (!scene.model.friction)
+    throw InputError("model.friction is missing: the puck model needs the Coulomb coefficient");
+  const CentralInertia inertia = central_inertia(*scene.body);
+  if (scene.model.air_force_N_s_m && !inertia.mass_known)
+    throw InputError(
+        "body.mass_kg is missing: model.air_force_N_s_m acts as coefficient over mass; weigh the "
+        "body");
+  PuckScene puck;
+  puck.gravity = scene.model.gravity_m_s2;
+  puck.radius_m = scene.body->radius_m;
+  // A hoop without width has no face; this one's error is its width over R, 1e-5.
+  constexpr double kWidestBore = 1.0 - 1e-5;
+  puck.bore = std::min(scene.body->inner_radius_m / puck.radius_m, kWidestBore);
+  puck.gyration = inertia.axial_kg_m2 / (inertia.mass_kg * puck.radius_m * puck.radius_m);
+  puck.mass_kg = inertia.mass_kg;
+  puck.mass_known = inertia.mass_known;
+  puck.height_m = scene.body->half_thickness_m();
+  puck.drag = scene.model.air_force_N_s_m.has_value();
+  const data::StartSettings& start = scene.start;
+  const double initial[] = {
+      start.x_m.value_or(0.0),     start.y_m.value_or(0.0),
+      start.vx_m_s.value_or(0.0),  start.vy_m_s.value_or(0.0),
+      start.psi_rad.value_or(0.0), start.w3_rad_s.value_or(start.dpsi_rad_s.value_or(0.0)),
+      *scene.model.friction,       scene.model.air_force_N_s_m.value_or(0.0)};
+  std::copy(std::begin(initial), std::end(initial), puck.value);
+  return puck;
+}
+
+constexpr double kLeastFriction = 1e-9;  // below it the stretched time loses its meaning
+
+std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
+  const auto initial = [&](Parameter which, const char* name, const char* unit,
+                           const char* meaning) {
+    return ParameterInfo{name,      unit,  Role::initial,     -kInfinity,
+                         kInfinity, false, puck.value[which], which != kPsi,
+                         meaning};
+  };
+  std::vector<ParameterInfo> list{
+      initial(kX, "x_m", "m", "centre of mass"),
+      initial(kY, "y_m", "m", "centre of mass"),
+      initial(kVx, "vx_m_s", "m/s", "velocity of the centre"),
+      initial(kVy, "vy_m_s", "m/s", "velocity of the centre"),
+      initial(kPsi, "psi_rad", "rad", "angle turned about the vertical"),
+      initial(kW3, "w3_rad_s", "rad/s", "spin about the vertical"),
+      {"friction", "1", Role::dynamics, kLeastFriction, kInfinity, true, puck.value[kFriction],
+       true, "Coulomb coefficient of face and floor"}};
+  if (puck.drag)
+    list.push_back({"air_force_N_s_m", "N s/m", Role::dynamics, 0.0, kInfinity, true,
+                    puck.value[kDrag], true, "air force on the centre of mass"});
+  return list;
+}
+
+template <class S>
+Puck<S> puck_system(const PuckScene& scene, const S& friction, const S& drag) {
+  Puck<S> puck;
+  puck.friction = friction;
+  puck.drag_1_s = drag * (1.0 / scene.mass_kg);
+  puck.gravity = scene.gravity;
+  puck.radius = scene.radius_m;
+  puck.bore = scene.bore;
+  puck.gyration = scene.gyration;
+  return puck;
+}
+
+/// Runs from parameter values, in the order of `Parameter`.
+template <class S>
+PuckPath<S> puck_path(const PuckScene& scene, const S (&p)[8], std::span<const double> t_s,
+                      double tolerance) {
+  const State<S, 7> start{p[kVx], p[kVy], p[kW3] * scene.radius_m, p[kX], p[kY], p[kPsi], S(0.0)};
+  return run_puck(puck_system<S>(scene, p[kFriction], p[kDrag]), start, t_s, tolerance);
+}
+
+/// The six initial parameters that describe a state.
+template <class S>
+State<S, kInitial> parameters_of(const State<S, 7>& s, double radius_m) {
+  using P = Puck<S>;
+  return {s[P::x], s[P::y], s[P::vx], s[P::vy], s[P::psi], s[P::q] * (1.0 / radius_m)};
+}
+
+class PuckPredictor : public Predictor {
+ public:
+  explicit PuckPredictor(const data::Scene& scene)
+      : scene_(puck_scene(scene)), infos_(puck_parameters(scene_)) {}
+  [[nodiscard]] const std::string& model_name() const override { return name_; }
+  [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override { return infos_; }
+  [[nodiscard]] Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                   const PredictRequest& request) const override;
+
+ private:
+  template <class S>
+  void fill(const PuckPath<S>& path, const PredictRequest& request, Prediction& out) const;
+
+  std::string name_ = "puck";
+  PuckScene scene_;
+  std::vector<ParameterInfo> infos_;
+};
+
+/// A puck lies flat: its tilt and node line are zero by convention.
+template <class S>
+S seen(const State<S, 7>& s, Observable what) {
+  using P = Puck<S>;
+  switch (what) {
+    case Observable::x_m:
+      return s[P::x];
+    case Observable::y_m:
+      return s[P::y];
+    case Observable::psi_rad:
+      return s[P::psi];
+    case Observable::theta_rad:
+    case Observable::phi_rad:
+      break;
+  }
+  return S(0.0);
+}
+
+template <class S>
+void PuckPredictor::fill(const PuckPath<S>& path, const PredictRequest& request,
+                         Prediction& out) const {
+  // Lane i belongs to column i; columns are at most eight, as many as there are parameters.
+  const auto put = [&](Eigen::Index row, const S& value, Eigen::VectorXd& values,
+                       Eigen::MatrixXd& jacobian) {
+    values[row] = value_of(value);
+    if constexpr (requires { value.derivative; }) {
+      for (Eigen::Index c = 0; c < jacobian.cols(); ++c) jacobian(row, c) = value.derivative[c];
+    }
+  };
+  Eigen::Index row = 0;
+  for (const auto& s : path.rows)
+    for (const Observable what : request.observables)
+      put(row++, seen(s, what), out.values, out.jacobian);
+  out.outcome = path.end == StepEnd::accepted     ? Outcome::reached_end
+                : path.end == StepEnd::step_limit ? Outcome::step_limit
+                                                  : Outcome::tolerance_not_reachable;
+  out.valid_until_s = path.rows.empty() ? request.start_s : request.t_s[path.rows.size() - 1];
+  out.steps = path.statistics.steps;
+  const double run_m = path.rows.empty()
+                           ? 0.0
+                           : std::hypot(value_of(path.rows.back()[3] - path.rows[0][3]),
+                                        value_of(path.rows.back()[4] - path.rows[0][4]));
+  out.error_estimate = request.tolerance * path.error_sum * run_m;
+  if (!request.want_end_state || path.rows.empty()) return;
+  const auto end = parameters_of(path.rows.back(), scene_.radius_m);
+  out.end_state.resize(kInitial);
+  out.end_state_jacobian.resize(kInitial, out.jacobian.cols());
+  for (int i = 0; i < kInitial; ++i) put(i, end[i], out.end_state, out.end_state_jacobian);
+}
+
+Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                  const PredictRequest& request) const {
+  check_request(*this, values, request);
+  std::vector<double> t_s;
+  for (const double t : request.t_s) t_s.push_back(t - request.start_s);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
+  Prediction out;
+  out.values.setConstant(rows, kNan);
+  out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
+  if (request.derivatives.empty()) {
+    double p[8] = {};
+    for (Eigen::Index i = 0; i < values.size(); ++i) p[i] = values[i];
+    fill(puck_path(scene_, p, t_s, request.tolerance), request, out);
+    return out;
+  }
+  Dual8 p[8];
+  for (Eigen::Index i = 0; i < values.size(); ++i) p[i] = Dual8(values[i]);
+  for (std::size_t c = 0; c < request.derivatives.size(); ++c)
+    p[request.derivatives[c]].derivative[c] = 1.0;
+  fill(puck_path(scene_, p, t_s, request.tolerance), request, out);
+  return out;
+}
+
+std::vector<std::string> puck_columns(bool mass_known) {
+  std::vector<std::string> columns = euler_columns();
+  if (!mass_known) columns.pop_back();  // energy needs the mass
+  for (const char* name : {"w3_rad_s", "vx_m_s", "vy_m_s"}) columns.emplace_back(name);
+  if (mass_known)
+    for (const char* name : {"normal_force_N", "force_x_N", "force_y_N"})
+      columns.emplace_back(name);
+  return columns;
+}
+
+}  // namespace
+
+std::unique_ptr<Predictor> make_puck(const data::Scene& scene) {
+  return std::make_unique<PuckPredictor>(scene);
+}
+
+Trajectory simulate_puck(const data::Scene& scene) {
+  const PuckScene puck = puck_scene(scene);
+  if (!(puck.value[kFriction] >= kLeastFriction))
+    throw InputError(fmt::format("model.friction = {} must be at least {}", puck.value[kFriction],
+                                 kLeastFriction));
+  const std::vector<double> t_s = output_times_s(scene.run);
+  const double tolerance = scene.run.tolerance;
+  const auto path = puck_path(puck, puck.value, t_s, tolerance);
+  const auto check = puck_path(puck, puck.value, t_s, finer(tolerance));
+  const auto system = puck_system<double>(puck, puck.value[kFriction], puck.value[kDrag]);
+
+  Trajectory run;
+  run.model = "puck";
+  run.integrator = "dop853";
+  run.integrator_reason = "smooth in the stretched time in which rest lies at infinity";
+  run.columns = puck_columns(puck.mass_known);
+  run.values.resize(static_cast<Eigen::Index>(path.rows.size()),
+                    static_cast<Eigen::Index>(run.columns.size()));
+  for (std::size_t n = 0; n < path.rows.size(); ++n) {
+    using P = Puck<double>;
+    const auto& s = path.rows[n];
+    const double w = s[P::q] / puck.radius_m, m = puck.mass_kg;
+    std::vector<double> row{t_s[n], 0.0, 0.0,     s[P::psi], 0.0,
+                            0.0,    w,   s[P::x], s[P::y],   puck.height_m};
+    const double kinetic =
+        0.5 * m * (s[P::vx] * s[P::vx] + s[P::vy] * s[P::vy] + puck.gyration * s[P::q] * s[P::q]);
+    if (puck.mass_known) row.push_back(kinetic + m * puck.gravity * puck.height_m);
+    row.insert(row.end(), {w, s[P::vx], s[P::vy]});
+    if (puck.mass_known) {
+      const bool moves = t_s[n] < path.rest_s;
+      const auto a = moves ? system.acceleration(s) : FaceForce<double>{0.0, 0.0, 0.0};
+      const double drag = value_of(system.drag_1_s);
+      row.insert(row.end(),
+                 {m * puck.gravity, m * (a.x + drag * s[P::vx]), m * (a.y + drag * s[P::vy])});
+    }
+    run.values.row(static_cast<Eigen::Index>(n)) =
+        Eigen::Map<const Eigen::RowVectorXd>(row.data(), static_cast<Eigen::Index>(row.size()));
+    if (n < check.rows.size())
+      run.error_estimate_m =
+          std::max(run.error_estimate_m,
+                   std::hypot(s[P::x] - check.rows[n][P::x], s[P::y] - check.rows[n][P::y]));
+  }
+  run.statistics = path.statistics;
+  run.end_s = path.rows.empty() ? 0.0 : t_s[path.rows.size() - 1];
+  run.outcome = path.end == StepEnd::accepted ? Outcome::reached_end : Outcome::step_limit;
+  if (std::isfinite(path.rest_s) && path.rest_s <= t_s.back()) {
+    run.events.push_back({path.rest_s, "at_rest"});
+    run.outcome = Outcome::at_rest;
+  }
+  return run;
+}
+
+}  // namespace trochoid::model

@@ -1,0 +1,263 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "trochoid/model/predictor.hpp"
+#include "trochoid/model/puck.hpp"
+#include "trochoid/model/simulate.hpp"
+
+namespace trochoid::model {
+namespace {
+
+/// Force and couple over mu N of a full face at e = v / (R w).
+struct FaceLaw {
+  double force, couple;
+};
+FaceLaw law(double e) {
+  const auto f = face_force<double>(e, 0.0, 1.0);
+  return {f.x, f.couple};
+}
+
+// Values of [Farkas2003]'s closed form; ten digits were given.
+TEST(FaceFriction, HasItsKnownValues) {
+  constexpr double kDigits = 1e-10;
+  EXPECT_NEAR(law(0.3).force, 0.2965859192, kDigits);
+  EXPECT_NEAR(law(0.3).couple, 0.6224358261, kDigits);
+  EXPECT_NEAR(law(1.5).force, 0.9408193755, kDigits);
+  EXPECT_NEAR(law(1.5).couple, 0.1737981055, kDigits);
+}
+
+TEST(FaceFriction, HasItsLimits) {
+  constexpr double kRounding = 1e-13;
+  EXPECT_NEAR(law(1.0).force, 8.0 / (3.0 * M_PI), kRounding);
+  EXPECT_NEAR(law(1.0).couple, 8.0 / (9.0 * M_PI), kRounding);
+  EXPECT_NEAR(law(1.0 + 1e-9).couple, 8.0 / (9.0 * M_PI), 1e-8);
+  EXPECT_NEAR(law(1e-7).force, 1e-7, 1e-20);
+  EXPECT_NEAR(law(1e-7).couple, 2.0 / 3.0, kRounding);
+  EXPECT_NEAR(law(1e7).force, 1.0, kRounding);
+  EXPECT_NEAR(law(1e7).couple * 4e7, 1.0, kRounding);
+  EXPECT_EQ(face_force<double>(0.3, 0.4, 0.0).couple, 0.0);
+  EXPECT_EQ(face_force<double>(0.0, 0.0, 2.0).x, 0.0);
+}
+
+/// Coulomb's law integrated over the face by the midpoint rule in both polar coordinates.
+FaceLaw quadrature(double e, double bore) {
+  constexpr int kRadii = 400, kAngles = 400;
+  double force = 0.0, couple = 0.0, area = 0.0;
+  for (int i = 0; i < kRadii; ++i) {
+    const double r = bore + (1.0 - bore) * (i + 0.5) / kRadii;
+    for (int j = 0; j < kAngles; ++j) {
+      const double a = 2.0 * M_PI * (j + 0.5) / kAngles;
+      const double ux = e - r * std::sin(a), uy = r * std::cos(a), u = std::hypot(ux, uy);
+      force += r * ux / u;
+      couple += r * r * (std::cos(a) * uy - std::sin(a) * ux) / u;
+      area += r;
+    }
+  }
+  return {force / area, couple / area};
+}
+
+TEST(FaceFriction, IsCoulombsLawIntegratedOverDiscAndRing) {
+  constexpr double kQuadrature = 2e-4;  // the integrand has a kink where the slip vanishes
+  for (const double e : {0.2, 0.9, 1.4}) {
+    EXPECT_NEAR(law(e).force, quadrature(e, 0.0).force, kQuadrature);
+    EXPECT_NEAR(law(e).couple, quadrature(e, 0.0).couple, kQuadrature);
+    Puck<double> ring;
+    ring.friction = 1.0;
+    ring.gravity = 1.0;
+    ring.radius = 1.0;
+    ring.bore = 0.6;
+    ring.gyration = 1.0;
+    const auto f = ring.acceleration({e, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0});
+    EXPECT_NEAR(-f.x, quadrature(e, 0.6).force, kQuadrature);
+    EXPECT_NEAR(-f.couple, quadrature(e, 0.6).couple, kQuadrature);
+  }
+}
+
+data::Scene puck_scene() {
+  data::Scene scene;
+  scene.body.emplace();
+  scene.body->radius_m = 0.03;
+  scene.body->thickness_m = 0.005;
+  scene.support.kind = data::SupportKind::flat;
+  scene.model.friction = 0.2;
+  scene.start.x_m = 0.1;
+  scene.start.y_m = -0.05;
+  scene.start.vx_m_s = 0.8;
+  scene.start.vy_m_s = 0.6;
+  scene.start.psi_rad = 0.3;
+  scene.start.w3_rad_s = 0.0;
+  scene.run.until_s = 1.0;
+  scene.run.rate_hz = 100.0;
+  scene.run.tolerance = 1e-12;
+  return scene;
+}
+
+double column(const Trajectory& run, Eigen::Index row, const std::string& name) {
+  for (std::size_t c = 0; c < run.columns.size(); ++c)
+    if (run.columns[c] == name) return run.values(row, static_cast<Eigen::Index>(c));
+  ADD_FAILURE() << "no column " << name;
+  return NAN;
+}
+
+// Without spin the deceleration is mu g: s = v0 t - mu g t^2 / 2, rest after v0 / (mu g).
+TEST(Puck, StopsLikeABlockWhenItDoesNotSpin) {
+  const data::Scene scene = puck_scene();
+  const Trajectory run = simulate(scene);
+  const double a = 0.2 * 9.81, rest_s = 1.0 / a;
+  EXPECT_EQ(run.outcome, Outcome::at_rest);
+  ASSERT_EQ(run.events.size(), 1u);
+  EXPECT_NEAR(run.events[0].t_s, rest_s, 1e-8);
+  ASSERT_EQ(run.values.rows(), 101);
+  for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
+    const double t = std::min(0.01 * static_cast<double>(n), rest_s);
+    const double s = t - 0.5 * a * t * t;
+    EXPECT_NEAR(column(run, n, "x_m"), 0.1 + 0.8 * s, 1e-11);
+    EXPECT_NEAR(column(run, n, "y_m"), -0.05 + 0.6 * s, 1e-11);
+    EXPECT_EQ(column(run, n, "psi_rad"), 0.3);
+  }
+}
+
+// Pure spinning: dw/dt = -mu g R (2/3) / (C/m), C/m = R^2/2.
+TEST(Puck, SpinsDownUniformlyInPlace) {
+  data::Scene scene = puck_scene();
+  scene.start.vx_m_s = scene.start.vy_m_s = 0.0;
+  scene.start.w3_rad_s = -30.0;
+  const Trajectory run = simulate(scene);
+  const double a = 0.2 * 9.81 * 4.0 / (3.0 * 0.03), rest_s = 30.0 / a;
+  EXPECT_NEAR(run.events.at(0).t_s, rest_s, 1e-8);
+  EXPECT_NEAR(column(run, 100, "psi_rad"), 0.3 - 450.0 / a, 1e-9);
+  EXPECT_EQ(column(run, 100, "x_m"), 0.1);
+}
+
+// The uniform disc comes to rest in both motions at once, with e -> 0.653 [Farkas2003].
+TEST(Puck, EndsBothMotionsTogetherAtTheKnownRatio) {
+  Puck<double> puck;
+  puck.friction = 0.2;
+  puck.radius = 0.03;
+  State<double, 7> y{1.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0};
+  DormandPrince<Puck<double>> stepper(puck, uniform_control<7>(1e-12));
+  stepper.start(0.0, y);
+  while (stepper.y()[0] > 1e-8) ASSERT_EQ(stepper.step(1e3), StepEnd::accepted);
+  EXPECT_NEAR(stepper.y()[0] / stepper.y()[2], 0.653, 5e-4);
+}
+
+void expect_derivatives(const Predictor& predictor, std::span<const double> t_s,
+                        std::vector<Observable> observables) {
+  const auto& list = predictor.parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(list.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    values[i] = list[static_cast<std::size_t>(i)].value;
+  PredictRequest request;
+  request.t_s = t_s;
+  request.observables = std::move(observables);
+  request.tolerance = 1e-13;
+  request.want_end_state = true;
+  for (int i = 0; i < values.size(); ++i) request.derivatives.push_back(i);
+  const Prediction exact = predictor.predict(values, request);
+  EXPECT_EQ(exact.outcome, Outcome::reached_end);
+  EXPECT_TRUE(exact.values.allFinite());
+  request.derivatives.clear();
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const double h = 1e-4 * std::max(std::abs(values[i]), 0.1);
+    const auto at = [&](double offset) {
+      Eigen::VectorXd moved = values;
+      moved[i] += offset;
+      return predictor.predict(moved, request);
+    };
+    const Prediction a = at(h), b = at(-h), a2 = at(2.0 * h), b2 = at(-2.0 * h);
+    const double scale = 1.0 / (12.0 * h);
+    const Eigen::VectorXd path = (8.0 * (a.values - b.values) - (a2.values - b2.values)) * scale;
+    const Eigen::VectorXd end =
+        (8.0 * (a.end_state - b.end_state) - (a2.end_state - b2.end_state)) * scale;
+    // Differences: 1e-13 / h of rounding, and more beside the kink at rest.
+    constexpr double kDifference = 1e-6;
+    EXPECT_LE((exact.jacobian.col(i) - path).cwiseAbs().maxCoeff(),
+              kDifference * (1.0 + path.cwiseAbs().maxCoeff()))
+        << list[static_cast<std::size_t>(i)].name;
+    EXPECT_LE((exact.end_state_jacobian.col(i) - end).cwiseAbs().maxCoeff(),
+              kDifference * (1.0 + end.cwiseAbs().maxCoeff()))
+        << list[static_cast<std::size_t>(i)].name;
+  }
+}
+
+TEST(Puck, DifferentiatesByEveryParameterMovingAndAtRest) {
+  data::Scene scene = puck_scene();
+  scene.body->mass_kg = 0.05;
+  scene.model.air_force_N_s_m = 2e-3;
+  for (const double w3 : {0.0, 4.0, -40.0, 200.0}) {
+    scene.start.w3_rad_s = w3;
+    expect_derivatives(*make_predictor(scene), std::vector{0.1, 0.3, 0.42, 3.0},
+                       {Observable::x_m, Observable::y_m, Observable::psi_rad});
+  }
+}
+
+TEST(Puck, StaysWhereItIsWhenItStartsAtRest) {
+  data::Scene scene = puck_scene();
+  scene.start.vx_m_s = scene.start.vy_m_s = 0.0;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::at_rest);
+  EXPECT_EQ(run.values.rows(), 101);
+  EXPECT_EQ(column(run, 100, "x_m"), 0.1);
+}
+
+data::Scene pivot_scene() {
+  data::Scene scene;
+  scene.body.emplace();
+  scene.body->radius_m = 0.05;
+  scene.support.kind = data::SupportKind::pivot;
+  scene.start.w3_rad_s = 40.0;
+  scene.run.until_s = 20.0;
+  scene.run.rate_hz = 10.0;
+  return scene;
+}
+
+// The closed form of the Riccati equation (pivot.md (2)): with
+// y = exp(-t1 t/2) (cosh st + (t1/2 + t2 w0) sinh(st)/s), s^2 = t1^2/4 - t0 t2: psi = ln(y)/t2.
+TEST(Pivot, FollowsTheClosedFormUntilItStops) {
+  data::Scene scene = pivot_scene();
+  const double t0 = 0.8, t1 = 0.15, t2 = 0.004;
+  scene.model.spin_down_dry_rad_s2 = t0;
+  scene.model.spin_down_viscous_1_s = t1;
+  scene.model.spin_down_quadratic_1_rad = t2;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::at_rest);
+  const double rest_s = run.events.at(0).t_s, s = std::sqrt(t1 * t1 / 4.0 - t0 * t2);
+  const auto angle = [&](double t) {
+    return std::log(std::exp(-t1 * t / 2.0) *
+                    (std::cosh(s * t) + (t1 / 2.0 + t2 * 40.0) * std::sinh(s * t) / s)) /
+           t2;
+  };
+  for (Eigen::Index n = 0; n < run.values.rows(); ++n)
+    EXPECT_NEAR(column(run, n, "psi_rad"), angle(std::min(0.1 * static_cast<double>(n), rest_s)),
+                1e-8);
+}
+
+TEST(Pivot, StopsDryInTheParabolasTime) {
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_dry_rad_s2 = 4.0;
+  scene.start.w3_rad_s = -40.0;
+  const Trajectory run = simulate(scene);
+  EXPECT_NEAR(run.events.at(0).t_s, 10.0, 1e-12);
+  EXPECT_NEAR(column(run, 200, "psi_rad"), -200.0, 1e-9);
+}
+
+TEST(Pivot, NeverStopsWithoutDryFriction) {
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_viscous_1_s = 2.0;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::reached_end);
+  EXPECT_NEAR(column(run, 200, "psi_rad"), 20.0, 1e-7);
+}
+
+TEST(Pivot, DifferentiatesByEveryParameter) {
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_dry_rad_s2 = 0.8;
+  scene.model.spin_down_viscous_1_s = 0.15;
+  scene.model.spin_down_quadratic_1_rad = 0.004;
+  expect_derivatives(*make_predictor(scene), std::vector{0.5, 5.0, 30.0}, {Observable::psi_rad});
+}
+
+}  // namespace
+}  // namespace trochoid::model
