@@ -1,0 +1,67 @@
+#include "background.hpp"
+
+#include <gtest/gtest.h>
+
+#include "drawn_clip.hpp"
+#include "silhouette.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+/// Frames of a dark disc at the given places over one floor.
+std::vector<cv::Mat> frames_of(const cv::Mat& floor, const std::vector<cv::Point2d>& places) {
+  std::mt19937 random(11);
+  std::vector<cv::Mat> frames;
+  for (const cv::Point2d& p : places) {
+    cv::Mat picture = floor.clone();
+    draw_disc(picture, p.x, p.y, 15.0, 15.0, 0.0, 40.0);
+    frames.push_back(developed(picture, 2.0, random));
+  }
+  return frames;
+}
+
+double level_at(const cv::Mat& image, int x, int y) {
+  return cv::mean(image(cv::Rect(x - 3, y - 3, 7, 7)))[0];
+}
+
+TEST(Background, ABodyThatRestsMostOfTheTimeIsNotFloor) {
+  const cv::Mat floor = drawn_floor(200, 120, 150.0);
+  std::vector<cv::Point2d> places(16, {150.0, 60.0});  // rests for 11 of 16 samples
+  for (int i = 0; i < 5; ++i) places[static_cast<std::size_t>(i)] = {20.0 + 18.0 * i, 60.0};
+  const auto frames = frames_of(floor, places);
+  const Background background = Background::from_samples(frames);
+  EXPECT_NEAR(level_at(background.plate(), 150, 60), level_at(floor, 150, 60), 3.0);
+  const auto seen = find_silhouettes(frames.back(), background.plate(), background.noise_levels());
+  ASSERT_EQ(seen.size(), 1u);
+  EXPECT_NEAR(seen[0].detection.centre_px.x(), 150.0, 1.0);
+  EXPECT_NEAR(seen[0].detection.semi_major_px, 15.0, 1.5);
+}
+
+TEST(Background, NoiseIsMeasuredAndFlickerIsTakenOut) {
+  std::mt19937 random(4);
+  const cv::Mat floor = drawn_floor(160, 120, 120.0);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 16; ++i)
+    frames.push_back(developed(floor * (1.0 + 0.1 * std::sin(i)), 3.0, random));
+  const Background background = Background::from_samples(frames);
+  EXPECT_NEAR(background.noise_levels(), 3.0, 0.8);
+  EXPECT_LT(cv::countNonZero(background.active()), 160 * 120 / 100);
+  const double gain = background.gain(frames[3]) / background.gain(frames[0]);
+  EXPECT_NEAR(gain, (1.0 + 0.1 * std::sin(3)), 0.01);
+}
+
+TEST(Background, ABodyThatNeverLeavesIsFilledIn) {
+  const cv::Mat floor = drawn_floor(200, 160, 60.0);
+  std::mt19937 random(9);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 16; ++i) {  // spins in place: its brightness never stays
+    cv::Mat picture = floor.clone();
+    draw_disc(picture, 100.0, 80.0, 25.0, 25.0, 0.0, 140.0 + 80.0 * std::sin(2.4 * i));
+    frames.push_back(developed(picture, 2.0, random));
+  }
+  const Background background = Background::from_samples(frames);
+  EXPECT_NEAR(level_at(background.plate(), 100, 80), 60.0, 12.0);
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,110 @@
+#include <fmt/core.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/tracking/tracker.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path video, scene, camera, edges, output;
+  int objects = 0;
+  std::string from, to, at;
+  double rate_hz = 0.0;
+};
+
+Eigen::Vector2d parse_point(const std::string& text) {
+  double x = 0.0, y = 0.0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
+    throw InputError(fmt::format("--at {}: give a point in pixels as x,y", text));
+  return {x, y};
+}
+
+data::Scene scene_of(const Options& options) {
+  data::Scene scene;
+  if (!options.scene.empty()) scene = data::read_scene(options.scene);
+  if (options.rate_hz > 0.0) scene.camera.frame_rate_hz = options.rate_hz;
+  if (!options.at.empty()) scene.tracking.at_px = parse_point(options.at);
+  if (options.objects > 0) scene.tracking.objects = options.objects;
+  return scene;
+}
+
+/// Run times live beside the track, so that the track itself is the same from run to run.
+void write_timing(const fs::path& track, double seconds, const tracking::TrackSummary& summary) {
+  const nlohmann::json timing = {{"command", "track"},
+                                 {"seconds", seconds},
+                                 {"frames", summary.frames},
+                                 {"frames_per_s", static_cast<double>(summary.frames) / seconds}};
+  fs::path path = track;
+  path.replace_extension(".timing.json");
+  data::write_text(timing.dump(2) + "\n", path);
+}
+
+void run(const Options& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const data::Scene scene = scene_of(options);
+  std::optional<data::Camera> camera;
+  if (!options.camera.empty()) camera = data::read_camera(options.camera);
+  tracking::TrackOptions how;
+  how.objects = scene.tracking.objects;
+  how.from = options.from;
+  how.to = options.to;
+  if (!options.edges.empty()) how.edges = options.edges;
+  tracking::TrackResult result;
+  {
+    Progress progress("track");
+    how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
+    result = tracking::track_video(options.video, scene, camera, how);
+  }
+  result.file.made_by = "trochoid " TROCHOID_VERSION;
+  data::write_track(result.file, options.output);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  write_timing(options.output, elapsed.count(), result.summary);
+  const tracking::TrackSummary& s = result.summary;
+  note(fmt::format(
+      "{}: {} bodies in {} frames: {} found, {} lost, {} doubtful, {} frames damaged; metres: {}",
+      options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost, s.doubtful,
+      s.damaged, s.camera_words));
+  const auto wanted = static_cast<std::size_t>(scene.tracking.objects);
+  if (result.file.tracks.size() < wanted)
+    throw NotGood(
+        fmt::format("only {} of {} moving bodies found", result.file.tracks.size(), wanted));
+}
+
+}  // namespace
+
+void add_track_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
+  track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
+      ->required();
+  track->add_option("--scene", options->scene, "Scene file (docs/formats.md)")
+      ->check(CLI::ExistingFile);
+  track->add_option("--camera", options->camera, "Camera file; replaces the scene's")
+      ->check(CLI::ExistingFile);
+  track->add_option("--objects", options->objects, "Number of moving bodies")
+      ->check(CLI::Range(1, 64));
+  track->add_option("--from", options->from, "First frame to use: seconds (1.5) or frame (f120)");
+  track->add_option("--to", options->to, "Last frame to use: seconds or frame");
+  track->add_option("--at", options->at, "A point x,y [px] on the body in the first frame used");
+  track->add_option("--edges", options->edges, "Also write the accepted edge points (CSV)");
+  track
+      ->add_option("--rate", options->rate_hz,
+                   "True frame rate [Hz], where the file's is not (slow motion)")
+      ->check(CLI::PositiveNumber);
+  track->add_option("-o,--output", options->output, "Track CSV to write")->required();
+  track->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,55 @@
+#pragma once
+#include <memory>
+#include <optional>
+
+#include "rim_fit.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+#include "trochoid/tracking/outline_fit.hpp"
+
+namespace trochoid::tracking {
+
+/// One body in one frame.
+struct Sighting {
+  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
+  Ellipse rim;                          ///< about what it covers in the picture
+  std::optional<PoseMeasurement> pose;  ///< with known body and camera
+  std::optional<double> turned_rad;  ///< of the face since the seed frame, image angle, unwrapped
+  double turned_sigma_rad = 0.0;
+  double rms_px = 0.0;
+  double accepted = 0.0;  ///< share of the outline with an edge
+  std::vector<EdgePoint> edges;
+};
+
+/// Picture evidence and what is expected, for one attempt.
+struct Look {
+  const Frame& frame;
+  const cv::Mat& background;  ///< of the frame's brightness near the body
+  double noise_levels = 1.0;
+  std::optional<Detection> detection{};
+  const Sighting* predicted = nullptr;
+  double reach_px = 4.0;        ///< how far off the prediction may be
+  double shape_sigma_px = 1.0;  ///< how well the predicted rim's shape is known
+  Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< per frame
+};
+
+/// Measures one body where it is expected. Stateless: used from several threads.
+class BodyFinder {
+ public:
+  virtual ~BodyFinder() = default;
+  /// Nothing if the picture does not show the body there.
+  [[nodiscard]] virtual std::optional<Sighting> find(const Look& look) const = 0;
+};
+
+/// By its rim alone: an ellipse in the picture. For want of a camera or a body.
+/// @param circle the rim is known to appear as a circle (lying flat under an overhead camera).
+[[nodiscard]] std::unique_ptr<BodyFinder> make_rim_finder(bool circle);
+
+/// By the outline of the known cylinder under the known camera.
+/// @param exposure_fraction shutter time over frame interval, 0 if unknown.
+[[nodiscard]] std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,
+                                                               const data::Support& support,
+                                                               const data::Camera& camera,
+                                                               double exposure_fraction);
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,151 @@
+#include "body_search.hpp"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "silhouette.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+struct Candidate {
+  std::size_t held_index;
+  Detection detection;
+  double score = 0.0;
+};
+
+/// 1 for a filled ellipse clear of the border; a hand, a merged pair or a shadowed body less.
+double likeness(const Silhouette& body) {
+  const Detection& d = body.detection;
+  const double flatness = d.semi_minor_px / d.semi_major_px;
+  double score = body.solidity * std::min(1.0, 4.0 * flatness);
+  if (d.touches_border) score *= 0.3;
+  if (d.semi_minor_px < 3.0) score *= 0.3;
+  return score;
+}
+
+std::vector<Candidate> collect(const std::vector<Frame>& held, const Background& background,
+                               const std::vector<Follower::Others>& explained) {
+  std::vector<Candidate> candidates;
+  cv::Mat plate;
+  const std::size_t looks = std::min<std::size_t>(24, held.size());
+  for (std::size_t k = 0; k < looks; ++k) {
+    const std::size_t index = (2 * k + 1) * held.size() / (2 * looks);
+    const cv::Mat& luma = held[index].luma;
+    background.scaled_into(plate, background.gain(luma), cv::Rect({}, luma.size()));
+    for (const Silhouette& body : find_silhouettes(luma, plate, background.noise_levels())) {
+      const Detection& d = body.detection;
+      const auto& taken = explained[index];
+      // Also when the region covers the other body and more: two in contact look like one.
+      const Ellipse cover =
+          Ellipse::from_axes(d.centre_px, d.semi_major_px, d.semi_minor_px, d.angle_rad);
+      const Eigen::Matrix2d to_unit = cover.shape_px.inverse();
+      if (std::any_of(taken.begin(), taken.end(), [&](const auto& other) {
+            const Eigen::Vector2d off = other.first - d.centre_px;
+            return off.norm() < 1.1 * other.second || (to_unit * off).norm() < 1.0;
+          }))
+        continue;
+      candidates.push_back({index, d, likeness(body)});
+    }
+  }
+  return candidates;
+}
+
+/// A body keeps its size, clutter does not: candidates far from the usual size lose. Small specks
+/// are many, so the usual size is the median weighted by area.
+void weigh_by_size(std::vector<Candidate>& candidates, std::size_t frames) {
+  std::vector<std::pair<double, double>> sizes;  // semi-major axis, area x likeness
+  double total = 0.0;
+  for (const Candidate& c : candidates) {
+    const double weight = c.detection.area_px2 * c.score;
+    sizes.emplace_back(c.detection.semi_major_px, weight);
+    total += weight;
+  }
+  std::sort(sizes.begin(), sizes.end());
+  double seen = 0.0, usual = 1.0;
+  for (const auto& [size, weight] : sizes) {
+    usual = size;
+    if ((seen += weight) > 0.5 * total) break;
+  }
+  for (Candidate& c : candidates) {
+    const double ratio = std::log(c.detection.semi_major_px / usual);
+    c.score *= std::exp(-ratio * ratio);
+    // Near the middle of the held frames following can go both ways at once.
+    const double middle = static_cast<double>(c.held_index) / static_cast<double>(frames) - 0.5;
+    c.score *= 1.0 - 0.2 * std::abs(middle);
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+}
+
+}  // namespace
+
+std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& background,
+                              const BodyFinder& finder,
+                              const std::vector<Follower::Others>& explained) {
+  std::vector<Candidate> candidates = collect(held, background, explained);
+  weigh_by_size(candidates, held.size());
+  std::optional<Seed> best;
+  double best_value = 0.0;
+  cv::Mat plate;
+  int tries = 0;
+  for (const Candidate& c : candidates) {
+    if (++tries > 16) break;
+    const Frame& frame = held[c.held_index];
+    background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+    Look look{.frame = frame, .background = plate, .noise_levels = background.noise_levels()};
+    look.detection = c.detection;
+    const auto seen = finder.find(look);
+    if (!seen || seen->accepted < 0.4) continue;
+    const double value = seen->accepted * c.score;
+    if (value > best_value) {
+      best_value = value;
+      best = Seed{c.held_index, *seen};
+    }
+    if (seen->accepted > 0.8 && c.score > 0.5) break;
+  }
+  return best;
+}
+
+std::optional<Seed> find_seed_at(const std::vector<Frame>& held, const Background& background,
+                                 const BodyFinder& finder, const Eigen::Vector2d& at_px) {
+  const Frame& frame = held.front();
+  Look look{
+      .frame = frame, .background = background.plate(), .noise_levels = background.noise_levels()};
+  std::vector<Detection> guesses;
+  for (const Silhouette& body : find_silhouettes(frame.luma, background.plate(), look.noise_levels))
+    if (body.detection.box.contains(
+            cv::Point(static_cast<int>(at_px.x()), static_cast<int>(at_px.y()))))
+      guesses.push_back(body.detection);
+  const double largest = 0.5 * std::min(frame.luma.rows, frame.luma.cols);
+  for (double radius = 6.0; radius < largest; radius *= 1.3) {
+    Detection circle;
+    circle.centre_px = at_px;
+    circle.semi_major_px = circle.semi_minor_px = radius;
+    const int side = static_cast<int>(2 * radius);
+    circle.box = cv::Rect(static_cast<int>(at_px.x() - radius),
+                          static_cast<int>(at_px.y() - radius), side, side);
+    circle.area_px2 = std::numbers::pi * radius * radius;
+    guesses.push_back(circle);
+  }
+  std::optional<Seed> best;
+  double best_value = 0.0;
+  for (const Detection& guess : guesses) {
+    look.detection = guess;
+    const auto seen = finder.find(look);
+    if (!seen) continue;
+    const bool holds_point =
+        (seen->rim.shape_px.inverse() * (at_px - seen->centre_px)).norm() < 1.1;
+    const double value = seen->accepted / (0.5 + seen->rms_px);
+    if (holds_point && seen->accepted > 0.4 && value > best_value) {
+      best_value = value;
+      best = Seed{0, *seen};
+    }
+  }
+  return best;
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,31 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "background.hpp"
+#include "body_finder.hpp"
+#include "follower.hpp"
+
+namespace trochoid::tracking {
+
+/// Where a body may be followed from.
+struct Seed {
+  std::size_t held_index = 0;  ///< of the frame among the held ones
+  Sighting seen;
+};
+
+/// Looks for a moving body in frames spread over `held`: regions the background does not explain,
+/// most body-like first (compact, of the usual size, clear of the border), until one measures well.
+/// @param explained for each held frame, places of bodies already followed.
+[[nodiscard]] std::optional<Seed> find_seed(const std::vector<Frame>& held,
+                                            const Background& background, const BodyFinder& finder,
+                                            const std::vector<Follower::Others>& explained);
+
+/// The body at a point of the first held frame, given by the user: the region there, or the circle
+/// of any size that fits best.
+[[nodiscard]] std::optional<Seed> find_seed_at(const std::vector<Frame>& held,
+                                               const Background& background,
+                                               const BodyFinder& finder,
+                                               const Eigen::Vector2d& at_px);
+
+}  // namespace trochoid::tracking

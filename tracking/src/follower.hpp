@@ -1,0 +1,63 @@
+#pragma once
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "background.hpp"
+#include "body_finder.hpp"
+#include "spin_profile.hpp"
+
+namespace trochoid::tracking {
+
+/// Follows one body from frame to frame, in either direction of time: predicts, measures, and when
+/// the prediction fails looks about with the background's help. What it cannot measure it leaves
+/// out; it never answers with the prediction.
+class Follower {
+ public:
+  /// Places other bodies are known to be in a frame (centre and radius), not to be taken for ours.
+  using Others = std::vector<std::pair<Eigen::Vector2d, double>>;
+
+  Follower(const BodyFinder& finder, const Background& background,
+           std::shared_ptr<const SpinProfile> marks);
+
+  /// Starts from a measured sighting.
+  void start(const Frame& frame, const Sighting& seen);
+  /// The body in the next frame (earlier or later than the last), if it is seen there.
+  [[nodiscard]] std::optional<Sighting> follow(const Frame& frame, const Others& others = {});
+  [[nodiscard]] int frames_lost() const { return lost_; }
+
+ private:
+  struct Moment {
+    double t_s;
+    Sighting seen;
+  };
+  [[nodiscard]] Sighting predict(double t_s) const;
+  [[nodiscard]] std::optional<Sighting> look_near(const Frame& frame, const Sighting& predicted,
+                                                  const Others& others);
+  [[nodiscard]] std::optional<Sighting> look_at(const Frame& frame, const Sighting& expected,
+                                                double reach_px);
+  [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
+                                                   const Others& others);
+  [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
+                               double reach_px) const;
+  void set_shape_knowledge(Look& look, Sighting& guess) const;
+  void read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const;
+  void accept(const Frame& frame, const Sighting& seen, const Sighting& predicted);
+
+  const BodyFinder& finder_;
+  const Background& background_;
+  std::shared_ptr<const SpinProfile> marks_;
+  std::deque<Moment> past_;  ///< newest last, at most three
+  cv::Mat plate_;            ///< background at the brightness of the frame, valid near the body
+  double gain_ = 1.0;
+  double frame_s_ = 0.0;      ///< typical time between frames
+  double surprise_px_ = 1.0;  ///< running size of prediction error of the centre
+  double shape_surprise_px_ = 0.3;
+  Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();  ///< running mean of whole sightings
+  double shape_scatter_px_ = 1.0;                            ///< running deviation from it
+  double usual_major_px_ = 0.0;
+  double usual_accepted_ = 0.0;
+  int lost_ = 0;
+};
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,102 @@
+#include "track_assembly.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Keeps an angle continuous: of all angle + k period the one nearest to where the last two lead.
+class Unwrapper {
+ public:
+  explicit Unwrapper(double period) : period_(period) {}
+
+  double operator()(double angle, double t_s) {
+    if (count_ > 0) {
+      const double expected = last_ + (count_ > 1 ? rate_ * (t_s - last_t_) : 0.0);
+      angle += period_ * std::round((expected - angle) / period_);
+      if (t_s > last_t_) rate_ = (angle - last_) / (t_s - last_t_);
+    }
+    last_ = angle;
+    last_t_ = t_s;
+    ++count_;
+    return angle;
+  }
+
+ private:
+  double period_, last_ = 0.0, last_t_ = 0.0, rate_ = 0.0;
+  int count_ = 0;
+};
+
+double quality_of(const Sighting& seen) {
+  const double spread = seen.rms_px / (0.3 + 0.02 * seen.rim.semi_minor_px());
+  return std::clamp(1.2 * seen.accepted / (1.0 + 0.25 * spread * spread), 0.0, 1.0);
+}
+
+void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
+  if (!rule.camera) return;
+  const Eigen::Vector3d p = rule.camera->table_from_image(seen.centre_px, rule.height_m);
+  const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
+  const Eigen::Matrix2d m_per_px = px_per_m.inverse();
+  sample.centre_m = p.head<2>();
+  sample.covariance_m2 = m_per_px * seen.covariance_px2 * m_per_px.transpose();
+}
+
+void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold) {
+  double theta = pose.pose.theta_rad, phi = pose.pose.phi_rad, psi = pose.pose.psi_rad;
+  if (fold && theta > 0.5 * kPi) theta = kPi - theta, phi += kPi, psi = -psi;
+  if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {theta, pose.sigma_theta_rad};
+  if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {phi, pose.sigma_phi_rad};
+  if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
+}
+
+}  // namespace
+
+double usual_radius_px(const BodyPath& path) {
+  std::vector<double> sizes;
+  for (const auto& [index, at] : path.frames)
+    if (at.seen.accepted > 0.7) sizes.push_back(at.seen.rim.semi_major_px());
+  if (sizes.empty())
+    for (const auto& [index, at] : path.frames) sizes.push_back(at.seen.rim.semi_major_px());
+  if (sizes.empty()) return 0.0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
+data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule, bool fold,
+                           double readout_s, int height_px) {
+  data::Track track{.object = object, .samples = {}};
+  Unwrapper phi(2.0 * kPi);
+  Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
+  for (const auto& [index, at] : path.frames) {
+    const Sighting& seen = at.seen;
+    data::TrackSample sample;
+    sample.frame = index;
+    sample.t_s =
+        at.t_s + readout_s * std::clamp(seen.centre_px.y() / std::max(1, height_px - 1), 0.0, 1.0);
+    sample.centre_px = seen.centre_px;
+    sample.quality = quality_of(seen);
+    if (seen.pose) {
+      sample.centre_m = seen.pose->pose.centre_m.head<2>();
+      sample.covariance_m2 = seen.pose->covariance_m2;
+      angles_from_pose(sample, *seen.pose, fold);
+    } else {
+      metres_from_rim(sample, seen, rule);
+      // The image's y points down, the table's up: turning right on the screen is a negative spin.
+      if (path.marks && seen.turned_rad)
+        sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),
+                      seen.turned_sigma_rad};
+    }
+    if (sample.phi) sample.phi->value_rad = phi(sample.phi->value_rad, sample.t_s);
+    if (sample.psi) sample.psi->value_rad = psi(sample.psi->value_rad, sample.t_s);
+    track.samples.push_back(std::move(sample));
+  }
+  return track;
+}
+
+}  // namespace trochoid::tracking

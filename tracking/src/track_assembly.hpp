@@ -1,0 +1,41 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "body_finder.hpp"
+#include "spin_profile.hpp"
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+
+namespace trochoid::tracking {
+
+/// All sightings of one body, by frame index.
+struct BodyPath {
+  struct At {
+    double t_s = 0.0;
+    Sighting seen;
+  };
+  using Frames = std::map<std::int64_t, At>;
+  Frames frames;
+  std::shared_ptr<const SpinProfile> marks;
+};
+
+/// How pixels become metres in a track measured by rims alone.
+struct MetreRule {
+  std::optional<data::Camera> camera;  ///< of the floor plane
+  double height_m = 0.0;               ///< of the measured rim above the floor
+};
+
+/// Track samples of a path: metres and their covariance, unwrapped and (for faces that look alike)
+/// folded angles, rolling-shutter times.
+/// @param readout_s time from the first to the last row.
+[[nodiscard]] data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+                                         bool fold, double readout_s, int height_px);
+
+/// Median of the rim's semi-major axis over the path [px]: what the known radius is compared with.
+[[nodiscard]] double usual_radius_px(const BodyPath& path);
+
+}  // namespace trochoid::tracking
