@@ -3,7 +3,15 @@
 
 namespace trochoid::model {
 
-/// By Taylor series, with the copy of the kernel made for the widest vectors of this machine.
+/// Instruction sets there is a copy of the kernel for.
+enum class InstructionSet { baseline, avx2, avx512 };
+[[nodiscard]] bool available(InstructionSet set);
+/// The widest this machine has.
+[[nodiscard]] InstructionSet widest();
+
+/// By Taylor series, with the copy made for `set`, which must be available.
+void run_top_on(InstructionSet set, const TopRun& run, TopResult& result);
+/// The same with the widest.
 void run_top_here(const TopRun& run, TopResult& result);
 
 /// By DOP853, values only.

@@ -1,0 +1,3 @@
+// Inner loops for machines with AVX-512; compiled with those flags, see model/CMakeLists.txt.
+#define TROCHOID_ISA isa_avx512
+#include "top_kernel_run.hpp"
