@@ -1,0 +1,154 @@
+#include "trochoid/tracking/outline_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "outline_refine.hpp"
+#include "pose_start.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+// Coarse to fine, the first two on blurred pictures: a wide edge is seen from far and through
+// noise, a sharp one is precise.
+constexpr double kFarBlurPx = 2.5, kNearBlurPx = 1.0;
+constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, false, false, 4};
+constexpr Search kNear{1.3, 4.5, 3.5, 2.0, 4, false, true, 3};
+Search exact(double blur_px) {
+  return {blur_px, 2.0 + 2.5 * blur_px, 0.5 + 2.0 * blur_px, 1.25, 5, true, true, 1};
+}
+
+cv::Rect window_of(const data::Body& body, const data::Camera& camera, const data::Pose<>& pose,
+                   double margin_px) {
+  const double reach_m = std::hypot(body.radius_m, body.half_thickness_m());
+  const Eigen::Vector2d centre = camera.image_from_table<double>(pose.centre_m);
+  const double reach_px = reach_m * camera.jacobian_px_per_m(pose.centre_m).norm() + margin_px;
+  const auto floor = [](double v) {
+    return static_cast<int>(std::floor(std::clamp(v, -1e6, 1e6)));
+  };
+  return {floor(centre.x() - reach_px), floor(centre.y() - reach_px), floor(2.0 * reach_px) + 2,
+          floor(2.0 * reach_px) + 2};
+}
+
+struct Fitted {
+  Refined refined;
+  double blur_px = kUsualBlurPx;
+};
+
+std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start, bool far) {
+  std::optional<Refined> refined;
+  data::Pose<> pose = start;
+  if (far) {
+    refined = refine(scenery.blurred(kFarBlurPx), pose, kFar);
+    if (!refined) return std::nullopt;
+    pose = refined->pose;
+  }
+  refined = refine(scenery.blurred(kNearBlurPx), pose, kNear);
+  if (!refined) return std::nullopt;
+  Fitted out;
+  out.blur_px = estimate_blur_px(scenery, *refined);
+  refined = refine(scenery, refined->pose, exact(out.blur_px));
+  if (!refined) return std::nullopt;
+  out.refined = std::move(*refined);
+  return out;
+}
+
+bool believable(const Fitted& fitted) {
+  constexpr double kLeastCovered = 0.35;
+  return fitted.refined.covered >= kLeastCovered && fitted.refined.solution.covariance.allFinite();
+}
+
+PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
+  const Refined& r = fitted.refined;
+  PoseMeasurement m;
+  m.pose = r.pose;
+  m.centre_px = scenery.camera.image_from_table<double>(r.pose.centre_m);
+  const auto velocities = scenery.motion.velocities(r.pose);
+  const Eigen::MatrixXd centre = velocities.topRows<3>();
+  const Eigen::Matrix3d covariance = centre * r.solution.covariance * centre.transpose();
+  const Eigen::Matrix<double, 2, 3> J = scenery.camera.jacobian_px_per_m(r.pose.centre_m);
+  m.covariance_m2 = covariance.topLeftCorner<2, 2>();
+  m.covariance_px2 = J * covariance * J.transpose();
+  m.sigma_theta_rad = m.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  const int rotation = scenery.motion.rotation();
+  if (rotation >= 0) {
+    m.sigma_theta_rad = std::sqrt(r.solution.covariance(rotation, rotation));
+    const double sine = std::sin(r.pose.theta_rad);
+    const double across = std::sqrt(r.solution.covariance(rotation + 1, rotation + 1));
+    constexpr double kLeastSine = 1e-6;
+    // Beyond a radian the direction of the tilt is simply not seen.
+    if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
+  }
+  m.rms_px = r.solution.rms_px;
+  m.accepted = r.covered;
+  for (size_t i = 0; i < r.equations.size(); ++i) {
+    const EdgeEquation& e = r.equations[i];
+    if (e.weight < 0.5) continue;
+    m.edges.push_back({r.samples[i].image_px + e.offset_px * r.samples[i].normal_px,
+                       r.samples[i].normal_px, std::sqrt(e.variance_px2), e.residual_px});
+  }
+  return m;
+}
+
+// Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
+void fold(data::Pose<>& pose) {
+  if (pose.theta_rad <= 0.5 * std::numbers::pi) return;
+  pose.theta_rad = std::numbers::pi - pose.theta_rad;
+  pose.phi_rad = std::remainder(pose.phi_rad + std::numbers::pi, 2.0 * std::numbers::pi);
+}
+
+}  // namespace
+
+OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camera camera)
+    : body_(std::move(body)), support_(std::move(support)), camera_(std::move(camera)) {
+  if (!(body_.radius_m > 0.0))
+    throw InputError(fmt::format(
+        "body: radius_m = {} gives no outline to look for; give the radius of the rim in metres",
+        body_.radius_m));
+  if (support_.kind == data::SupportKind::pivot && !support_.pivot_m)
+    throw InputError("support: kind = \"pivot\" needs pivot_m = [x, y, z] in metres");
+}
+
+std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evidence) const {
+  const PoseMotion motion(body_, support_, camera_);
+  const bool alike = body_.faces_look_alike() && support_.kind != data::SupportKind::pivot;
+  const std::vector<data::Pose<>> starts =
+      evidence.predicted ? std::vector{motion.settled(*evidence.predicted)}
+      : evidence.detection
+          ? starts_from_detection(body_, support_, camera_, motion, *evidence.detection)
+          : std::vector<data::Pose<>>{};
+  if (starts.empty()) return std::nullopt;
+  const double margin_px = evidence.predicted ? 12.0 : 24.0;
+  cv::Rect window = window_of(body_, camera_, starts.front(), margin_px);
+  for (const auto& start : starts) window |= window_of(body_, camera_, start, margin_px);
+  const Scenery scenery{
+      body_,
+      camera_,
+      motion,
+      LightWindow(evidence.luma, window),
+      evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
+      evidence.smear_px};
+  if (scenery.picture.empty()) return std::nullopt;
+  std::optional<Fitted> best;
+  double best_score = 0.0;
+  for (const auto& start : starts) {
+    auto fitted = fit_from(scenery, start, !evidence.predicted);
+    if (!fitted || !believable(*fitted)) continue;
+    const double score = starts.size() == 1
+                             ? 1.0
+                             : outline_score(scenery, fitted->refined.pose, fitted->blur_px, false);
+    if (!best || score > best_score) best = std::move(fitted), best_score = score;
+  }
+  if (!best) return std::nullopt;
+  PoseMeasurement m = measurement_of(scenery, *best);
+  if (alike) fold(m.pose);
+  return m;
+}
+
+}  // namespace trochoid::tracking

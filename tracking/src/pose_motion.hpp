@@ -1,0 +1,48 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "trochoid/data/body.hpp"
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/pose.hpp"
+#include "trochoid/data/scene.hpp"
+
+namespace trochoid::tracking {
+
+/// The ways a body can move under its support, as small motions about a pose: translations of the
+/// table frame [m], rotations about the node line and about the direction of steepest ascent [rad]
+/// (regular at theta = 0, where phi is not), and the distance along the axis from a pivot [m].
+class PoseMotion {
+ public:
+  static constexpr int kMost = 5;
+  using Step = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
+  /// Per unit of each parameter: velocity of the centre (rows 0-2), rotation vector (rows 3-5).
+  using Velocities = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMost>;
+
+  PoseMotion(const data::Body& body, const data::Support& support, const data::Camera& camera);
+
+  [[nodiscard]] int count() const { return count_; }
+  /// Index of the rotation about the node line; the one about e2 follows. -1: the attitude is
+  /// fixed.
+  [[nodiscard]] int rotation() const { return rotation_; }
+  /// Standard deviation [m or rad] of what a parameter could be at most; keeps the fit regular
+  /// where the picture says nothing.
+  [[nodiscard]] double scale(int parameter) const;
+  [[nodiscard]] Velocities velocities(const data::Pose<>& pose) const;
+  [[nodiscard]] data::Pose<> moved(const data::Pose<>& pose, const Step& step) const;
+  /// Puts a pose where the support wants it: height on the floor, flat, axis through the pivot.
+  [[nodiscard]] data::Pose<> settled(data::Pose<> pose) const;
+
+ private:
+  double radius_m_, half_thickness_m_;
+  data::Support support_;
+  int count_ = 0, rotation_ = -1;
+  bool depth_free_ = false;
+};
+
+/// e2 of the node frame: steepest ascent in the plane of the disc.
+[[nodiscard]] Eigen::Vector3d ascent(const data::Pose<>& pose);
+[[nodiscard]] Eigen::Vector3d node_line(const data::Pose<>& pose);
+/// theta and phi of a direction; phi is kept where the axis is vertical.
+void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose);
+
+}  // namespace trochoid::tracking

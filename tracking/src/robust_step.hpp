@@ -1,0 +1,36 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "pose_motion.hpp"
+
+namespace trochoid::tracking {
+
+/// One measured edge for the linear fit: observed offset along the normal and how it depends on the
+/// pose. `swell` multiplies a nuisance common to the whole outline (+1 on outer rims, -1 on bores).
+struct EdgeEquation {
+  PoseMotion::Step motion;
+  double swell = 1.0;
+  double offset_px = 0.0;
+  double variance_px2 = 1.0;
+  double arc_px = 1.0;
+  int curve = 0;             ///< equations of one curve follow each other along it
+  double weight = 0.0;       ///< out: 0..1, how much the fit trusts it
+  double residual_px = 0.0;  ///< out
+};
+
+struct RobustSolution {
+  PoseMotion::Step step;
+  Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
+  double swell_px = 0.0;
+  double rms_px = 0.0;
+  double accepted = 0.0;     ///< share of the arc with weight above one half
+  double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
+};
+
+/// Tukey-weighted least squares of  offset = motion . step + swell * c  with weak priors:
+/// `prior_sd` per parameter and kSwellSdPx on c. False if fewer than 8 equations.
+bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+                    double least_scale_px, RobustSolution& out);
+
+}  // namespace trochoid::tracking
