@@ -48,8 +48,12 @@ struct TrackColumns {
         y_px(csv.index_of("y_px")),
         quality(csv.index_of("quality")),
         object(csv.index_of("object")) {
-    for (std::size_t i = 0; i < kAngles.size(); ++i)
-      angles[i] = {csv.index_of(kAngles[i].value), csv.index_of(kAngles[i].sigma)};
+    for (std::size_t i = 0; i < kAngles.size(); ++i) {
+      const int sigma = csv.index_of(kAngles[i].sigma);
+      // An angle of unknown weight (a trajectory of simulate, another tool's export) is passed
+      // over.
+      angles[i] = {sigma < 0 ? -1 : csv.index_of(kAngles[i].value), sigma};
+    }
   }
   [[nodiscard]] bool sufficient() const {
     return t >= 0 && ((x >= 0 && y >= 0) || (x_px >= 0 && y_px >= 0));

@@ -124,6 +124,13 @@ TEST(TrackFile, OfAnotherToolNeedsOnlyTimeAndPlace) {
   EXPECT_FALSE(sample.has_covariance());
 }
 
+TEST(TrackFile, PassesOverAnglesWhoseFileHasNoSigmas) {
+  const TestFolder folder;
+  const TrackFile read =
+      read_track(folder.write("trajectory.csv", "t_s,theta_rad,x_m,y_m\n0,0.5,0.1,0.2\n"));
+  EXPECT_FALSE(read.tracks.at(0).samples.at(0).theta);
+}
+
 TEST(TrackFile, InPixelsOnlyHasNoMetres) {
   const TestFolder folder;
   const TrackFile read =
@@ -211,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
                 ":2:", "no covariance"},
         Refusal{"TooCorrelated", "t_s,x_m,y_m,sxx_m2,sxy_m2,syy_m2\n0,1,2,1,1.5,1\n",
                 ":2:", "no covariance"},
-        Refusal{"AngleWithoutSigma", "t_s,x_m,y_m,theta_rad\n0,1,2,0.5\n",
+        Refusal{"AngleWithoutSigma", "t_s,x_m,y_m,theta_rad,sigma_theta_rad\n0,1,2,0.5,\n",
                 ":2:", "sigma_theta_rad"},
         Refusal{"NegativeSigma", "t_s,x_m,y_m,phi_rad,sigma_phi_rad\n0,1,2,0.5,-1\n",
                 ":2:", "sigma_phi_rad = -1"},
