@@ -31,6 +31,7 @@ int run(int argc, char** argv) {
   add_simulate_command(app);
   add_fit_command(app);
   add_study_command(app);
+  add_report_command(app);
 #ifdef TROCHOID_HAS_TRACKING
   add_track_command(app);
   add_overlay_command(app);

@@ -1,0 +1,66 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "report.hpp"
+#include "run_folder.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+struct Options {
+  std::string folder, track, fit, output, path_svg;
+  bool json = false;
+};
+
+ReportInput inputs(const Options& options) {
+  if (options.folder.empty() == options.track.empty())
+    throw InputError("report: give either the folder of a run or --track (with --fit)");
+  if (!options.folder.empty()) return read_run_folder(options.folder);
+  ReportInput input;
+  input.tracks = data::read_track(options.track);
+  input.title = input.tracks.source.empty() ? options.track : input.tracks.source;
+  input.checksums[std::filesystem::path(options.track).filename().string()] =
+      data::sha256_of_file(options.track);
+  if (!options.fit.empty()) {
+    input.fit = data::read_fit(options.fit);
+    input.scene = scene_of_fit(*input.fit, options.fit);
+  }
+  return input;
+}
+
+void run(const Options& options) {
+  const ReportInput input = inputs(options);
+  const std::string html = make_report(input);
+  data::write_text(html, options.output);
+  if (!options.path_svg.empty()) data::write_text(make_path_svg(input), options.path_svg);
+  if (options.json)
+    fmt::print("{}\n", nlohmann::json{{"report", options.output}, {"bytes", html.size()}}.dump(2));
+  else
+    note("wrote " + options.output);
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "report", "Write one HTML page that shows a run and opens without a network");
+  command->add_option("folder", options->folder, "Folder a run has made");
+  command->add_option("--track", options->track, "Track CSV, instead of a folder");
+  command->add_option("--fit", options->fit, "Fit JSON made from that track");
+  command->add_option("-o,--output", options->output, "Page to write, .html")->required();
+  command->add_option("--path-svg", options->path_svg,
+                      "Also write the path as a picture for papers");
+  command->add_flag("--json", options->json, "Print a summary as JSON");
+  command->footer("Example:\n  trochoid report ring.trochoid/ -o report.html");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,113 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report_parts.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+constexpr double kVisiblePattern =
+    0.01;                         // p-value of whiteness below which residuals hold a pattern
+constexpr double kTooWide = 1.5;  // residuals this many times the track's sigma need a reason
+
+std::string length_words(double length_m) {
+  if (length_m >= 1e-3) return fmt::format("{:.3g} mm", length_m * 1e3);
+  return fmt::format("{:.3g} µm", length_m * 1e6);
+}
+
+std::string tracked_words(const ReportFacts& facts) {
+  const std::size_t bodies = facts.input.tracks.tracks.size();
+  return fmt::format("{} of {} positions over {:.3g} s",
+                     bodies == 1 ? "The path" : fmt::format("{} paths", bodies), facts.samples,
+                     facts.last_s - facts.first_s);
+}
+
+// Does the model describe the points, and is the scatter what the tracker expects?
+Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
+  Verdict verdict;
+  const std::string scatter =
+      fmt::format("{} rms per axis{}", length_words(facts.rms_axis_m),
+                  std::isfinite(facts.rms_axis_sigma)
+                      ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
+                      : "");
+  const bool pattern = fit.whiteness_p < kVisiblePattern;
+  const bool wide = facts.rms_axis_sigma > kTooWide;
+  if (!fit.converged) {
+    verdict = {
+        "bad",
+        "not trustworthy",
+        fmt::format(
+            "The model “{}” was tried and the fit did not settle: {}. Do not use its numbers.",
+            fit.model, fit.reason),
+        {}};
+  } else if (!pattern && !wide) {
+    verdict = {"good",
+               "explained",
+               fmt::format("{}: the model “{}” passes through them with {}, and what is left shows "
+                           "no pattern (p = {:.2g}).",
+                           tracked_words(facts), fit.model, scatter, fit.whiteness_p),
+               {}};
+  } else {
+    verdict = {"fair",
+               "use with care",
+               fmt::format("{}: the model “{}” follows them to {}, but {}.", tracked_words(facts),
+                           fit.model, scatter,
+                           pattern ? "the residuals hang together, so the model or the camera "
+                                     "misses something; the error bars allow for it"
+                                   : "that is more than the tracker expects"),
+               {}};
+  }
+  return verdict;
+}
+
+}  // namespace
+
+std::string value_words(double value, double sigma) {
+  if (!std::isfinite(value)) return "—";
+  if (!(sigma > 0.0) || !std::isfinite(sigma)) return short_number(value);
+  const int exponent =
+      static_cast<int>(std::floor(std::log10(sigma))) - 1;  // of the last digit shown
+  const double largest = std::max(std::abs(value), sigma);
+  if (largest >= 1e5 || largest < 1e-3) {
+    const int power = static_cast<int>(std::floor(std::log10(largest)));
+    const double unit = std::pow(10.0, power);
+    const int decimals = std::clamp(power - exponent, 0, 12);
+    return fmt::format("({:.{}f} ± {:.{}f}) × 10^{}", value / unit, decimals, sigma / unit,
+                       decimals, power);
+  }
+  const int decimals = std::clamp(-exponent, 0, 12);
+  return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, sigma, decimals);
+}
+
+std::string short_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.5g}", value) : "—";
+}
+
+Verdict judge(const ReportFacts& facts) {
+  Verdict verdict;
+  if (facts.input.fit) {
+    verdict = judge_fit(facts, *facts.input.fit);
+    verdict.remarks = facts.input.fit->warnings;
+    for (const PredictedArc& arc : facts.prediction.arcs)
+      if (!arc.ended.empty())
+        verdict.remarks.push_back("the predicted motion ends before the track does: " + arc.ended);
+  } else {
+    verdict = {
+        "none",
+        "tracked only",
+        fmt::format("{}; no model was fitted{}.", tracked_words(facts),
+                    facts.input.no_fit_reason.empty() ? "" : ": " + facts.input.no_fit_reason),
+        {}};
+  }
+  if (!facts.metres)
+    verdict.remarks.push_back(
+        "positions are in pixels: a camera file, a scale or the body's radius would give metres");
+  if (facts.missing > 0)
+    verdict.remarks.push_back(fmt::format("{} frames in {} gap{} are without a detection",
+                                          facts.missing, facts.gaps, facts.gaps == 1 ? "" : "s"));
+  return verdict;
+}
+
+}  // namespace trochoid::tools
