@@ -20,6 +20,8 @@ std::unique_ptr<Predictor> make_pivot(const data::Scene& scene);
 Trajectory simulate_free(const data::Scene& scene);
 Trajectory simulate_top(const data::Scene& scene);
 Trajectory simulate_top_euler(const data::Scene& scene);
+/// @param law  rolling, smooth or sliding.
+Trajectory simulate_rim(const data::Scene& scene, const std::string& law);
 Trajectory simulate_puck(const data::Scene& scene);
 Trajectory simulate_pivot(const data::Scene& scene);
 

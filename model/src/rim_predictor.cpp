@@ -259,6 +259,9 @@ void RimPredictor::fill_cyclic(const Call& call, Prediction& out) const {
   }
 }
 
+/// Enough for minutes of motion; a regularised law too stiff for the explicit method ends here.
+constexpr int kMostSteps = 300000;
+
 unsigned components_of(const PredictRequest& request) {
   constexpr int kState[] = {Rim::phi, Rim::theta, Rim::psi, Rim::x, Rim::y};
   unsigned mask = 1u << Rim::x | 1u << Rim::y;  // the derivative by phi needs both
@@ -274,6 +277,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   call.options.tolerance = request.tolerance;
   call.options.end_s = call.t_s.empty() ? 0.0 : call.t_s.back();
   call.options.impact_at_rim = impact_;
+  call.options.max_steps = kMostSteps;
   call.options.components = components_of(request);
 
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

@@ -21,6 +21,7 @@ struct RimRunOptions {
   bool impact_at_rim = false;  ///< go on at theta = pi/2 with the impact map instead of ending
   unsigned components = ~0u;   ///< state components the sink reads
   int max_steps = 2000000;
+  double stick_factor = 1.0;  ///< scales the threshold of sticking, to see its influence
 };
 
 /// How a run went; `y` is the state at `end_s`, of `regime` (rolling: the last two are 0).
@@ -99,15 +100,15 @@ class RimRun {
         options_(options),
         t_s_(t_s) {
     if constexpr (kCoulomb) {
-      if (friction.eps_v == 0.0) slide_.stick_speed_m_s = stick_speed_m_s(body);
+      if (friction.eps_v == 0.0)
+        slide_.stick_speed_m_s = options.stick_factor * stick_speed_m_s(body);
     }
   }
 
   /// @param start  state at t_s = 0; its slip decides between rolling and sliding phases when
   ///               `regime` says sliding under the exact law.
-  /// @param sink   sink(stepper, offset, first, last): see integrate(); times of this phase begin
-  /// at
-  ///               t_s[offset].
+  /// @param sink   sink(stepper, first, last): t_s[first, last) lie in the stepper's last step; its
+  ///               system tells the regime.
   template <class Sink>
   RimRunEnd<S> run(State<S, 10> start, Regime regime, Sink&& sink) {
     end_ = {};

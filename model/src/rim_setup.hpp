@@ -117,4 +117,15 @@ auto with_terms(const data::ModelSettings& model, Visit&& visit) {
   return visit(TermList<>{});
 }
 
+/// Sliding bodies have two compiled lists: no loss but friction, and every loss.
+template <class Visit>
+auto with_few_terms(const data::ModelSettings& model, Visit&& visit) {
+  const LossValues<double> losses = loss_values(model);
+  bool any = false;
+  for (const double value : losses.value) any = any || value > 0.0;
+  if (!any) return visit(TermList<>{});
+  return visit(TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                        PivotingFriction, ContourFriction>{});
+}
+
 }  // namespace trochoid::model

@@ -49,11 +49,14 @@ Trajectory simulate(const data::Scene& scene) {
   if (name == "free") return simulate_free(scene);
   if (name == "top") return simulate_top(scene);
   if (name == "top-euler") return simulate_top_euler(scene);
+  if (name == "rolling" || name == "smooth" || name == "sliding") return simulate_rim(scene, name);
   if (name == "puck") return simulate_puck(scene);
   if (name == "pivot") return simulate_pivot(scene);
-  throw InputError(fmt::format(
-      "model.name = \"{}\" cannot be simulated; models are free, top, top-euler, puck, pivot",
-      name));
+  throw InputError(
+      fmt::format("model.name = \"{}\" cannot be simulated; models are free, top, top-euler, "
+                  "rolling, smooth, sliding, "
+                  "puck, pivot",
+                  name));
 }
 
 }  // namespace trochoid::model

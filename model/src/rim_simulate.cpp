@@ -1,0 +1,352 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "factories.hpp"
+#include "rim_kernel.hpp"
+#include "solve.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/model/inertia.hpp"
+
+// Whole runs of bodies with rim contact as tables: state, contact point, and with a known mass
+// energy and contact force.
+namespace trochoid::model {
+namespace {
+
+struct Columns {
+  bool mass_known = false;
+  bool exact_friction = false;  ///< rolling and sliding phases alternate: say which
+
+  [[nodiscard]] std::vector<std::string> names() const {
+    std::vector<std::string> list = euler_columns();
+    if (!mass_known) list.pop_back();
+    for (const char* name : {"w1_rad_s", "w2_rad_s", "w3_rad_s", "vx_m_s", "vy_m_s"})
+      list.emplace_back(name);
+    if (mass_known)
+      for (const char* name : {"normal_force_N", "force_x_N", "force_y_N"}) list.emplace_back(name);
+    for (const char* name : {"contact_x_m", "contact_y_m", "slip_m_s"}) list.emplace_back(name);
+    if (exact_friction) list.emplace_back("mode");
+    return list;
+  }
+};
+
+template <class S, template <class> class... Terms>
+ContactForce<S> force_of(const Rolling<S, Terms...>& system, const NodeMotion<S>& q) {
+  return system.contact_force(q, system.acceleration(q));
+}
+template <class S, template <class> class Friction, template <class> class... Terms>
+ContactForce<S> force_of(const Sliding<S, Friction, Terms...>& system, const NodeMotion<S>& q) {
+  return system.contact_force(q);
+}
+
+/// One row of the table.
+template <class System>
+std::vector<double> row_of(const Columns& columns, const System& system, double t_s,
+                           const State<double, System::kStates>& y) {
+  const NodeMotion<double> q = system.motion(y);
+  const double dphi = q.w2 / q.at.s;
+  std::vector<double> row{t_s,  y[Rim::phi],           y[Rim::theta], y[Rim::psi], dphi,
+                          q.w1, q.w3 - q.precession_k, y[Rim::x],     y[Rim::y],   q.at.z};
+  if (columns.mass_known) row.push_back(energy_J(system.body, q));
+  const World<double> v = world_from_node(horizontal_velocity(q), y[Rim::phi]);
+  row.insert(row.end(), {q.w1, q.w2, q.w3, v.x, v.y});
+  if (columns.mass_known) {
+    const ContactForce<double> force = force_of(system, q);
+    const World<double> f =
+        world_from_node(Horizontal<double>{force.along_n, force.along_mh}, y[Rim::phi]);
+    row.insert(row.end(), {force.normal, f.x, f.y});
+  }
+  const World<double> arm = world_from_node(Horizontal<double>{0.0, -q.at.slope}, y[Rim::phi]);
+  const bool slides = System::kStates == 10;
+  const Horizontal<double> u = slip_velocity(system.body, q);
+  row.insert(row.end(), {y[Rim::x] + arm.x, y[Rim::y] + arm.y,
+                         slides ? std::hypot(u.along_n, u.along_mh) : 0.0});
+  if (columns.exact_friction) row.push_back(slides ? 1.0 : 0.0);
+  return row;
+}
+
+/// A finished run before it becomes a Trajectory.
+struct RimRecord {
+  std::vector<std::vector<double>> rows;
+  RimRunEnd<double> end;
+};
+
+/// What a scene asks for, ready to run at any tolerance.
+struct RimJob {
+  RimModel model;
+  RimInput<double> input;
+  Columns columns;
+  std::vector<double> t_s;
+  std::string law;
+  bool impact = false;
+  Method method = Method::dop853;
+
+  [[nodiscard]] RimRunOptions options(double tolerance, double stick) const {
+    RimRunOptions options;
+    options.tolerance = tolerance;
+    options.end_s = t_s.back();
+    options.impact_at_rim = impact;
+    options.stick_factor = stick;
+    return options;
+  }
+  [[nodiscard]] double eps_v() const {
+    return law == "sliding" ? model.terms.slip_regularisation_m_s.value_or(0.0) : 0.0;
+  }
+};
+
+template <template <class> class Friction, template <class> class... Terms>
+RimRecord run_phases(const RimJob& job, const Friction<double>& friction, double limit,
+                     Regime regime, const RimRunOptions& options, TermList<Terms...>) {
+  RimRecord record;
+  RimRun<double, Friction, Terms...> run(job.model.body,
+                                         make_losses<Losses<double, Terms...>>(job.input.losses),
+                                         friction, limit, options, job.t_s);
+  record.end = run.run(rim_state(job.model.body, job.input), regime,
+                       [&](auto& stepper, int first, int last) {
+                         for (int n = first; n < last; ++n) {
+                           const double t = job.t_s[static_cast<std::size_t>(n)];
+                           const auto y = stepper.dense_state(stepper.fraction(t));
+                           record.rows.push_back(row_of(job.columns, stepper.system(), t, y));
+                         }
+                       });
+  return record;
+}
+
+/// One phase without change of regime by SUNDIALS, up to its first event.
+template <class System, class DualSystem>
+RimRecord run_sundials(const RimJob& job, const System& system, const DualSystem& duals,
+                       double tolerance) {
+  constexpr int n = System::kStates;
+  RimRecord record;
+  const State<double, 10> start = rim_state(job.model.body, job.input);
+  Eigen::VectorXd y0(n);
+  for (int i = 0; i < n; ++i) y0[i] = start[i];
+  StepControl<n> control = rim_control<n>(job.model.body, job.options(tolerance, 1.0));
+  if constexpr (n == 10) {
+    // Stick lives at slips below eps_v: resolve them whatever the tolerance.
+    constexpr double kOfRegularisation = 1e-4;
+    for (const int c : {Rim::un, Rim::ut})
+      if (job.eps_v() > 0.0)
+        control.atol[c] = std::min(control.atol[c], kOfRegularisation * job.eps_v());
+  }
+  Ode ode = make_ode(duals);
+  ode.events = System::kEvents;
+  ode.event_functions = [&system](double t, const double* y, double* g) {
+    State<double, n> state;
+    State<double, System::kEvents> value;
+    for (int i = 0; i < n; ++i) state[i] = y[i];
+    system.events(t, state, value);
+    for (int i = 0; i < System::kEvents; ++i) g[i] = value[i];
+  };
+  const SundialsRun run = integrate_sundials(
+      ode, 0.0, y0, job.t_s, sundials_options(job.method, control.rtol, control.atol, n));
+  State<double, n> y;
+  for (Eigen::Index row = 0; row < run.states.rows(); ++row) {
+    for (int i = 0; i < n; ++i) y[i] = run.states(row, i);
+    record.rows.push_back(row_of(job.columns, system, job.t_s[static_cast<std::size_t>(row)], y));
+  }
+  record.end.outcome = run.outcome;
+  record.end.end_s = run.end_s;
+  record.end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
+                           static_cast<int>(run.evaluations)};
+  constexpr Outcome kOutcomes[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
+                                   Outcome::inconsistent_contact};
+  if (run.event >= 0 && run.event < 4) {
+    record.end.outcome = kOutcomes[run.event];
+    record.end.events.push_back({run.end_s, std::string(name(record.end.outcome))});
+  }
+  return record;
+}
+
+template <class System>
+void place(const RimJob& job, System& system) {
+  system.body = job.model.body;
+  system.body.side = std::cos(job.input.theta) < 0.0 ? -1.0 : 1.0;
+  using S = typename System::Scalar;
+  LossValues<S> losses{};
+  for (int i = 0; i < kLosses; ++i) losses.value[i] = S(job.input.losses.value[i]);
+  losses.air_ratio = job.input.losses.air_ratio;
+  losses.quadratic_ratio = job.input.losses.quadratic_ratio;
+  losses.eps_w = job.input.losses.eps_w;
+  system.losses = make_losses<typename System::LossList>(losses);
+}
+
+template <template <class> class Friction>
+RimRecord run_sliding_by(const RimJob& job, double tolerance) {
+  using Jacobian = Dual<16>;
+  Sliding<double, Friction, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+          PivotingFriction, ContourFriction>
+      system;
+  Sliding<Jacobian, Friction, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+          PivotingFriction, ContourFriction>
+      duals;
+  place(job, system);
+  place(job, duals);
+  if constexpr (Friction<double>::kActive) {
+    system.friction = {job.input.friction, job.eps_v()};
+    duals.friction = {Jacobian(job.input.friction), job.eps_v()};
+  }
+  return run_sundials(job, system, duals, tolerance);
+}
+
+RimRecord run_rolling_by(const RimJob& job, double tolerance) {
+  Rolling<double, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
+          ContourFriction>
+      system;
+  Rolling<Dual<8>, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
+          ContourFriction>
+      duals;
+  place(job, system);
+  place(job, duals);
+  return run_sundials(job, system, duals, tolerance);
+}
+
+RimRecord run_job(const RimJob& job, double tolerance, double stick) {
+  const data::ModelSettings& terms = job.model.terms;
+  const RimRunOptions options = job.options(tolerance, stick);
+  const bool own = job.method == Method::dop853;
+  if (job.law == "rolling") {
+    if (!own) return run_rolling_by(job, tolerance);
+    return with_terms(terms, [&](auto list) {
+      return run_phases(job, NoSlip<double>{}, 0.0, Regime::rolling, options, list);
+    });
+  }
+  if (job.law == "smooth") {
+    if (!own) return run_sliding_by<NoFriction>(job, tolerance);
+    return with_few_terms(terms, [&](auto list) {
+      return run_phases(job, NoFriction<double>{}, 0.0, Regime::sliding, options, list);
+    });
+  }
+  if (!own) return run_sliding_by<Coulomb>(job, tolerance);
+  const Coulomb<double> friction{job.input.friction, job.eps_v()};
+  const double limit = job.eps_v() > 0.0 ? 0.0 : job.input.friction;
+  return with_few_terms(terms, [&](auto list) {
+    return run_phases(job, friction, limit, Regime::sliding, options, list);
+  });
+}
+
+/// Steps an explicit method needs: its stability limit times the fastest rate of the regularised
+/// law, about (mu m g / eps_v)(1/m + R^2/C + h^2/A) (theory/sliding.md).
+double explicit_steps(const RimJob& job) {
+  if (job.eps_v() == 0.0) return 0.0;
+  constexpr double kStability = 6.0;
+  const RimBody& b = job.model.body;
+  const double rate = job.input.friction * b.m * b.g / job.eps_v() *
+                      (1.0 / b.m + b.R * b.R / b.C + (b.h * b.h + b.R * b.R) / b.A);
+  return rate * job.t_s.back() / kStability;
+}
+
+struct ContactChoice {
+  Method method = Method::dop853;
+  std::string name = "dop853", reason;
+};
+
+ContactChoice choose(const RimJob& job, const std::string& asked) {
+  constexpr double kManySteps = 2e5;
+  const bool exact = job.law == "sliding" && job.eps_v() == 0.0;
+  if (asked == "auto") {
+    if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
+    const double steps = explicit_steps(job);
+    if (steps > kManySteps)
+      return {
+          Method::cvode_bdf, "cvode-bdf",
+          fmt::format("stiff friction: an explicit method would take about {:.0e} steps", steps)};
+    return {Method::dop853, "dop853", "not stiff, smooth between events"};
+  }
+  if (asked == "taylor")
+    throw InputError(
+        "run.integrator = \"taylor\" needs polynomial equations; contact models take auto, dop853, "
+        "cvode-adams, cvode-bdf or arkode");
+  const Choice choice = choose_integrator(asked);
+  if (choice.method != Method::dop853 && (exact || job.impact))
+    throw InputError(fmt::format(
+        "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
+        "impacts take auto or dop853",
+        asked));
+  return {choice.method, choice.name, choice.reason};
+}
+
+RimJob rim_job(const data::Scene& scene, const std::string& law) {
+  RimJob job;
+  job.law = law;
+  job.model = {rim_body(scene), scene.model};
+  const RimStart start = rim_start(scene, job.model.body);
+  job.input = {start.theta_rad,
+               start.phi_rad,
+               start.psi_rad,
+               start.w1_rad_s,
+               start.w2_rad_s,
+               start.w3_rad_s,
+               start.x_m,
+               start.y_m,
+               start.vx_m_s,
+               start.vy_m_s,
+               loss_values(scene.model),
+               0.0};
+  if (law == "sliding") {
+    if (!scene.model.friction)
+      throw InputError(
+          "model.friction is missing: the sliding model needs the Coulomb coefficient");
+    job.input.friction = *scene.model.friction;
+    if (!(job.input.friction >= 0.0) || !std::isfinite(job.input.friction))
+      throw InputError(fmt::format("model.friction = {} must be 0 or greater", job.input.friction));
+    if (job.input.friction == 0.0) job.law = "smooth";
+  }
+  if (scene.run.rim_switch != "end" && scene.run.rim_switch != "impact")
+    throw InputError(
+        fmt::format("run.rim_switch = \"{}\" must be end or impact", scene.run.rim_switch));
+  job.impact = scene.run.rim_switch == "impact";
+  job.columns = {central_inertia(*scene.body).mass_known,
+                 job.law == "sliding" && job.eps_v() == 0.0};
+  job.t_s = output_times_s(scene.run);
+  return job;
+}
+
+/// Largest differences of path and axis between two runs over their common rows.
+void estimate_error(const RimRecord& a, const RimRecord& b, Trajectory& run) {
+  constexpr int kPhi = 1, kTheta = 2, kX = 7, kY = 8;
+  for (std::size_t n = 0; n < std::min(a.rows.size(), b.rows.size()); ++n) {
+    const auto& p = a.rows[n];
+    const auto& q = b.rows[n];
+    run.error_estimate_m = std::max(run.error_estimate_m, std::hypot(p[kX] - q[kX], p[kY] - q[kY]));
+    run.error_estimate_rad =
+        std::max(run.error_estimate_rad,
+                 std::hypot(p[kTheta] - q[kTheta], std::sin(p[kTheta]) * (p[kPhi] - q[kPhi])));
+  }
+}
+
+}  // namespace
+
+Trajectory simulate_rim(const data::Scene& scene, const std::string& law) {
+  RimJob job = rim_job(scene, law);
+  const ContactChoice choice = choose(job, scene.run.integrator);
+  job.method = choice.method;
+  const double tolerance = scene.run.tolerance;
+  RimRecord record = run_job(job, tolerance, 1.0);
+  // The second run: finer, or coarser where finer is below rounding; and with another threshold of
+  // sticking, so that its influence shows as well.
+  constexpr double kFinest = 1e-12, kOtherStick = 3.0;
+  const RimRecord other =
+      run_job(job, tolerance > kFinest ? 0.01 * tolerance : 10.0 * tolerance, kOtherStick);
+
+  Trajectory run;
+  run.model = law;
+  run.integrator = choice.name;
+  run.integrator_reason = choice.reason;
+  run.columns = job.columns.names();
+  run.values.resize(static_cast<Eigen::Index>(record.rows.size()),
+                    static_cast<Eigen::Index>(run.columns.size()));
+  for (std::size_t n = 0; n < record.rows.size(); ++n)
+    run.values.row(static_cast<Eigen::Index>(n)) = Eigen::Map<const Eigen::RowVectorXd>(
+        record.rows[n].data(), static_cast<Eigen::Index>(run.columns.size()));
+  estimate_error(record, other, run);
+  run.events = std::move(record.end.events);
+  run.outcome = record.end.outcome;
+  run.end_s = record.end.end_s;
+  run.statistics = record.end.statistics;
+  return run;
+}
+
+}  // namespace trochoid::model

@@ -1,0 +1,144 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/reference_case.hpp"
+#include "trochoid/model/simulate.hpp"
+
+namespace trochoid::model {
+namespace {
+
+std::string reference_path(const std::string& name, const char* ending) {
+  return std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ending;
+}
+data::Scene reference_scene(const std::string& name) {
+  return data::read_reference_case(reference_path(name, ".json")).scene;
+}
+Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
+  for (std::size_t c = 0; c < run.columns.size(); ++c)
+    if (run.columns[c] == name) return run.values.col(static_cast<Eigen::Index>(c));
+  ADD_FAILURE() << "no column " << name;
+  return Eigen::VectorXd::Zero(run.values.rows());
+}
+/// Runs a scene on the thinned reference's own times, which are multiples of 1/rate.
+struct Compared {
+  Trajectory run;
+  data::Table reference;
+  [[nodiscard]] double error(const std::string& ours, const std::string& theirs) const {
+    const Eigen::VectorXd a = column(run, ours), b = reference.column(theirs);
+    const Eigen::VectorXd t = reference.column("t"), mine = column(run, "t_s");
+    double largest = 0.0;
+    Eigen::Index row = 0;
+    for (Eigen::Index n = 0; n < t.size(); ++n) {
+      while (row < mine.size() && mine[row] < t[n] - 1e-9) ++row;
+      if (row == mine.size()) return INFINITY;
+      EXPECT_NEAR(mine[row], t[n], 1e-9);
+      largest = std::max(largest, std::abs(a[row] - b[n]));
+    }
+    return largest;
+  }
+};
+Compared compare(const std::string& name, double tolerance = 1e-13) {
+  data::Scene scene = reference_scene(name);
+  scene.run.tolerance = tolerance;
+  return {simulate(scene), data::read_table(reference_path(name, ".csv"))};
+}
+
+struct Case {
+  const char* name;
+  double angle, length, energy;  ///< reached, with a margin of ten
+};
+class RimReference : public testing::TestWithParam<Case> {};
+
+TEST_P(RimReference, IsReproducedInEveryColumn) {
+  const Compared c = compare(GetParam().name);
+  EXPECT_EQ(c.run.outcome, Outcome::reached_end);
+  for (const char* name : {"phi", "theta", "psi"})
+    EXPECT_LE(c.error(std::string(name) + "_rad", name), GetParam().angle) << name;
+  for (const char* name : {"x", "y", "z"})
+    EXPECT_LE(c.error(std::string(name) + "_m", name), GetParam().length) << name;
+  EXPECT_LE(c.error("energy_J", "energy"), GetParam().energy);
+  // Rates are up to 1e3 1/s times the angles they belong to; contact forces likewise.
+  for (const char* name : {"w1", "w2", "w3", "dphi", "dpsi"})
+    EXPECT_LE(c.error(std::string(name) + "_rad_s", name), 1e3 * GetParam().angle) << name;
+  EXPECT_LE(c.error("normal_force_N", "N"), 1e3 * GetParam().angle);
+  EXPECT_LE(c.error("force_x_N", "Fx"), 1e3 * GetParam().angle);
+  EXPECT_LE(c.error("contact_y_m", "yc"), 1e3 * GetParam().length);
+  EXPECT_LE(c.error("vx_m_s", "vx"), 1e3 * GetParam().length);
+}
+INSTANTIATE_TEST_SUITE_P(Rim, RimReference,
+                         testing::Values(Case{"s05_smooth_disc", 3e-8, 1e-10, 1e-10},
+                                         Case{"s06_roll_disc", 6e-11, 1e-11, 1e-13},
+                                         Case{"s07_roll_hoop_thin", 2e-11, 1e-11, 1e-13},
+                                         Case{"s08_slide_disc", 4e-11, 1e-11, 1e-13},
+                                         Case{"s09_ring_retrograde_drag", 3e-11, 1e-11, 1e-13}));
+
+// The reference states its own uncertainty: 3.9e-5 rad, 2.7e-6 m, 4.2e-5 s.
+TEST(ExactCoulomb, FindsTheTwentyEventsOfTheReference) {
+  constexpr double kAngle = 3.9e-5, kLength = 2.7e-6, kTime_s = 4.2e-5;
+  const Compared c = compare("s10_stick_slip_event", 1e-12);
+  EXPECT_LE(c.error("theta_rad", "theta"), kAngle);
+  EXPECT_LE(c.error("x_m", "x"), kLength);
+  EXPECT_LE(c.error("y_m", "y"), kLength);
+  const double events_s[] = {
+      0.04968661296613985, 0.3372374801141652, 0.6515495849987775, 0.9216421738468644,
+      0.9917287011922116,  1.0321880788689135, 1.2172332516738837, 1.2991556517243925,
+      1.392908068699665,   1.4205115434121411, 1.4426861280721055, 1.4721704764682857,
+      1.5839656306387384,  1.663628837106431,  1.7525954409938493, 1.7810217875208518,
+      1.794630440136598,   1.8337154734068428, 1.929468763874862};
+  ASSERT_EQ(c.run.events.size(), std::size(events_s));
+  for (std::size_t i = 0; i < std::size(events_s); ++i) {
+    EXPECT_NEAR(c.run.events[i].t_s, events_s[i], kTime_s);
+    EXPECT_EQ(c.run.events[i].name, i % 2 == 0 ? "stick" : "slip");
+  }
+}
+
+// At its own tolerance a run's estimate must not be below the error it has.
+TEST(RimSimulation, EstimatesItsErrorHonestly) {
+  for (const char* name : {"s06_roll_disc", "s09_ring_retrograde_drag", "s08_slide_disc"}) {
+    for (const double tolerance : {1e-6, 1e-9}) {
+      const Compared c = compare(name, tolerance);
+      EXPECT_GE(1.5 * c.run.error_estimate_m, c.error("x_m", "x")) << name << " " << tolerance;
+      EXPECT_LE(c.run.error_estimate_m, 1e5 * tolerance);
+    }
+  }
+}
+
+TEST(RimSimulation, AgreesBetweenItsIntegrators) {
+  for (const char* name : {"s05_smooth_disc", "s06_roll_disc", "s08_slide_disc"}) {
+    data::Scene scene = reference_scene(name);
+    scene.run.until_s = 0.5;
+    scene.run.tolerance = 1e-11;
+    const Trajectory ours = simulate(scene);
+    for (const std::string integrator : {"cvode-bdf", "cvode-adams", "arkode"}) {
+      // Explicit Runge-Kutta of ARKODE gives up on the stiff law at this tolerance, and says so.
+      if (integrator == "arkode" && std::string(name) == "s08_slide_disc") continue;
+      scene.run.integrator = integrator;
+      const Trajectory theirs = simulate(scene);
+      ASSERT_EQ(theirs.values.rows(), ours.values.rows()) << integrator;
+      EXPECT_LE((column(theirs, "theta_rad") - column(ours, "theta_rad")).cwiseAbs().maxCoeff(),
+                2e-7)
+          << name << " " << integrator;
+    }
+  }
+}
+
+TEST(RimSimulation, LeavesForceAndEnergyOutWithoutAMass) {
+  data::Scene scene = reference_scene("s06_roll_disc");
+  const Trajectory weighed = simulate(scene);
+  scene.body->mass_kg.reset();
+  scene.body->I_kg_m2.reset();
+  scene.body->Is_kg_m2.reset();
+  const Trajectory unknown = simulate(scene);
+  for (const std::string& name : unknown.columns) {
+    EXPECT_NE(name, "energy_J");
+    EXPECT_NE(name, "normal_force_N");
+  }
+  EXPECT_LE((column(weighed, "x_m") - column(unknown, "x_m")).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+}  // namespace
+}  // namespace trochoid::model
