@@ -75,10 +75,17 @@ State<double, 7> start_state(const FreeSettings& free) {
            s * std::cos(difference), s * std::sin(difference), c * std::sin(sum)}};
 }
 
+/// Near an unstable axis the small components decide what happens: errors count relative to the
+/// smallest one that is not zero.
 StepControl<7> control_of(const FreeSettings& free, double tolerance) {
   StepControl<7> control = uniform_control<7>(tolerance);
-  const double w = free.w_rad_s.norm();
-  for (int i = 0; i < 3; ++i) control.atol[i] = tolerance * (w > 0.0 ? w : 1.0);
+  const double largest = free.w_rad_s.cwiseAbs().maxCoeff();
+  double smallest = largest;
+  for (const double w : free.w_rad_s) {
+    if (w != 0.0) smallest = std::min(smallest, std::abs(w));
+  }
+  for (int i = 0; i < 3; ++i)
+    control.atol[i] = tolerance * (largest > 0.0 ? std::max(smallest, 1e-15 * largest) : 1.0);
   return control;
 }
 
@@ -151,13 +158,12 @@ std::vector<double> fine_times(const std::vector<double>& t_s, double w_rad_s, i
   return fine;
 }
 
-/// Largest difference of the attitude between two runs [rad].
-double attitude_difference(const Solution& a, const Solution& b) {
+/// How far two runs are apart in attitude at every time both reached [rad].
+Eigen::VectorXd attitude_differences(const Solution& a, const Solution& b) {
   const Eigen::Index rows = std::min(a.states.rows(), b.states.rows());
-  if (rows == 0) return 0.0;
   return 2.0 * (a.states.topRows(rows).rightCols(4) - b.states.topRows(rows).rightCols(4))
-                   .cwiseAbs()
-                   .maxCoeff();
+                   .rowwise()
+                   .norm();
 }
 
 }  // namespace
@@ -194,8 +200,11 @@ Trajectory simulate_free(const data::Scene& scene) {
   trajectory.outcome = solution.outcome;
   trajectory.end_s = solution.end_s;
   trajectory.statistics = solution.statistics;
-  trajectory.error_estimate_rad =
-      attitude_difference(solution, run(free, fine, finer(scene.run.tolerance), choice.method));
+  const Eigen::VectorXd apart =
+      attitude_differences(solution, run(free, fine, finer(scene.run.tolerance), choice.method));
+  Eigen::VectorXd at_rows((apart.size() + parts - 1) / parts);
+  for (Eigen::Index n = 0; n < at_rows.size(); ++n) at_rows[n] = apart[n * parts];
+  end_where_unknown(at_rows, trajectory);
   return trajectory;
 }
 

@@ -36,6 +36,18 @@ const std::vector<std::string>& euler_columns() {
   return columns;
 }
 
+void end_where_unknown(const Eigen::VectorXd& apart_rad, Trajectory& trajectory) {
+  constexpr double kUnknown_rad = 0.05;
+  const Eigen::Index rows = std::min(apart_rad.size(), trajectory.values.rows());
+  Eigen::Index known = 0;
+  while (known < rows && apart_rad[known] <= kUnknown_rad) ++known;
+  trajectory.error_estimate_rad = known > 0 ? apart_rad.head(known).maxCoeff() : 0.0;
+  if (known == trajectory.values.rows()) return;
+  trajectory.values.conservativeResize(known, Eigen::NoChange);
+  trajectory.end_s = known > 0 ? trajectory.values(known - 1, 0) : 0.0;
+  trajectory.outcome = Outcome::tolerance_not_reachable;
+}
+
 double finer(double tolerance) {
   return std::max(0.01 * tolerance, 2e-15);
 }

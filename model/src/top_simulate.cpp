@@ -137,14 +137,19 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   return columns;
 }
 
-/// Largest difference of the axis between two runs.
-double axis_difference(const TopColumns& a, const TopColumns& b) {
-  double largest = 0.0;
-  for (int n = 0; n < std::min(a.rows, b.rows); ++n) {
-    for (int i = 0; i < 3; ++i)
-      largest = std::max(largest, std::abs(a.column[i][n] - b.column[i][n]));
+/// How far the axes of two runs are apart at every time both reached [rad].
+Eigen::VectorXd axis_differences(const TopColumns& a, const TopColumns& b) {
+  Eigen::VectorXd apart(std::min(a.rows, b.rows));
+  for (Eigen::Index n = 0; n < apart.size(); ++n) {
+    const auto at = static_cast<std::size_t>(n);
+    double squared = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double d = a.column[i][at] - b.column[i][at];
+      squared += d * d;
+    }
+    apart[n] = std::sqrt(squared);
   }
-  return largest;
+  return apart;
 }
 
 /// Integral of the spin rate omega_s exp(-gamma3 t).
@@ -199,7 +204,7 @@ Trajectory tabulate(const data::Scene& scene, const TopSettings& top, const Choi
   trajectory.end_s = columns.result.reached_s;
   trajectory.statistics = {columns.result.steps, columns.result.rejected,
                            columns.result.evaluations};
-  trajectory.error_estimate_rad = axis_difference(columns, run(t_s, finer(scene.run.tolerance)));
+  end_where_unknown(axis_differences(columns, run(t_s, finer(scene.run.tolerance))), trajectory);
   trajectory.error_estimate_m = top.l_m * trajectory.error_estimate_rad;
   return trajectory;
 }

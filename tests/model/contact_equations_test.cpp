@@ -45,8 +45,7 @@ RimBody body_of(const data::Scene& scene) {
 
 template <int N>
 State<double, N> state_of(const Reference& file, Eigen::Index row) {
-  static constexpr const char* kNames[] = {"phi", "theta", "psi", "w1", "w2",
-                                           "w3",  "x",     "y"};
+  static constexpr const char* kNames[] = {"phi", "theta", "psi", "w1", "w2", "w3", "x", "y"};
   State<double, N> y;
   for (int i = 0; i < 8; ++i) y[i] = file.at(row, kNames[i]);
   return y;

@@ -35,6 +35,12 @@ TROCHOID_INLINE void multiply_add(Dual<N>& sum, const Dual<N>& a, const Dual<N>&
   sum.derivative += b.value * a.derivative;
 }
 
+/// x / n for a small whole number.
+template <class S>
+TROCHOID_INLINE S divided(const S& x, int n) {
+  return x * (1.0 / n);
+}
+
 /// Coefficient n of the product a b. Two sums: one chain of additions would wait for itself.
 template <class S>
 TROCHOID_INLINE S product(const Series<S>& a, const Series<S>& b, int n) {
@@ -133,8 +139,7 @@ class Taylor {
     for (int n = 0; n < kOrder; ++n) {
       Y dy;
       system_.series(series_, n, dy);
-      const double next = 1.0 / (n + 1);
-      for (int c = 0; c < kN; ++c) series_[c][n + 1] = dy[c] * next;
+      for (int c = 0; c < kN; ++c) series_[c][n + 1] = divided(dy[c], n + 1);
     }
   }
   /// Largest scaled coefficient of one order.
