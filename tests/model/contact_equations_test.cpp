@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/inertia.hpp"
@@ -138,6 +139,105 @@ TEST(SlidingEquations, GiveTheReferenceForcesWithCouplesAndAir) {
     const auto u = slip_velocity(system.body, q);
     EXPECT_NEAR(std::hypot(u.along_n, u.along_mh), file.at(row, "slip"), kFileDigits);
   }
+}
+
+/// A system with the work done on it as one more state.
+template <class System>
+struct WithWork {
+  using Scalar = double;
+  static constexpr int kStates = System::kStates + 1;
+  System system;
+  void derivative(double t_s, const State<double, kStates>& y, State<double, kStates>& dy) const {
+    State<double, System::kStates> inner, rate;
+    for (int i = 0; i < System::kStates; ++i) inner[i] = y[i];
+    system.derivative(t_s, inner, rate);
+    for (int i = 0; i < System::kStates; ++i) dy[i] = rate[i];
+    dy[System::kStates] = power_W(inner);
+  }
+  [[nodiscard]] double power_W(const State<double, System::kStates>& y) const {
+    const auto q = system.motion(y);
+    if constexpr (System::kStates == 8) {
+      return loss_power_W(system.body, system.losses, q, system.acceleration(q).normal);
+    } else {
+      const auto force = system.contact_force(q);
+      const auto u = slip_velocity(system.body, q);
+      return loss_power_W(system.body, system.losses, q, force.normal) + force.along_n * u.along_n +
+             force.along_mh * u.along_mh;
+    }
+  }
+};
+
+template <class System>
+void expect_power_balance(const System& system, const State<double, System::kStates>& start) {
+  constexpr double kBalance = 1e-9, kEnd_s = 0.5;
+  constexpr int n = System::kStates;
+  State<double, n + 1> y;
+  for (int i = 0; i < n; ++i) y[i] = start[i];
+  y[n] = 0.0;
+  DormandPrince<WithWork<System>> stepper({system}, uniform_control<n + 1>(1e-13));
+  stepper.start(0.0, y);
+  const double before = energy_J(system.body, system.motion(start));
+  while (stepper.t_s() < kEnd_s) ASSERT_EQ(stepper.step(kEnd_s), StepEnd::accepted);
+  State<double, n> end;
+  for (int i = 0; i < n; ++i) end[i] = stepper.y()[i];
+  const double after = energy_J(system.body, system.motion(end));
+  EXPECT_LT(after, 0.95 * before) << "the losses must matter";
+  EXPECT_NEAR((after - before) / before, stepper.y()[n] / before, kBalance);
+}
+
+/// Every loss at once, each strong enough to be seen.
+template <class System>
+void fill_losses(System& system) {
+  auto& l = system.losses;
+  static_cast<LinearAir<double>&>(l) = {2e-6, 2e-6, 5e-6};
+  static_cast<QuadraticAir<double>&>(l) = {4e-8, 4e-8, 2e-8};
+  l.c_v = 5e-3;
+  l.eta = 1.8e-5;
+  l.mu_r = 1e-4;
+  l.mu_p = 3e-4;
+  l.mu_c = 2e-4;
+}
+
+TEST(PowerBalance, HoldsForARollingBodyWithEveryLoss) {
+  const Reference file("s06_roll_disc");
+  Rolling<double, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
+          ContourFriction>
+      system;
+  system.body = body_of(file.scene);
+  fill_losses(system);
+  expect_power_balance(system, state_of<8>(file, 0));
+}
+
+TEST(PowerBalance, HoldsForASlidingBodyWithEveryLoss) {
+  const Reference file("s08_slide_disc");
+  Sliding<double, Coulomb, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+          PivotingFriction, ContourFriction>
+      system;
+  system.body = body_of(file.scene);
+  fill_losses(system);
+  system.friction = {0.3, 1e-3};
+  expect_power_balance(system, sliding_state(file, system.body, 0));
+}
+
+TEST(CentralInertia, IsThatOfTheShapeUnlessGiven) {
+  data::Body ring;
+  ring.kind = data::BodyKind::ring;
+  ring.radius_m = 0.03;
+  ring.inner_radius_m = 0.027;
+  ring.thickness_m = 0.008;
+  ring.mass_kg = 0.03373693518837008;
+  // The reference case's own moments of this ring.
+  EXPECT_NEAR(central_inertia(ring).transverse_kg_m2, 1.3919297176468351e-05, 1e-19);
+  EXPECT_NEAR(central_inertia(ring).axial_kg_m2, 2.7478733710927426e-05, 1e-19);
+  ring.I_kg_m2 = 2e-5;
+  EXPECT_EQ(central_inertia(ring).transverse_kg_m2, 2e-5);
+  ring.mass_kg.reset();
+  EXPECT_THROW((void)central_inertia(ring), InputError);
+  ring.I_kg_m2.reset();
+  EXPECT_FALSE(central_inertia(ring).mass_known);
+  EXPECT_NEAR(central_inertia(ring).axial_kg_m2, 0.5 * (9e-4 + 7.29e-4), 1e-18);
+  ring.radius_m = -1.0;
+  EXPECT_THROW((void)central_inertia(ring), InputError);
 }
 
 }  // namespace
