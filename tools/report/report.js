@@ -15,10 +15,10 @@
     const edge = spec.kind === "band";
     const stroke = edge ? "transparent" : colour(spec.colour);
     return {
-      label: spec.label, stroke, width: line ? 1.75 : 0, spanGaps: false,
+      label: spec.label, stroke, width: line ? 1.5 : 0, spanGaps: false,
       value: (u, value) => digits(value),
       paths: line ? undefined : () => null,
-      points: { show: !line, size: spec.colour === "observed" ? 4 : 3.5, fill: stroke, stroke, width: 0 },
+      points: { show: !line, size: spec.colour === "observed" ? 5 : 3.5, fill: stroke, stroke, width: 0 },
     };
   }
 
@@ -43,7 +43,7 @@
       series: [{ label: "t", value: (u, v) => (v == null ? "--" : v.toFixed(4) + " s") }, ...chart.series.map(series)],
       bands: bands(chart.series),
       cursor: { y: false, sync: { key: "time" }, drag: { x: true, y: false }, points: { size: 7 } },
-      legend: { live: true },
+      legend: { live: true, markers: { width: 0, fill: (u, i) => (i > 0 ? colour(chart.series[i - 1].colour) : null) } },
     };
     const plot = new uPlot(options, [object.t, ...chart.series.map((s) => s.values)], holder);
     // Band edges need no line in the legend.
