@@ -16,6 +16,8 @@ void add_study_command(CLI::App& app);
 void add_study_reference(CLI::App& study);
 void add_report_command(CLI::App& app);
 void add_study_retrograde(CLI::App& study);
+void add_study_solvers(CLI::App& study);
+void add_study_stability(CLI::App& study);
 #ifdef TROCHOID_HAS_TRACKING
 void add_track_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);

@@ -9,6 +9,8 @@ void add_study_command(CLI::App& app) {
   study->require_subcommand(1);
   add_study_reference(*study);
   add_study_retrograde(*study);
+  add_study_solvers(*study);
+  add_study_stability(*study);
 }
 
 }  // namespace trochoid::tools

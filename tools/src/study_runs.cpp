@@ -1,0 +1,54 @@
+#include "study_runs.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/pose.hpp"
+#include "trochoid/data/table.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+void compare(const model::Trajectory& run, const ReferenceRun& reference, StudyRun& result) {
+  const data::Table table{.header = {}, .columns = run.columns, .values = run.values};
+  const Eigen::VectorXd theta = table.column("theta_rad"), phi = table.column("phi_rad");
+  const Eigen::VectorXd x = table.column("x_m"), y = table.column("y_m");
+  const Eigen::Index rows = std::min(theta.size(), reference.t_s.size());
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const Eigen::Vector3d axis = data::symmetry_axis(theta[i], phi[i]);
+    const double axis_error = (axis - reference.axis.row(i).transpose()).norm();
+    const double path_error = std::hypot(x[i] - reference.xy_m(i, 0), y[i] - reference.xy_m(i, 1));
+    // NaN must not hide behind std::max.
+    result.axis_error = axis_error <= result.axis_error ? result.axis_error : axis_error;
+    result.path_error_m = path_error <= result.path_error_m ? result.path_error_m : path_error;
+  }
+}
+
+}  // namespace
+
+StudyRun study_run(const data::Scene& scene, const ReferenceRun& reference, int repeats) {
+  using Clock = std::chrono::steady_clock;
+  StudyRun result;
+  result.time_us = std::numeric_limits<double>::infinity();
+  try {
+    model::Trajectory run;
+    for (int i = 0; i < repeats; ++i) {
+      const auto start = Clock::now();
+      run = model::simulate(scene);
+      const std::chrono::duration<double, std::micro> elapsed = Clock::now() - start;
+      result.time_us = std::min(result.time_us, elapsed.count());
+    }
+    result.outcome = run.outcome;
+    result.statistics = run.statistics;
+    result.estimate_m = run.error_estimate_m;
+    compare(run, reference, result);
+  } catch (const Error& error) {
+    result.refusal = error.what();
+  }
+  return result;
+}
+
+}  // namespace trochoid::tools
