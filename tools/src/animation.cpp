@@ -1,4 +1,3 @@
-#ifdef TROCHOID_HAS_TRACKING
 #include "animation.hpp"
 
 #include <fmt/format.h>
@@ -81,4 +80,3 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
 }
 
 }  // namespace trochoid::tools
-#endif
