@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -277,7 +278,8 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   call.options.tolerance = request.tolerance;
   call.options.end_s = call.t_s.empty() ? 0.0 : call.t_s.back();
   call.options.impact_at_rim = impact_;
-  call.options.max_steps = kMostSteps;
+  call.options.max_steps =
+      request.max_steps > 0 ? std::min(request.max_steps, kMostSteps) : kMostSteps;
   call.options.components = components_of(request);
 
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

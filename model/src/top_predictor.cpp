@@ -214,6 +214,7 @@ Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   run.count = static_cast<int>(request.t_s.size());
   run.end_s = request.t_s.empty() ? request.start_s : request.t_s.back();
   run.tolerance = request.tolerance;
+  if (request.max_steps > 0) run.max_steps = request.max_steps;
   Prediction prediction;
   const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
   prediction.values.resize(rows);
