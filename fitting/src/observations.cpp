@@ -97,6 +97,14 @@ ArcData ArcData::slice(int first, int last, int step) const {
   return part;
 }
 
+ArcData ArcData::without(Channel channel) const {
+  ArcData part = *this;
+  std::erase_if(part.readings, [&](const Reading& reading) { return reading.channel == channel; });
+  std::erase(part.observables, observable_of(channel));
+  number_rows(part);
+  return part;
+}
+
 ArcData make_arc(const data::Track& track, int first, int last, const ChannelChoice& choice,
                  bool folded) {
   ArcData arc;

@@ -40,6 +40,8 @@ struct ArcData {
   [[nodiscard]] Eigen::MatrixX2d positions_m() const;
   /// The same arc with the samples first, first + step, ... below last only.
   [[nodiscard]] ArcData slice(int first, int last, int step = 1) const;
+  /// The same arc without the readings of one channel.
+  [[nodiscard]] ArcData without(Channel channel) const;
 };
 
 /// Which measurements a model can use.

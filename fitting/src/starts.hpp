@@ -28,4 +28,23 @@ struct Start {
 /// Places the pivot of a top may be, when nobody knows: from circles through the track.
 [[nodiscard]] std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& arc);
 
+/// A disc or ring on its rim, for starts: lengths [m], moments per mass [m^2].
+struct RimShape {
+  double R = 0.0, h = 0.0, A = 0.0, C = 0.0, g = 9.81;
+};
+
+/// Starts for a body that rolls (or slides) on its rim, state at the window's first sample.
+/// With tilt and precession in the track: w1 = dtheta, w2 = dphi sin(theta), and no slip,
+/// v_n = h w2 - R w3, gives the spin. From positions alone: a grid over the tilt, the direction of
+/// motion against the node line and the precession rate (the path's turning rate, and the two
+/// roots of steady rolling).
+[[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
+
+/// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
+[[nodiscard]] std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2);
+
+/// Starts for a disc spinning down on a pivot, from its angle: dw/dt = -(t0 sgn w + t1 w + t2 w|w|)
+/// by non-negative least squares.
+[[nodiscard]] std::vector<Start> pivot_starts(const ArcData& window);
+
 }  // namespace trochoid::fitting

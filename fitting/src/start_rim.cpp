@@ -1,0 +1,132 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "smoothing.hpp"
+#include "starts.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Readings of one angle, continued over its jumps, with the times they belong to.
+struct AngleSeries {
+  std::vector<double> t_s;
+  Eigen::MatrixXd value;
+};
+
+AngleSeries series_of(const ArcData& arc, Channel channel) {
+  AngleSeries series;
+  std::vector<double> values;
+  for (const Reading& reading : arc.readings) {
+    if (reading.channel != channel) continue;
+    double value = reading.value.x();
+    if (!values.empty()) value = values.back() + std::remainder(value - values.back(), 2.0 * kPi);
+    values.push_back(value);
+    series.t_s.push_back(arc.t_s[reading.sample]);
+  }
+  series.value = Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
+  return series;
+}
+
+// Value and rate at an instant: the smoothed curve's nearest sample, carried there.
+std::pair<double, double> at(const AngleSeries& series, double t_s) {
+  const SmoothCurve curve = smooth_auto(series.t_s, series.value);
+  const auto nearest = std::lower_bound(series.t_s.begin(), series.t_s.end(), t_s);
+  const Eigen::Index i = std::min<Eigen::Index>(nearest - series.t_s.begin(),
+                                                static_cast<Eigen::Index>(series.t_s.size()) - 1);
+  const double ahead_s = t_s - series.t_s[i];
+  return {curve.value(i, 0) + curve.first(i, 0) * ahead_s, curve.first(i, 0)};
+}
+
+struct Motion {
+  Eigen::Vector2d position_m, velocity_m_s;
+  double turning_rad_s = 0.0;  // median rate of the heading
+};
+
+Motion motion_of(const ArcData& arc) {
+  const SmoothCurve curve = smooth_auto(arc.t_s, arc.positions_m());
+  std::vector<double> turning;
+  for (Eigen::Index i = 0; i < curve.value.rows(); ++i) {
+    const Eigen::RowVector2d v = curve.first.row(i), a = curve.second.row(i);
+    const double speed2 = v.squaredNorm();
+    if (speed2 > 0.0) turning.push_back((v.x() * a.y() - v.y() * a.x()) / speed2);
+  }
+  return {curve.value.row(0).transpose(), curve.first.row(0).transpose(),
+          median(std::move(turning))};
+}
+
+// State that rolls without slip with the given attitude, rates and the measured velocity.
+Start state(const Motion& motion, const RimShape& shape, double theta, double phi, double w1,
+            double w2, const char* path) {
+  const Eigen::Vector2d n(std::cos(phi), std::sin(phi));
+  const double w3 = (shape.h * w2 - motion.velocity_m_s.dot(n)) / shape.R;
+  return {path,
+          {{"theta_rad", theta},
+           {"phi_rad", phi},
+           {"w1_rad_s", w1},
+           {"w2_rad_s", w2},
+           {"w3_rad_s", w3},
+           {"x_m", motion.position_m.x()},
+           {"y_m", motion.position_m.y()},
+           {"vx_m_s", motion.velocity_m_s.x()},
+           {"vy_m_s", motion.velocity_m_s.y()}}};
+}
+
+// Steady rolling at this tilt with CoM speed vn along the node line: the quadratic in W of
+// A W^2 s c - C W s w3 + W (R s + h c) vn + g (h s - R c) = 0 (per mass), w3 = (h W s - vn)/R.
+std::vector<double> steady_rates(const RimShape& q, double theta, double vn) {
+  const double s = std::sin(theta), c = std::cos(theta);
+  const double two = q.A * s * c - q.C * s * s * q.h / q.R;
+  const double one = (q.C * s / q.R + q.R * s + q.h * c) * vn;
+  const double zero = q.g * (q.h * s - q.R * c);
+  const double discriminant = one * one - 4.0 * two * zero;
+  if (discriminant < 0.0 || std::abs(two) < 1e-300) return {};
+  const double root = std::sqrt(discriminant);
+  return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
+}
+
+std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const Motion& motion) {
+  const AngleSeries theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
+  if (theta.t_s.size() < 8 || phi.t_s.size() < 8) return {};
+  const auto [tilt, tilting] = at(theta, arc.start_s);
+  const auto [azimuth, turning] = at(phi, arc.start_s);
+  const double clamped = std::clamp(tilt, 0.03, kPi - 0.03);
+  std::vector<Start> starts;
+  for (const double share : {1.0, 0.5})  // the rate at an edge of the window is its noisiest number
+    starts.push_back(state(motion, shape, clamped, azimuth, share * tilting,
+                           turning * std::sin(clamped), "windows"));
+  return starts;
+}
+
+std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
+  std::vector<Start> starts;
+  const double speed = motion.velocity_m_s.norm();
+  const double heading = std::atan2(motion.velocity_m_s.y(), motion.velocity_m_s.x());
+  for (double theta = 0.15; theta < 1.5; theta += 0.15)
+    for (int direction = 0; direction < 12; ++direction) {
+      const double delta = 2.0 * kPi * direction / 12;
+      const double vn = speed * std::cos(delta), vt = speed * std::sin(delta);
+      const double z = shape.R * std::sin(theta) + shape.h * std::cos(theta);
+      std::vector<double> rates{0.8 * motion.turning_rad_s, motion.turning_rad_s,
+                                1.25 * motion.turning_rad_s};
+      for (const double rate : steady_rates(shape, theta, vn)) rates.push_back(rate);
+      for (const double rate : rates)
+        starts.push_back(state(motion, shape, theta, heading - delta, -vt / z,
+                               rate * std::sin(theta), "multistart"));
+    }
+  return starts;
+}
+
+}  // namespace
+
+std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
+  if (window.t_s.size() < 12) return {};
+  const Motion motion = motion_of(window);
+  std::vector<Start> starts = from_angles(window, shape, motion);
+  if (starts.empty()) starts = from_positions(shape, motion);
+  return starts;
+}
+
+}  // namespace trochoid::fitting
