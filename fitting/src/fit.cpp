@@ -13,6 +13,7 @@
 #include "statistics.hpp"
 #include "strategy.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/model/inertia.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -58,35 +59,55 @@ double tolerance_for(const std::vector<ArcData>& arcs, double share) {
   return std::clamp(least, 1e-11, 1e-5);
 }
 
-Starter starter_for(const model::Predictor& predictor, bool free_pivot) {
+Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
   const int px = predictor.index_of("pivot_x_m"), py = predictor.index_of("pivot_y_m");
-  if (predictor.model_name().starts_with("top")) {
-    const Eigen::Vector2d known(px >= 0 ? predictor.parameters()[px].value : 0.0,
-                                py >= 0 ? predictor.parameters()[py].value : 0.0);
-    return [=](const ArcData& window) {
-      if (!free_pivot) return top_starts(window, known);
-      std::vector<Start> all;
-      for (const Eigen::Vector2d& pivot : pivot_guesses(window))
-        for (Start& start : top_starts(window, pivot)) all.push_back(std::move(start));
-      return all;
-    };
+  const Eigen::Vector2d known(px >= 0 ? predictor.parameters()[px].value : 0.0,
+                              py >= 0 ? predictor.parameters()[py].value : 0.0);
+  return [=](const ArcData& window) {
+    if (!free_pivot) return top_starts(window, known);
+    std::vector<Start> all;
+    for (const Eigen::Vector2d& pivot : pivot_guesses(window))
+      for (Start& start : top_starts(window, pivot)) all.push_back(std::move(start));
+    return all;
+  };
+}
+
+Starter rim_starter(const data::Scene& scene) {
+  data::Body body = *scene.body;
+  const model::CentralInertia inertia = model::central_inertia(body);
+  const RimShape shape{body.radius_m, body.half_thickness_m(),
+                       inertia.transverse_kg_m2 / inertia.mass_kg,
+                       inertia.axial_kg_m2 / inertia.mass_kg, scene.model.gravity_m_s2};
+  return [shape](const ArcData& window) { return rim_starts(window, shape); };
+}
+
+Starter starter_for(const model::Predictor& predictor, const data::Scene& scene) {
+  const std::string& model = predictor.model_name();
+  if (model.starts_with("top")) return top_starter(predictor, scene.fit.free_pivot);
+  if ((model == "rolling" || model == "sliding" || model == "smooth") && scene.body)
+    return rim_starter(scene);
+  if (model == "puck") {
+    const double gravity_m_s2 = scene.model.gravity_m_s2;
+    return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };
   }
+  if (model == "pivot") return pivot_starts;
   return [](const ArcData&) { return std::vector<Start>{}; };
 }
 
-// Turns parameters on that only some measurements show, and off those nothing shows.
+// Turns parameters on that only some measurements show, and off those nothing shows: the spin angle
+// without a mark, and a puck's spin, which the path alone hardly carries.
 void suit_to_data(Problem& problem, const data::Scene& scene) {
-  const auto is_free = [&](int index, int arc) {
-    return std::any_of(problem.free.begin(), problem.free.end(), [&](const FreeParameter& p) {
-      return p.index == index && (p.arc == arc || p.arc < 0);
-    });
-  };
+  const bool puck = problem.predictor->model_name() == "puck";
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    if (problem.arcs[arc].observable_index(model::Observable::psi_rad) < 0) continue;
-    for (const char* name : {"psi_rad", "omega_s_rad_s"}) {
+    const bool seen = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
+    for (const char* name : {"psi_rad", "omega_s_rad_s", "w3_rad_s"}) {
+      if (name == std::string("w3_rad_s") && !puck) continue;
       const int index = problem.predictor->index_of(name);
-      if (index >= 0 && !is_free(index, arc) && !scene.fit.fixed.contains(name))
-        problem.free.push_back({index, arc, {}, std::nullopt});
+      if (index < 0 || scene.fit.fixed.contains(name)) continue;
+      const auto same = [&](const FreeParameter& p) { return p.index == index && p.arc == arc; };
+      const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
+      if (seen && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
+      if (!seen && is_free) std::erase_if(problem.free, same);
     }
   }
   std::stable_sort(problem.free.begin(), problem.free.end(),
@@ -107,8 +128,35 @@ Problem single_arc(const Problem& problem, int arc) {
   return part;
 }
 
+bool is_top_spin(const Problem& problem, int free_index) {
+  const std::string& name = problem.predictor->parameters()[problem.free[free_index].index].name;
+  return name == "psi_rad" || name == "omega_s_rad_s";
+}
+
+// Starts the spin angle once the path is known, and takes its readings in.
+Found with_spin(const Problem& problem, Found found) {
+  if (!found.solution.usable) return found;
+  Problem whole = problem;
+  for (int i = 0, j = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (!is_top_spin(problem, i))
+      whole.base[0][problem.free[i].index] = problem.free[i].transform.value(found.solution.u[j++]);
+  Eigen::VectorXd sign;
+  fold_tilt(*problem.predictor, whole.base[0], sign);
+  start_top_spin(whole, 0);
+  found.solution = solve(whole, whole.start());
+  return found;
+}
+
 Found find_arc(const Problem& problem, const Starter& starter, const FitOptions& options,
                bool start_given) {
+  const bool top = problem.predictor->index_of("omega_s_rad_s") >= 0;
+  if (top && problem.arcs[0].observable_index(model::Observable::psi_rad) >= 0) {
+    Problem path = problem;
+    path.arcs[0] = problem.arcs[0].without(Channel::psi);
+    for (int i = static_cast<int>(path.free.size()) - 1; i >= 0; --i)
+      if (is_top_spin(path, i)) path.free.erase(path.free.begin() + i);
+    return with_spin(problem, find_arc(path, starter, options, start_given));
+  }
   const Start given{"given", options.start};
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   if (options.strategy == "single") return grow(problem, given, all);
@@ -282,7 +330,7 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
   problem.tolerance =
       options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
 
-  const Starter starter = starter_for(predictor, scene.fit.free_pivot);
+  const Starter starter = starter_for(predictor, scene);
   data::Fit result;
   result.model = model;
   result.seed = options.seed;

@@ -17,6 +17,10 @@ double Transform::value(double u) const {
   switch (kind) {
     case Kind::log:
       return std::exp(u);
+    case Kind::above:
+      return lower + std::exp(u);
+    case Kind::below:
+      return upper - std::exp(u);
     case Kind::between:
       return lower + 0.5 * (upper - lower) * (1.0 + std::tanh(u));
     default:
@@ -27,7 +31,10 @@ double Transform::value(double u) const {
 double Transform::slope(double u) const {
   switch (kind) {
     case Kind::log:
+    case Kind::above:
       return std::exp(u);
+    case Kind::below:
+      return -std::exp(u);
     case Kind::between: {
       const double t = std::tanh(u);
       return 0.5 * (upper - lower) * (1.0 - t * t);
@@ -38,12 +45,18 @@ double Transform::slope(double u) const {
 }
 
 double Transform::inverse(double value) const {
+  const double least = 1e-300;
   switch (kind) {
     case Kind::log:
-      return std::log(std::max(value, 1e-300));
+      return std::log(std::max(value, least));
+    // A start on or beyond the bound moves a thousandth of its size inside, else it never leaves.
+    case Kind::above:
+      return std::log(std::max(value - lower, 1e-3 * std::abs(lower) + least));
+    case Kind::below:
+      return std::log(std::max(upper - value, 1e-3 * std::abs(upper) + least));
     case Kind::between: {
       const double t = 2.0 * (value - lower) / (upper - lower) - 1.0;
-      return std::atanh(std::clamp(t, -0.999, 0.999));  // a start on the bound could never leave it
+      return std::atanh(std::clamp(t, -0.999, 0.999));
     }
     default:
       return value;
@@ -93,6 +106,14 @@ void Problem::set_base(const Eigen::VectorXd& u) {
   }
 }
 
+int Problem::max_steps() const {
+  // Motion that a camera follows turns less than once per sample; a step covers a good part of a
+  // turn. Regularised friction is stiff and takes what it takes.
+  std::size_t samples = 0;
+  for (const ArcData& arc : arcs) samples = std::max(samples, arc.t_s.size());
+  return predictor->model_name() == "sliding" ? 0 : 2000 + 20 * static_cast<int>(samples);
+}
+
 int Problem::rows() const {
   int rows = 0;
   for (const ArcData& arc : arcs) rows += arc.rows;
@@ -130,8 +151,13 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
 
 Transform transform_of(const ParameterInfo& info, const data::FitSettings& settings) {
   const auto bounds = settings.bounds.find(info.name);
-  if (bounds != settings.bounds.end())
-    return {Transform::Kind::between, bounds->second.first, bounds->second.second};
+  if (bounds != settings.bounds.end()) {
+    const auto [lower, upper] = bounds->second;
+    const bool low = std::isfinite(lower), high = std::isfinite(upper);
+    if (low && high) return {Transform::Kind::between, lower, upper};
+    if (low && !(info.logarithmic && lower <= 0.0)) return {Transform::Kind::above, lower, upper};
+    if (high) return {Transform::Kind::below, lower, upper};
+  }
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
 }
 
@@ -163,7 +189,7 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
   problem.row_weights.resize(problem.arcs.size());
   const auto add = [&](int index, int arc) {
     const ParameterInfo& info = parameters[index];
-    FreeParameter parameter{index, arc, transform_of(info, scene.fit), std::nullopt};
+    FreeParameter parameter{index, arc, transform_of(info, scene.fit), {}, {}};
     const auto prior = scene.fit.prior.find(info.name);
     if (prior != scene.fit.prior.end()) parameter.prior = prior->second;
     problem.free.push_back(parameter);
@@ -212,6 +238,7 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   request.start_s = data.start_s;
   request.observables = data.observables;
   request.tolerance = problem.tolerance;
+  request.max_steps = problem.max_steps();
   if (jacobian != nullptr)
     for (const int i : columns) request.derivatives.push_back(problem.free[i].index);
   model::Prediction prediction;

@@ -14,9 +14,10 @@ namespace trochoid::fitting {
 /// How a free parameter is handed to the minimiser, so that it stays in its range.
 ///   identity  value = u
 ///   log       value = exp(u): positive, over decades
+///   above     value = lower + exp(u);   below: value = upper - exp(u)
 ///   between   value = lower + (upper - lower) (1 + tanh u)/2
 struct Transform {
-  enum class Kind { identity, log, between };
+  enum class Kind { identity, log, above, below, between };
   Kind kind = Kind::identity;
   double lower = 0.0, upper = 0.0;
   [[nodiscard]] double value(double u) const;
@@ -29,6 +30,7 @@ struct FreeParameter {
   int arc = -1;   ///< -1: shared by all arcs
   Transform transform;
   std::optional<data::Prior> prior;
+  std::optional<data::Prior> leash;  ///< on u, while exploring: short windows see no friction
 };
 
 /// A predictor, the arcs it has to explain and what may vary. The vector u holds one entry per free
@@ -50,6 +52,7 @@ struct Problem {
   [[nodiscard]] double value(int free_index, const Eigen::VectorXd& u) const;
   void set_base(const Eigen::VectorXd& u);  ///< writes the values of u back into `base`
   [[nodiscard]] int rows() const;
+  [[nodiscard]] int max_steps() const;  ///< of one integration; 0 = the model's own limit
 };
 
 /// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it

@@ -50,27 +50,27 @@ class ArcCost : public ceres::CostFunction {
   int shared_ = 0, own_ = 0;
 };
 
-// What is known from outside: (value - prior)/sigma.
+// What is known from outside, (value - prior)/sigma; or a leash, the same on u itself.
 class PriorCost : public ceres::CostFunction {
  public:
-  PriorCost(const FreeParameter& parameter, int size, int entry)
-      : parameter_(parameter), size_(size), entry_(entry) {
+  PriorCost(const Transform& transform, const data::Prior& prior, int size, int entry)
+      : transform_(transform), prior_(prior), size_(size), entry_(entry) {
     set_num_residuals(1);
     mutable_parameter_block_sizes()->push_back(size);
   }
   bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
     const double u = blocks[0][entry_];
-    residuals[0] =
-        (parameter_.transform.value(u) - parameter_.prior->value) / parameter_.prior->sigma;
+    residuals[0] = (transform_.value(u) - prior_.value) / prior_.sigma;
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       std::fill_n(jacobians[0], size_, 0.0);
-      jacobians[0][entry_] = parameter_.transform.slope(u) / parameter_.prior->sigma;
+      jacobians[0][entry_] = transform_.slope(u) / prior_.sigma;
     }
     return true;
   }
 
  private:
-  FreeParameter parameter_;
+  Transform transform_;
+  data::Prior prior_;
   int size_, entry_;
 };
 
@@ -95,12 +95,16 @@ void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
     if (blocks.size[arc + 1] > 0) used.push_back(u.data() + blocks.first[arc + 1]);
     ceres_problem.AddResidualBlock(new ArcCost(problem, arc), nullptr, used);
   }
-  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
-    if (!problem.free[i].prior) continue;
+  const auto add_prior = [&](int i, const Transform& transform, const data::Prior& prior) {
     const int block = problem.free[i].arc + 1;
     ceres_problem.AddResidualBlock(
-        new PriorCost(problem.free[i], blocks.size[block], i - blocks.first[block]), nullptr,
+        new PriorCost(transform, prior, blocks.size[block], i - blocks.first[block]), nullptr,
         u.data() + blocks.first[block]);
+  };
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& parameter = problem.free[i];
+    if (parameter.prior) add_prior(i, parameter.transform, *parameter.prior);
+    if (parameter.leash) add_prior(i, Transform{}, *parameter.leash);
   }
 }
 

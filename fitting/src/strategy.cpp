@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+
+#include "smoothing.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -14,11 +17,25 @@ int free_rows(const Problem& problem) {
   return std::max(1, problem.rows() - static_cast<int>(problem.free.size()));
 }
 
+// Losses over decades hardly show on a short window; unheld they wander off to where the equations
+// are stiff. Their logarithm stays within a factor of about five of the start.
+void leash(Problem& problem) {
+  const Eigen::VectorXd u = problem.start();
+  for (std::size_t i = 0; i < problem.free.size(); ++i) {
+    const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[i].index];
+    const bool loss = info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
+                      info.name != "l_m";
+    if (loss && problem.free[i].transform.kind == Transform::Kind::log)
+      problem.free[i].leash = data::Prior{u[static_cast<int>(i)], 1.5};
+  }
+}
+
 // The problem on the first `samples` samples, thinned to about kThinned of them.
 Problem windowed(const Problem& problem, int samples) {
   Problem part = problem;
   const int step = std::max(1, samples / kThinned);
   part.arcs[0] = problem.arcs[0].slice(0, samples, step);
+  leash(part);
   return part;
 }
 
@@ -107,6 +124,42 @@ Found search(const Problem& problem, const Starter& starter) {
     }
   }
   return best;
+}
+
+void start_top_spin(Problem& problem, int arc) {
+  const int psi = problem.predictor->index_of("psi_rad");
+  const int omega = problem.predictor->index_of("omega_s_rad_s");
+  const ArcData& data = problem.arcs[arc];
+  if (psi < 0 || omega < 0 || data.observable_index(model::Observable::psi_rad) < 0) return;
+  Eigen::VectorXd values = problem.base[arc];
+  values[psi] = values[omega] = 0.0;
+  model::PredictRequest request;
+  request.t_s = data.t_s;
+  request.start_s = data.start_s;
+  request.observables = {model::Observable::psi_rad};
+  const model::Prediction prediction = problem.predictor->predict(values, request);
+  std::vector<double> t_s, difference, rates;
+  for (const Reading& reading : data.readings) {
+    if (reading.channel != Channel::psi) continue;
+    double d = reading.value.x() - prediction.values[reading.sample];
+    // The next value lies where the latest rate takes it, not merely within half a turn.
+    if (!difference.empty()) {
+      const double step_s = data.t_s[reading.sample] - t_s.back();
+      const double expected = difference.back() + (rates.empty() ? 0.0 : median(rates) * step_s);
+      d = expected + std::remainder(d - expected, 2.0 * std::numbers::pi);
+      rates.push_back((d - difference.back()) / step_s);
+    }
+    difference.push_back(d);
+    t_s.push_back(data.t_s[reading.sample] - data.start_s);
+  }
+  const int n = static_cast<int>(t_s.size());
+  if (n < 3) return;
+  const Eigen::Map<const Eigen::VectorXd> t(t_s.data(), n), d(difference.data(), n);
+  const double mean_t = t.mean();
+  const double slope =
+      (t.array() - mean_t).matrix().dot(d) / (t.array() - mean_t).matrix().squaredNorm();
+  problem.base[arc][omega] = slope;
+  problem.base[arc][psi] = d.mean() - slope * mean_t;
 }
 
 }  // namespace trochoid::fitting
