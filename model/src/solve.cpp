@@ -45,6 +45,9 @@ SundialsOptions sundials_options(Method method, double rtol, const double* atol,
   // Their multistep error control has no use for tolerances within rounding of the state.
   constexpr double kFinest = 1e-14;
   options.rtol = std::max(rtol, kFinest);
+  // Adams interpolates at its own order. BDF must not look beyond the end, where rigid friction has
+  // long come to rest; a one-step method's interpolation would be of order 5.
+  options.interpolate = method == Method::cvode_adams;
   options.atol = Eigen::Map<const Eigen::VectorXd>(atol, states).cwiseMax(1e-300);
   return options;
 }

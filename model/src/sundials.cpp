@@ -101,7 +101,8 @@ std::string named(char* name) {
 class Cvode : public Stepper {
  public:
   Cvode(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
-        const SundialsOptions& options, SUNContext context) {
+        const SundialsOptions& options, SUNContext context)
+      : interpolate_(options.interpolate) {
     const bool stiff = options.method == SundialsMethod::cvode_bdf;
     memory_ = CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context);
     CVodeSetErrHandlerFn(memory_, keep_quiet, nullptr);
@@ -119,7 +120,7 @@ class Cvode : public Stepper {
   ~Cvode() override { CVodeFree(&memory_); }
 
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    CVodeSetStopTime(memory_, t_limit_s);
+    if (!interpolate_) CVodeSetStopTime(memory_, t_limit_s);
     return CVode(memory_, t_limit_s, y, &t_s, CV_NORMAL);
   }
   void root_signs(int* signs) override { CVodeGetRootInfo(memory_, signs); }
@@ -143,6 +144,7 @@ class Cvode : public Stepper {
     require(CVodeSetNonlinearSolver(memory_, nonlinear_.get()), "CVodeSetNonlinearSolver");
   }
 
+  bool interpolate_;
   void* memory_ = nullptr;
   Matrix matrix_;
   LinearSolver linear_;
@@ -152,7 +154,8 @@ class Cvode : public Stepper {
 class Erk : public Stepper {
  public:
   Erk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
-      const SundialsOptions& options, SUNContext context) {
+      const SundialsOptions& options, SUNContext context)
+      : interpolate_(options.interpolate) {
     memory_ = ERKStepCreate(call_derivative, start_s, y.get(), context);
     ERKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
     require(ERKStepSVtolerances(memory_, options.rtol, atol.get()), "ERKStepSVtolerances");
@@ -167,7 +170,7 @@ class Erk : public Stepper {
 
   // Stepping exactly to each output keeps order 8; interpolating would be of order 5 at most.
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    ERKStepSetStopTime(memory_, t_limit_s);
+    if (!interpolate_) ERKStepSetStopTime(memory_, t_limit_s);
     return ERKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
   }
   void root_signs(int* signs) override { ERKStepGetRootInfo(memory_, signs); }
@@ -179,13 +182,15 @@ class Erk : public Stepper {
   std::string flag_name(int flag) const override { return named(ERKStepGetReturnFlagName(flag)); }
 
  private:
+  bool interpolate_;
   void* memory_ = nullptr;
 };
 
 class Dirk : public Stepper {
  public:
   Dirk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
-       const SundialsOptions& options, SUNContext context) {
+       const SundialsOptions& options, SUNContext context)
+      : interpolate_(options.interpolate) {
     memory_ = ARKStepCreate(nullptr, call_derivative, start_s, y.get(), context);
     ARKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
     require(ARKStepSVtolerances(memory_, options.rtol, atol.get()), "ARKStepSVtolerances");
@@ -205,7 +210,7 @@ class Dirk : public Stepper {
   ~Dirk() override { ARKStepFree(&memory_); }
 
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    ARKStepSetStopTime(memory_, t_limit_s);
+    if (!interpolate_) ARKStepSetStopTime(memory_, t_limit_s);
     return ARKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
   }
   void root_signs(int* signs) override { ARKStepGetRootInfo(memory_, signs); }
@@ -219,6 +224,7 @@ class Dirk : public Stepper {
   std::string flag_name(int flag) const override { return named(ARKStepGetReturnFlagName(flag)); }
 
  private:
+  bool interpolate_;
   void* memory_ = nullptr;
   Matrix matrix_;
   LinearSolver linear_;

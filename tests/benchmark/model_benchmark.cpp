@@ -114,37 +114,61 @@ State<double, 5> start() {
   return {{s.L[0], s.L[1], s.k[0], s.k[1], s.k[2]}};
 }
 
-/// The same equations and grid through another integrator.
-void other(benchmark::State& state, Method method) {
+void report_axis(benchmark::State& state, const Eigen::MatrixXd& states, double steps) {
+  Eigen::VectorXd path(2 * states.rows());
+  for (Eigen::Index n = 0; n < states.rows(); ++n) {
+    path[2 * n] = kL * states(n, 2);
+    path[2 * n + 1] = kL * states(n, 3);
+  }
+  report_error(state, path);
+  state.counters["steps"] = steps;
+}
+
+double tolerance_of(const benchmark::State& state) {
+  return std::pow(10.0, -static_cast<double>(state.range(0)));
+}
+
+/// The same equations and grid through our Runge-Kutta stepper.
+void dop853(benchmark::State& state) {
   const std::vector<double> t_s = grid();
-  const auto control = uniform_control<5>(std::pow(10.0, -static_cast<double>(state.range(0))));
   const auto duals = dual_system();
   Solution solution;
   for (auto _ : state) {
-    solution = solve(duals.values(), duals, start(), t_s, control, method);
+    solution = solve(duals.values(), duals, start(), t_s, uniform_control<5>(tolerance_of(state)),
+                     Method::dop853);
     benchmark::DoNotOptimize(solution.states.data());
   }
-  Eigen::VectorXd path(2 * solution.states.rows());
-  for (Eigen::Index n = 0; n < solution.states.rows(); ++n) {
-    path[2 * n] = kL * solution.states(n, 2);
-    path[2 * n + 1] = kL * solution.states(n, 3);
-  }
-  report_error(state, path);
-  state.counters["steps"] = solution.statistics.steps;
-}
-void dop853(benchmark::State& state) {
-  other(state, Method::dop853);
-}
-void cvode_adams(benchmark::State& state) {
-  other(state, Method::cvode_adams);
-}
-void arkode_erk(benchmark::State& state) {
-  other(state, Method::arkode);
+  report_axis(state, solution.states, solution.statistics.steps);
 }
 BENCHMARK(dop853)->Arg(10)->Arg(12)->Unit(benchmark::kMicrosecond);
-// Tolerances at which they reach 1e-9 .. 1e-10 in x/l.
-BENCHMARK(cvode_adams)->Arg(11)->Arg(12)->Unit(benchmark::kMicrosecond);
-BENCHMARK(arkode_erk)->Arg(9)->Arg(11)->Unit(benchmark::kMicrosecond);
+
+/// And through SUNDIALS, outputs interpolated by SUNDIALS itself.
+void sundials(benchmark::State& state, SundialsMethod method) {
+  const std::vector<double> t_s = grid();
+  const Ode ode = make_ode(dual_system());
+  const auto y = start();
+  const Eigen::VectorXd y0 = Eigen::Map<const Eigen::VectorXd>(y.v, 5);
+  SundialsOptions options;
+  options.method = method;
+  options.rtol = tolerance_of(state);
+  options.atol = Eigen::VectorXd::Constant(5, options.rtol);
+  options.interpolate = true;
+  SundialsRun run;
+  for (auto _ : state) {
+    run = integrate_sundials(ode, 0.0, y0, t_s, options);
+    benchmark::DoNotOptimize(run.states.data());
+  }
+  report_axis(state, run.states, static_cast<double>(run.steps));
+}
+void cvode_adams(benchmark::State& state) {
+  sundials(state, SundialsMethod::cvode_adams);
+}
+void arkode_erk(benchmark::State& state) {
+  sundials(state, SundialsMethod::arkode_erk);
+}
+// Tolerances at which they come near 1e-9 .. 1e-10 in x/l.
+BENCHMARK(cvode_adams)->Arg(10)->Arg(11)->Arg(12)->Unit(benchmark::kMicrosecond);
+BENCHMARK(arkode_erk)->Arg(10)->Arg(12)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace trochoid::model

@@ -38,6 +38,9 @@ struct SundialsOptions {
                          ///< well below the regularisation, or stick is not resolved
   int max_steps = 5000000;
   double max_step_s = 0.0;  ///< 0: unlimited
+  /// Outputs from the solver's own interpolation instead of steps that end there: fewer steps on a
+  /// dense grid, but the derivative is also evaluated a little beyond the last time.
+  bool interpolate = false;
 };
 
 struct SundialsRun {
