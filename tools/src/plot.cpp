@@ -16,6 +16,7 @@ namespace {
 // Okabe and Ito's palette without yellow, which is faint on white.
 constexpr std::array<const char*, 7> kColours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                               "#E69F00", "#56B4E9", "#000000"};
+constexpr std::array<int, 5> kMarks{5, 7, 9, 13, 11};  // gnuplot's filled ones
 constexpr int kWidth_px = 900, kPanelHeight_px = 420, kSquareHeight_px = 760;
 
 std::string quoted(const std::string& text) {
@@ -27,14 +28,21 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
+int columns_of(std::size_t panels) {
+  return panels > 3 ? 2 : 1;
+}
+
 std::string terminal(const std::filesystem::path& path, const std::vector<Axes>& panels) {
+  const int columns = columns_of(panels.size());
   int height = 0;
   for (const Axes& axes : panels) height += axes.equal ? kSquareHeight_px : kPanelHeight_px;
+  height = (height + columns - 1) / columns;
+  const int width = kWidth_px * (columns + 1) / 2;
   if (path.extension() == ".svg")
-    return fmt::format("svg size {},{} dynamic background rgb 'white' font 'sans-serif,14'",
-                       kWidth_px, height);
+    return fmt::format("svg size {},{} dynamic background rgb 'white' font 'sans-serif,14'", width,
+                       height);
   if (path.extension() == ".png")
-    return fmt::format("pngcairo size {},{} font 'sans,11'", kWidth_px, height);
+    return fmt::format("pngcairo size {},{} font 'sans,11'", width, height);
   throw InputError(fmt::format("{}: a plot is written as .svg or .png", path.string()));
 }
 
@@ -49,6 +57,10 @@ void add_settings(const Axes& axes, std::back_insert_iterator<std::string> out) 
   // One legend entry says nothing that the title does not.
   fmt::format_to(out, "set size {}\nset key {}\n", axes.equal ? "ratio -1" : "noratio",
                  axes.series.size() > 1 ? "on" : "off");
+  if (axes.y_range)
+    fmt::format_to(out, "set yrange [{}:{}]\n", axes.y_range->x(), axes.y_range->y());
+  else
+    fmt::format_to(out, "set yrange [*:*]\n");
 }
 
 void add_data(const Axes& axes, std::size_t panel, std::back_insert_iterator<std::string> out) {
@@ -57,7 +69,7 @@ void add_data(const Axes& axes, std::size_t panel, std::back_insert_iterator<std
     fmt::format_to(out, "$data{}_{} << EOD\n", panel, i);
     for (Eigen::Index k = 0; k < series.x.size(); ++k) {
       if (std::isfinite(series.x[k]) && std::isfinite(series.y[k]))
-        fmt::format_to(out, "{} {}\n", series.x[k], series.y[k]);
+        fmt::format_to(out, "{:.7g} {:.7g}\n", series.x[k], series.y[k]);
       else
         fmt::format_to(out, "\n");
     }
@@ -70,11 +82,12 @@ void add_panel(const Axes& axes, std::size_t panel, std::back_insert_iterator<st
   fmt::format_to(out, "plot ");
   for (std::size_t i = 0; i < axes.series.size(); ++i) {
     const Series& series = axes.series[i];
+    const std::size_t colour = series.colour < 0 ? i : static_cast<std::size_t>(series.colour);
     const std::string style = series.points
-                                  ? fmt::format("points pt {} ps 0.7", 5 + i % 8)
+                                  ? fmt::format("points pt {} ps 0.9", kMarks[i % kMarks.size()])
                                   : fmt::format("lines lw 1.6 dt {}", series.dashed ? 2 : 1);
     fmt::format_to(out, "{}$data{}_{} using 1:2 with {} lc rgb '{}' title {} noenhanced",
-                   i == 0 ? "" : ", ", panel, i, style, kColours[i % kColours.size()],
+                   i == 0 ? "" : ", ", panel, i, style, kColours[colour % kColours.size()],
                    quoted(series.label));
   }
   fmt::format_to(out, "\n");
@@ -90,7 +103,10 @@ std::string script(const std::vector<Axes>& panels, const std::filesystem::path&
                  "set grid lc rgb '#cccccc'\nset key outside right top\nset border 3\n"
                  "set xtics nomirror\nset ytics nomirror\n");
   for (std::size_t p = 0; p < panels.size(); ++p) add_data(panels[p], p, out);
-  if (panels.size() > 1) fmt::format_to(out, "set multiplot layout {},1\n", panels.size());
+  const auto columns = static_cast<std::size_t>(columns_of(panels.size()));
+  if (panels.size() > 1)
+    fmt::format_to(out, "set multiplot layout {},{}\n", (panels.size() + columns - 1) / columns,
+                   columns);
   for (std::size_t p = 0; p < panels.size(); ++p) add_panel(panels[p], p, out);
   return text;
 }

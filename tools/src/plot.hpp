@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@ struct Series {
   Eigen::VectorXd x, y;
   bool points = false;  ///< markers instead of a line
   bool dashed = false;
+  int colour = -1;  ///< place in the palette; -1: the place in the list
 };
 
 struct Axes {
@@ -19,10 +21,11 @@ struct Axes {
   bool log_x = false, log_y = false;
   bool equal = false;  ///< the same length unit on both axes
   std::vector<Series> series;
+  std::optional<Eigen::Vector2d> y_range{};  ///< lowest and highest y shown; all of it if absent
 };
 
-/// Draws panels below each other as SVG or PNG, by the file's ending, in colours that colour-blind
-/// readers tell apart. Drawn by gnuplot; whole file or none.
+/// Draws panels below each other, more than three in two columns, as SVG or PNG, by the file's
+/// ending, in colours that colour-blind readers tell apart. Drawn by gnuplot; whole file or none.
 /// @throws InputError if gnuplot is not installed or the ending is another.
 void write_plot(const std::vector<Axes>& panels, const std::filesystem::path& path);
 

@@ -1,9 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "commands.hpp"
 #include "plot.hpp"
@@ -74,8 +75,8 @@ std::vector<Case> cases() {
 }
 
 struct Turn {
+  Eigen::VectorXd x_m, y_m;
   model::MeanPath path;
-  model::Outcome outcome;
   double end_s;
   double friction_demand;
 };
@@ -89,41 +90,89 @@ double friction_demand(const data::Table& run) {
 Turn follow(const data::Scene& scene) {
   const model::Trajectory run = model::simulate(scene);
   const data::Table table{.header = {}, .columns = run.columns, .values = run.values};
-  return {model::mean_path(table.column("t_s"), table.column("phi_rad"), table.column("x_m"),
-                           table.column("y_m")),
-          run.outcome, run.end_s, friction_demand(table)};
+  const Eigen::VectorXd x_m = table.column("x_m"), y_m = table.column("y_m");
+  return {x_m, y_m, model::mean_path(table.column("t_s"), table.column("phi_rad"), x_m, y_m),
+          run.end_s, friction_demand(table)};
+}
+
+/// Median heading rate over one eighth of the run: where the mean path has a cusp its rate has a
+/// spike, which a mean would keep.
+double typical_rate(const model::MeanPath& path, int eighth) {
+  const Eigen::Index size = path.heading_per_phi.size() / 8;
+  const Eigen::VectorXd part = path.heading_per_phi.segment(eighth * size, size);
+  std::vector<double> rates(part.begin(), part.end());
+  const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
+  std::nth_element(rates.begin(), middle, rates.end());
+  return *middle;
 }
 
 void print_row(const Case& item, const Turn& turn) {
-  const Eigen::VectorXd parts = turn.path.heading_in_parts(8);
-  const std::optional<double> inflection = turn.path.inflection_s();
-  const std::string verdict =
-      parts[7] < 0.0 ? fmt::format("retrograde, inflection at {:.2f} s", inflection.value_or(NAN))
-      : inflection   ? fmt::format("retrograde from {:.2f} s, then prograde again", *inflection)
-                     : std::string("prograde throughout");
-  fmt::print("{:<34} {:>8.3f} {:>8.3f} {:>8.2f} {:>7.2f}  {}\n", item.label, parts[0], parts[7],
+  const double first = typical_rate(turn.path, 0), last = typical_rate(turn.path, 7);
+  const std::string verdict = last < 0.0 ? fmt::format("retrograde, inflection at {:.2f} s",
+                                                       turn.path.inflection_s().value_or(NAN))
+                                         : std::string("prograde at the end");
+  fmt::print("{:<34} {:>8.3f} {:>8.3f} {:>8.2f} {:>7.2f}  {}\n", item.label, first, last,
              turn.friction_demand, turn.end_s, verdict);
+}
+
+/// Every n-th value: as many as the eye resolves.
+Eigen::VectorXd thinned(const Eigen::VectorXd& values) {
+  constexpr Eigen::Index kEvery = 10;
+  return values(Eigen::seqN(0, (values.size() + kEvery - 1) / kEvery, kEvery));
+}
+
+Axes heading_panel(const char* body) {
+  return {.title = fmt::format("{}: prograde above zero, retrograde below", body),
+          .x_label = "t [s]",
+          .y_label = "turning of the mean path / precession",
+          .series = {},
+          .y_range = Eigen::Vector2d(-0.6, 0.4)};
+}
+
+/// Path of the centre of mass, its mean and the inflection, from above.
+Axes path_panel(const Case& item, const Turn& turn) {
+  Axes axes{
+      .title = item.label, .x_label = "x [m]", .y_label = "y [m]", .equal = true, .series = {}};
+  axes.series = {
+      {.label = "centre of mass", .x = turn.x_m, .y = turn.y_m, .colour = 5},
+      {.label = "mean path", .x = thinned(turn.path.x_m), .y = thinned(turn.path.y_m), .colour = 1},
+      {.label = "start",
+       .x = turn.path.x_m.head(1),
+       .y = turn.path.y_m.head(1),
+       .points = true,
+       .colour = 6}};
+  const auto inflection = turn.path.inflection_s();
+  if (!inflection) return axes;
+  const auto& t_s = turn.path.t_s;
+  const auto at = std::lower_bound(t_s.begin(), t_s.end() - 1, *inflection) - t_s.begin();
+  axes.series.push_back({.label = "inflection",
+                         .x = turn.path.x_m.segment(at, 1),
+                         .y = turn.path.y_m.segment(at, 1),
+                         .points = true,
+                         .colour = 3});
+  return axes;
 }
 
 void run(const Options& options) {
   if (!options.out.empty()) fs::create_directories(options.out);
   fmt::print("{:<34} {:>8} {:>8} {:>8} {:>7}  {}\n", "body and loss", "first", "last", "demand",
-             "end_s", "mean path (heading rate per phi in the first and last eighth)");
-  Axes axes{.title = "Heading of the mean path: positive is prograde, negative retrograde",
-            .x_label = "t [s]",
-            .y_label = "d(heading)/d(phi) = (W - nu)/W",
-            .series = {}};
+             "end_s",
+             "mean path (its turning per precession, medians of the first and last eighth)");
+  std::vector<Axes> headings{heading_panel("ring"), heading_panel("disc")}, paths;
   for (const Case& item : cases()) {
     const Turn turn = follow(item.scene);
     print_row(item, turn);
-    axes.series.push_back({.label = item.label,
-                           .x = turn.path.t_s,
-                           .y = turn.path.heading_per_phi,
-                           .dashed = item.label.starts_with("disc")});
+    const bool disc = item.label.starts_with("disc");
+    headings[disc ? 1 : 0].series.push_back({.label = item.label.substr(6),
+                                             .x = thinned(turn.path.t_s),
+                                             .y = thinned(turn.path.heading_per_phi)});
+    if (paths.size() == (disc ? 1u : 0u)) paths.push_back(path_panel(item, turn));
   }
   if (options.out.empty()) return;
-  write_plot({axes}, options.out / "retrograde.svg");
-  fmt::print("{}\n", (options.out / "retrograde.svg").string());
+  write_plot(headings, options.out / "retrograde_heading.svg");
+  write_plot(paths, options.out / "retrograde_path.svg");
+  fmt::print("{}\n{}\n", (options.out / "retrograde_heading.svg").string(),
+             (options.out / "retrograde_path.svg").string());
 }
 
 }  // namespace
@@ -132,7 +181,7 @@ void add_study_retrograde(CLI::App& study) {
   auto options = std::make_shared<Options>();
   CLI::App* command = study.add_subcommand(
       "retrograde", "Which bodies and which losses turn the mean path of a rolling body round");
-  command->add_option("--out", options->out, "Draw the heading rates into this folder");
+  command->add_option("--out", options->out, "Draw heading rates and paths into this folder");
   command->footer("Example: trochoid study retrograde --out docs/figures");
   command->callback([options] { run(*options); });
 }

@@ -43,7 +43,7 @@ StudyRun study_run(const data::Scene& scene, const ReferenceRun& reference, int 
     }
     result.outcome = run.outcome;
     result.statistics = run.statistics;
-    result.estimate_m = run.error_estimate_m;
+    result.estimate_rad = run.error_estimate_rad;
     compare(run, reference, result);
   } catch (const Error& error) {
     result.refusal = error.what();

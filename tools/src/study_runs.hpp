@@ -15,7 +15,7 @@ struct StudyRun {
   double path_error_m = 0.0;  ///< largest distance of the CoM from the reference
   double time_us = 0.0;       ///< fastest of the repeats, outputs included
   model::Statistics statistics;
-  double estimate_m = 0.0;  ///< what the run itself says of its error
+  double estimate_rad = 0.0;  ///< what the run itself says of its error in the axis
 };
 
 /// @param repeats  how often to run for the time.

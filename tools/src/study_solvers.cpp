@@ -91,7 +91,8 @@ void write_diagram(const std::vector<Row>& rows, const char* x_label, Cost cost,
               .log_x = true,
               .log_y = true,
               .series = {}};
-    for (const char* integrator : kIntegrators) {
+    for (std::size_t i = 0; i < kIntegrators.size(); ++i) {
+      const char* integrator = kIntegrators[i];
       std::vector<double> x, y;
       for (const Row& row : rows)
         if (row.scene == scene && row.integrator == integrator && row.run.refusal.empty() &&
@@ -103,7 +104,8 @@ void write_diagram(const std::vector<Row>& rows, const char* x_label, Cost cost,
         axes.series.push_back(
             {.label = integrator,
              .x = Eigen::Map<Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())),
-             .y = Eigen::Map<Eigen::VectorXd>(y.data(), static_cast<Eigen::Index>(y.size()))});
+             .y = Eigen::Map<Eigen::VectorXd>(y.data(), static_cast<Eigen::Index>(y.size())),
+             .colour = static_cast<int>(i)});
     }
     if (!axes.series.empty()) panels.push_back(std::move(axes));
   }
