@@ -66,7 +66,7 @@ class AnyReader : public testing::TestWithParam<Reader> {};
 
 TEST_P(AnyReader, ReadsOrRefusesDamagedFilesAndNeverDoesAnythingElse) {
   constexpr unsigned kSeed = 20260101;
-  constexpr int kFiles = 400;
+  constexpr int kFiles = 150;
   std::mt19937 draw(kSeed);
   const TestFolder folder;
   // The first lines of a long file hold all its kinds of content.
