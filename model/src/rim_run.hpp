@@ -318,7 +318,7 @@ class RimRun {
                           [&](const State<S, 10>& at) { return slipping(rolling_part(at)); });
   }
 
-  // Perfectly inelastic jump to the other rim (12).
+  // Perfectly inelastic jump to the other rim (rolling.md, (12)).
   void rolling_rim_switch(const State<S, 8>& y, const S& delay) {
     note("rim_switch");
     if (!options_.impact_at_rim || chattering(end_.end_s)) return finish(Outcome::rim_switch);
@@ -347,7 +347,7 @@ class RimRun {
   }
 
   /// The same with a vertical impulse only: while the contact slides, friction's share of the short
-  /// impulse, mu times it, is left out (13).
+  /// impulse, mu times it, is left out (S15).
   void sliding_rim_switch(const State<S, 10>& y, const S& delay) {
     note("rim_switch");
     if (!options_.impact_at_rim || chattering(end_.end_s)) return finish(Outcome::rim_switch);

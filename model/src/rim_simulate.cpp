@@ -228,7 +228,8 @@ RimRecord run_job(const RimJob& job, double tolerance, double stick) {
 }
 
 /// Steps an explicit method needs: its stability limit times the fastest rate of the regularised
-/// law, about (mu m g / eps_v)(1/m + R^2/C + h^2/A) (theory/sliding.md).
+/// law, at most (mu m g / eps_v)(1/m + R^2/C + (R^2 + h^2)/A) while N = m g (theory/sliding.md,
+/// (S19)).
 double explicit_steps(const RimJob& job) {
   if (job.eps_v() == 0.0) return 0.0;
   constexpr double kStability = 6.0;

@@ -36,8 +36,8 @@ TEST(ThesisScenes, AllRunToTheirEnd) {
   EXPECT_GE(scenes, 20);
 }
 
-// Closed form (B2): the tilt swings between theta_0 and theta_max with period T_n; theta_max, T_n
-// and the gain of phi per period for the runs of the thesis.
+// Closed form (top.md, (13) and (14)): the tilt swings between theta_0 and theta_max with period
+// T_n; theta_max, T_n and the gain of phi per period for the runs of the thesis.
 struct Row {
   const char* scene;
   double theta_max_deg, period_s, dphi_per_period;

@@ -69,7 +69,7 @@ std::optional<ReferenceRun> run(const data::Scene& scene, Derivative f, const Re
   return result;
 }
 
-// y = (ell, k, b): PHYSICS M2 with drag; model/theory/top.md.
+// y = (ell, k, b): the top with drag; model/theory/top.md, (7).
 std::optional<ReferenceRun> run_top(const data::Scene& scene) {
   const data::Body& body = *scene.body;
   const Real I = *body.I_kg_m2, Is = *body.Is_kg_m2, l = *body.l_m;

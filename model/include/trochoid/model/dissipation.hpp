@@ -153,7 +153,7 @@ struct Losses : Terms<S>... {
   }
 };
 
-/// Power of all losses but sliding [W]: what they add to dE/dt, never positive (11).
+/// Power of all losses but sliding [W]: what they add to dE/dt, never positive (rolling.md, (11)).
 template <class S, template <class> class... Terms>
 [[nodiscard]] S loss_power_W(const RimBody& body, const Losses<S, Terms...>& losses,
                              const NodeMotion<S>& q, const S& normal) {

@@ -257,7 +257,7 @@ template <class S>
 }
 
 /// State to start the next arc with: the derivatives cross the event by the saltation matrix
-///   S+ = (dR/dy + (f+ - dR/dy f-) (grad g)^T / (-grad g . f-)) S-,
+///   S+ = (dR/dy + (f+ - dR/dy f-) (grad g)^T / (grad g . f-)) S-,
 /// written with duals: go to the moved event along the old motion, reset, and come back along the
 /// new one. With S = double this is only the reset.
 /// @param before, after  systems on either side.
