@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <type_traits>
+#include <vector>
 
 namespace trochoid::tracking {
 namespace {
@@ -167,6 +168,21 @@ LightWindow LightWindow::blurred(double sigma_px) const {
   return out;
 }
 
+void LightWindow::scale_to(const LightWindow& picture) {
+  constexpr int kStridePx = 3;
+  constexpr float kDark = 2.0f;  // ratios of darker pixels are mostly noise
+  if (empty() || picture.empty()) return;
+  std::vector<float> ratios;
+  for (int y = 0; y < light_.rows; y += kStridePx)
+    for (int x = 0; x < light_.cols; x += kStridePx)
+      if (light_.at<float>(y, x) > kDark)
+        ratios.push_back(picture.light_.at<float>(y, x) / light_.at<float>(y, x));
+  if (ratios.empty()) return;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  light_ *= *middle;
+}
+
 float LightWindow::at(float x_px, float y_px) const {
   const float x = x_px - static_cast<float>(window_.x), y = y_px - static_cast<float>(window_.y);
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
@@ -176,6 +192,16 @@ float LightWindow::at(float x_px, float y_px) const {
   const float top = upper[0] + fx * (upper[1] - upper[0]);
   const float bottom = lower[0] + fx * (lower[1] - lower[0]);
   return top + fy * (bottom - top);
+}
+
+void Profile::begin_at(double s) {
+  int skipped = 0;
+  while (skipped + 1 < count && s_px(skipped) < s) ++skipped;
+  std::copy(light.begin() + skipped, light.begin() + count, light.begin());
+  if (plate)
+    std::copy(background.begin() + skipped, background.begin() + count, background.begin());
+  first_px = s_px(skipped);
+  count -= skipped;
 }
 
 bool sample_profile(const LightWindow& picture, const LightWindow& plate,

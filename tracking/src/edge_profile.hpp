@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
 
@@ -14,6 +15,8 @@ class LightWindow {
   LightWindow(const cv::Mat& luma, const cv::Rect& window);
   /// The same window blurred by a Gaussian.
   [[nodiscard]] LightWindow blurred(double sigma_px) const;
+  /// Brightens a plate by the median ratio to the picture: exposure drifts, lamps flicker.
+  void scale_to(const LightWindow& picture);
   [[nodiscard]] bool empty() const { return light_.empty(); }
   [[nodiscard]] const cv::Rect& window() const { return window_; }
   /// Bilinear sample; `holds` must be true for the point.
@@ -38,6 +41,13 @@ struct Profile {
   std::array<float, kMost> light, background;
 
   [[nodiscard]] float s_px(int i) const { return first_px + kStepPx * static_cast<float>(i); }
+  /// Whether some of it is as bright as the picture can be.
+  [[nodiscard]] bool clipped() const {
+    constexpr float kClipped = 245.0f;
+    return *std::max_element(light.begin(), light.begin() + count) > kClipped;
+  }
+  /// Forgets the samples before s.
+  void begin_at(double s);
   /// Forgets the samples beyond s.
   void end_at(double s) {
     while (count > 1 && s_px(count - 1) > s) --count;

@@ -39,29 +39,60 @@ cv::Rect window_of(const data::Body& body, const data::Camera& camera, const dat
 struct Fitted {
   Refined refined;
   double blur_px = kUsualBlurPx;
+  double score = 0.0;     ///< outline_score of the pose
+  double evidence = 0.0;  ///< evidence_of the fit
 };
 
-std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start, bool far) {
-  std::optional<Refined> refined;
-  data::Pose<> pose = start;
-  if (far) {
-    refined = refine(scenery.blurred(kFarBlurPx), pose, kFar);
-    if (!refined) return std::nullopt;
-    pose = refined->pose;
-  }
-  refined = refine(scenery.blurred(kNearBlurPx), pose, kNear);
+std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
+  auto refined = refine(scenery.blurred(kNearBlurPx), start, kNear);
   if (!refined) return std::nullopt;
   Fitted out;
   out.blur_px = estimate_blur_px(scenery, *refined);
   refined = refine(scenery, refined->pose, exact(out.blur_px));
   if (!refined) return std::nullopt;
   out.refined = std::move(*refined);
+  out.score = outline_score(scenery, out.refined.pose, out.blur_px);
+  out.evidence = evidence_of(out.refined);
   return out;
 }
 
+const Fitted& better(const Fitted& a, const Fitted& b) {
+  return a.evidence >= b.evidence ? a : b;
+}
+
+// From afar: each start is drawn towards edges, those that then lie on edges are fitted.
+std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::Pose<>>& starts,
+                               bool mirrors) {
+  constexpr size_t kFitted = 3;
+  const Scenery far = scenery.blurred(kFarBlurPx), near = scenery.blurred(kNearBlurPx);
+  std::vector<std::pair<double, data::Pose<>>> drawn;
+  for (const auto& start : starts) {
+    auto refined = refine(far, start, kFar);
+    if (refined) refined = refine(near, refined->pose, kNear);
+    if (refined)
+      drawn.emplace_back(outline_score(scenery, refined->pose, kUsualBlurPx), refined->pose);
+  }
+  std::sort(drawn.begin(), drawn.end(),
+            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::optional<Fitted> best;
+  const auto consider = [&](const data::Pose<>& pose) {
+    const auto fitted = fit_from(scenery, pose);
+    if (fitted) best = best ? better(*best, *fitted) : *fitted;
+  };
+  for (size_t i = 0; i < std::min(kFitted, drawn.size()); ++i) {
+    consider(drawn[i].second);
+    if (mirrors) consider(mirrored(scenery.camera, scenery.motion, drawn[i].second));
+  }
+  return best;
+}
+
+// Below kDoubtful the mirrored attitude may fit better; below kLeastScore the body is not there.
+constexpr double kDoubtful = 0.7, kLeastScore = 0.25;
+
 bool believable(const Fitted& fitted) {
   constexpr double kLeastCovered = 0.35;
-  return fitted.refined.covered >= kLeastCovered && fitted.refined.solution.covariance.allFinite();
+  return fitted.score >= kLeastScore && fitted.refined.covered >= kLeastCovered &&
+         fitted.refined.solution.covariance.allFinite();
 }
 
 PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
@@ -86,7 +117,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
     if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
   }
   m.rms_px = r.solution.rms_px;
-  m.accepted = r.covered;
+  m.accepted = fitted.score;
   for (size_t i = 0; i < r.equations.size(); ++i) {
     const EdgeEquation& e = r.equations[i];
     if (e.weight < 0.5) continue;
@@ -121,7 +152,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   const std::vector<data::Pose<>> starts =
       evidence.predicted ? std::vector{motion.settled(*evidence.predicted)}
       : evidence.detection
-          ? starts_from_detection(body_, support_, camera_, motion, *evidence.detection)
+          ? starts_from_edges(body_, support_, camera_, motion, *evidence.detection, evidence.luma,
+                              evidence.background)
           : std::vector<data::Pose<>>{};
   if (starts.empty()) return std::nullopt;
   const double margin_px = evidence.predicted ? 12.0 : 24.0;
@@ -135,17 +167,15 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
       evidence.smear_px};
   if (scenery.picture.empty()) return std::nullopt;
-  std::optional<Fitted> best;
-  double best_score = 0.0;
-  for (const auto& start : starts) {
-    auto fitted = fit_from(scenery, start, !evidence.predicted);
-    if (!fitted || !believable(*fitted)) continue;
-    const double score = starts.size() == 1
-                             ? 1.0
-                             : outline_score(scenery, fitted->refined.pose, fitted->blur_px, false);
-    if (!best || score > best_score) best = std::move(fitted), best_score = score;
+  // About a pivot the mirrored axis has another centre.
+  const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
+  auto best =
+      evidence.predicted ? fit_from(scenery, starts.front()) : fit_best(scenery, starts, mirrors);
+  if (best && evidence.predicted && mirrors && best->score < kDoubtful) {
+    const auto other = fit_from(scenery, mirrored(camera_, motion, best->refined.pose));
+    if (other) best = better(*best, *other);
   }
-  if (!best) return std::nullopt;
+  if (!best || !believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
   if (alike) fold(m.pose);
   return m;

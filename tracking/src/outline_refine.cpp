@@ -25,14 +25,18 @@ double clear_of_next(double next_px, double extent_px, double blur_px) {
 }
 
 // What may be assumed of the levels beside an edge: constant; changing linearly (shading, soft
-// shadows); constant with only the nearest pixels outside looked at (a sliver of shadow).
-enum Assumption { kFlat, kSloped, kClose, kAssumptions };
+// shadows); constant with only the nearest pixels looked at, outside (a sliver of shadow) or on
+// both sides (a chamfer or relief of the body).
+enum Assumption { kFlat, kSloped, kClose, kTight, kAssumptions };
 
 // The edge near a point of the outline under each assumption.
 struct Look {
   std::array<ProfileEdge, kAssumptions> edges;
   std::array<bool, kAssumptions> found{};
-  [[nodiscard]] bool any() const { return found[kFlat] || found[kSloped] || found[kClose]; }
+  bool clipped = false;  ///< the picture is saturated beside the edge
+  [[nodiscard]] bool any() const {
+    return std::any_of(found.begin(), found.end(), [](bool f) { return f; });
+  }
 };
 
 bool look_for_edge(const Scenery& scenery, const OutlineSample& sample, const Search& search,
@@ -48,6 +52,7 @@ bool look_for_edge(const Scenery& scenery, const OutlineSample& sample, const Se
   if (!sample_profile(scenery.picture, plate, sample.image_px, sample.normal_px, inside, outside,
                       profile))
     return false;
+  look.clipped = profile.clipped();
   const double reach = std::min(search.reach_px + widen, std::min(inside, outside));
   EdgeModel model{blur, plate_explains(profile, 1.5 * blur), false};
   const auto fit = [&](Assumption as) {
@@ -61,6 +66,12 @@ bool look_for_edge(const Scenery& scenery, const OutlineSample& sample, const Se
     model.slopes = false;
     profile.end_at(kClosePx + blur);
     fit(kClose);
+  }
+  if (inside > kClosePx + 2.0 * blur) {
+    model.slopes = false;
+    profile.end_at(kClosePx + blur);
+    profile.begin_at(-kClosePx - blur);
+    fit(kTight);
   }
   return look.any();
 }
@@ -118,6 +129,18 @@ double sensor_noise2(const std::vector<Look>& looks, const std::vector<Pools>& p
   return std::max(*quartile, kLeast);
 }
 
+// What the edge model itself may be wrong by, as a variance of one edge: its shape, light that
+// varies across the edge by a small share of its level, levels beyond the range of the picture.
+double model_variance_px2(const ProfileEdge& edge, bool silhouette, double blur_px, bool clipped) {
+  constexpr double kShapePx = 0.03, kOwnShapePx = 0.15, kLightShare = 0.05, kClippedPx = 0.2;
+  const double level = std::max(edge.inner, edge.inner + edge.contrast);
+  // An error of one contrast beside the edge moves its half level by about the width of the blur.
+  const double light_px =
+      kLightShare * level / std::max(std::abs(edge.contrast), 1e-3) * std::max(blur_px, 0.5);
+  const double shape_px = silhouette ? kShapePx : kOwnShapePx;
+  return shape_px * shape_px + light_px * light_px + (clipped ? kClippedPx * kClippedPx : 0.0);
+}
+
 // Chooses the assumption that leaves the most precise edge. Residuals beyond the noise of the
 // sensor are structure the assumption does not have: a sliver of shadow, a highlight. Structure
 // goes on along the outline and does not average out like noise: it counts as fully correlated over
@@ -147,7 +170,9 @@ void choose_edges(const Search& search, const std::vector<OutlineSample>& sample
     }
     if (best < 0) continue;
     ProfileEdge edge = looks[i].edges[static_cast<size_t>(best)];
-    edge.variance_px2 = own_variance;
+    edge.variance_px2 =
+        own_variance + correlated * model_variance_px2(edge, samples[i].silhouette, search.blur_px,
+                                                       looks[i].clipped);
     edge.noise = noise;
     out.samples.push_back(samples[i]);
     out.edges.push_back(edge);
@@ -159,6 +184,7 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge) {
   EdgeEquation e;
   e.motion = sample.motion.transpose();
   e.swell = bore ? -1.0 : 1.0;
+  e.polarity = edge.contrast < 0.0 ? -1.0 : 1.0;
   e.offset_px = edge.offset_px;
   e.variance_px2 = edge.variance_px2;
   e.arc_px = sample.arc_px;
@@ -260,21 +286,38 @@ double estimate_blur_px(const Scenery& scenery, const Refined& refined) {
   return *middle;
 }
 
-double outline_score(const Scenery& scenery, const data::Pose<>& pose, double blur_px,
-                     bool own_edges_only) {
-  constexpr double kMostPerEdge = 3.0;
-  const Search search{blur_px, 3.0, 0.8, 2.0, 1, true, false, 1};
+double outline_score(const Scenery& scenery, const data::Pose<>& pose, double blur_px) {
+  // Gain at which an edge is certain; how far off it may be where the outline is right.
+  constexpr double kCertain = 3.0, kTolerancePx = 0.3;
+  const Search search{blur_px, 3.0, 1.5, 2.0, 1, false, false, 3};
   double score = 0.0, arc = 0.0;
   Profile profile;
   for (const OutlineSample& sample :
        outline_samples(scenery.body, pose, scenery.camera, scenery.motion, search.step_px)) {
-    if (own_edges_only && sample.silhouette) continue;
+    if (!sample.silhouette) continue;
     Look look;
     arc += sample.arc_px;
     if (!look_for_edge(scenery, sample, search, profile, look)) continue;
-    score += sample.arc_px * std::clamp(look.edges[kFlat].gain, 0.0, kMostPerEdge);
+    const ProfileEdge& edge = look.edges[kFlat];
+    const double off2 = edge.offset_px * edge.offset_px;
+    const double gain = edge.gain - 0.5 * off2 / (edge.variance_px2 + kTolerancePx * kTolerancePx);
+    score += sample.arc_px * std::clamp(gain / kCertain, 0.0, 1.0);
   }
-  return own_edges_only ? score : (arc > 0.0 ? score / arc : 0.0);
+  return arc > 0.0 ? score / arc : 0.0;
+}
+
+double evidence_of(const Refined& refined) {
+  constexpr double kCertain = 3.0, kTolerancePx = 0.1;
+  double evidence = 0.0;
+  for (size_t i = 0; i < refined.edges.size(); ++i) {
+    const ProfileEdge& edge = refined.edges[i];
+    const EdgeEquation& e = refined.equations[i];
+    const double variance = edge.noise * edge.noise / edge.information;
+    const double misfit =
+        0.5 * e.residual_px * e.residual_px / (variance + kTolerancePx * kTolerancePx);
+    evidence += e.arc_px * std::max(0.0, std::min(edge.gain, kCertain) - misfit);
+  }
+  return evidence;
 }
 
 }  // namespace trochoid::tracking

@@ -57,9 +57,13 @@ struct Refined {
 /// Blur of the edges of this picture [px], from the refined outline's own profiles.
 [[nodiscard]] double estimate_blur_px(const Scenery& scenery, const Refined& refined);
 
-/// Evidence that the outline of `pose` is in the picture: summed log-likelihood of edges exactly
-/// there over no edges, per pixel of outline, limited per edge so that no single one decides.
-[[nodiscard]] double outline_score(const Scenery& scenery, const data::Pose<>& pose, double blur_px,
-                                   bool own_edges_only);
+/// Share of the predicted silhouette, 0..1, with an edge exactly there: near 1 for the right pose,
+/// a third or less for a pose that merely has settled among edges.
+[[nodiscard]] double outline_score(const Scenery& scenery, const data::Pose<>& pose,
+                                   double blur_px);
+
+/// What speaks for this pose rather than another one with nearly the same silhouette: the gain of
+/// all edges, limited per edge so that no single one decides, less what their residuals take.
+[[nodiscard]] double evidence_of(const Refined& refined);
 
 }  // namespace trochoid::tracking

@@ -12,14 +12,8 @@
 namespace trochoid::tracking {
 namespace {
 
-// Angle between axis and line of sight from the ratio of the silhouette's axes,
-// b/a = cos v + (h/R) sin v  (orthographic), on the branch v in [0, pi/2].
-double view_tilt(const data::Body& body, double ratio) {
-  const double slope = body.half_thickness_m() / body.radius_m;
-  const double peak = std::atan(slope), height = std::hypot(1.0, slope);
-  return std::clamp(peak + std::acos(std::clamp(ratio / height, 0.0, 1.0)), 0.0,
-                    0.5 * std::numbers::pi);
-}
+constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr size_t kMostStarts = 10;
 
 // Puts the centre on the ray through a pixel at the height the support wants.
 std::optional<data::Pose<>> on_ray(const data::Camera& camera, const PoseMotion& motion,
@@ -33,93 +27,180 @@ std::optional<data::Pose<>> on_ray(const data::Camera& camera, const PoseMotion&
   return pose;
 }
 
-// Directions across the line of sight that the axes of the detected ellipse stand for.
-struct ViewFrame {
-  Eigen::Vector3d towards, along_minor;
+struct Candidate {
+  double score;
+  data::Pose<> pose;
+  Eigen::Vector2d centre_px;
 };
 
-ViewFrame view_frame(const data::Camera& camera, const Eigen::Vector3d& at_m, double angle_rad) {
-  const Eigen::Vector3d towards = direction_to(camera, at_m);
-  const Eigen::Vector2d minor_px{-std::sin(angle_rad), std::cos(angle_rad)};
-  const Eigen::Matrix<double, 2, 3> J = camera.jacobian_px_per_m(at_m);
-  // Least-norm motion with this image; what is along the line of sight leaves no trace.
-  Eigen::Vector3d minor = J.transpose() * (J * J.transpose()).inverse() * minor_px;
-  minor -= minor.dot(towards) * towards;
-  return {towards, minor.normalized()};
+// Attitudes about `step_rad` apart, from lying flat to nearly upright.
+std::vector<std::pair<double, double>> attitudes(double step_rad) {
+  constexpr double kUpright = 1.5;
+  std::vector<std::pair<double, double>> all{{0.0, 0.0}};
+  const int rings = static_cast<int>(std::lround(kUpright / step_rad));
+  for (int ring = 1; ring <= rings; ++ring) {
+    const double theta = kUpright * ring / rings;
+    const int around =
+        std::max(4, static_cast<int>(std::lround(kTurn * std::sin(theta) / step_rad)));
+    for (int i = 0; i < around; ++i)
+      all.emplace_back(theta, kTurn * (i + 0.5 * (ring % 2)) / around);
+  }
+  return all;
 }
 
-std::vector<data::Pose<>> free_starts(const data::Body& body, const data::Camera& camera,
-                                      const PoseMotion& motion, const Detection& detection) {
-  std::vector<data::Pose<>> starts;
-  data::Pose<> level;
-  const auto first = on_ray(camera, motion, level, detection.centre_px);
-  if (!first) return starts;
-  const ViewFrame view = view_frame(camera, first->centre_m, detection.angle_rad);
-  const double ratio = detection.semi_minor_px / std::max(detection.semi_major_px, 1e-9);
-  const double tilt = view_tilt(body, ratio);
-  const auto add = [&](double v, double sign) {
-    data::Pose<> pose = *first;
-    set_axis(std::cos(v) * view.towards + sign * std::sin(v) * view.along_minor, pose);
-    if (const auto placed = on_ray(camera, motion, pose, detection.centre_px))
-      starts.push_back(*placed);
-  };
-  if (motion.rotation() < 0) return {*first};
-  // A shadow in the silhouette changes the ratio; the outline decides.
-  for (const double change : {0.0, 0.25, -0.25}) {
-    const double v = tilt + change;
-    if (v < -0.2 || v > 0.5 * std::numbers::pi + 0.1) continue;
-    add(std::max(v, 0.02), 1.0);
-    add(std::max(v, 0.02), -1.0);
+struct Search {
+  const data::Body& body;
+  const data::Camera& camera;
+  const PoseMotion& motion;
+  const EdgeMap& map;
+  double radius_px;
+};
+
+// Silhouette of a pose as cells of the map relative to the cell of its centre.
+struct CellPoint {
+  int x, y, direction;
+};
+std::vector<CellPoint> silhouette_cells(const Search& search, const data::Pose<>& pose) {
+  constexpr double kPoints = 40.0;
+  std::vector<CellPoint> cells;
+  const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
+  const double step_px = kTurn * search.radius_px / kPoints;
+  for (const auto& p : data::visible_outline(search.body, pose, search.camera, step_px)) {
+    if (!p.silhouette) continue;
+    const Eigen::Vector2d off = (p.image_px - centre) / search.map.cell_px();
+    cells.push_back({static_cast<int>(std::lround(off.x())), static_cast<int>(std::lround(off.y())),
+                     EdgeMap::direction_of(p.normal_px.x(), p.normal_px.y())});
   }
+  return cells;
+}
+
+// Mean strength of the edges under a silhouette for every cell its centre may be in.
+cv::Mat silhouette_scores(const Search& search, const std::vector<CellPoint>& cells) {
+  const cv::Size size = search.map.strength(0).size();
+  cv::Mat sum = cv::Mat::zeros(size, CV_32FC1);
+  const cv::Rect all({}, size);
+  for (const CellPoint& c : cells) {
+    const cv::Rect to = all & (all - cv::Point(c.x, c.y));
+    if (to.empty()) continue;
+    cv::Mat part = sum(to);
+    part += search.map.strength(c.direction)(to + cv::Point(c.x, c.y));
+  }
+  return sum / static_cast<double>(std::max<size_t>(1, cells.size()));
+}
+
+// On the floor the silhouette of an attitude hardly depends on where it is: one template each.
+std::vector<Candidate> seek_on_floor(const Search& search, const Eigen::Vector2d& about_px) {
+  constexpr double kAttitudeStep = 0.21;
+  constexpr int kPerAttitude = 2;
+  std::vector<Candidate> found;
+  for (const auto& [theta, phi] : search.motion.rotation() < 0
+                                      ? std::vector<std::pair<double, double>>{{0.0, 0.0}}
+                                      : attitudes(kAttitudeStep)) {
+    data::Pose<> pose;
+    pose.theta_rad = theta;
+    pose.phi_rad = phi;
+    const auto middle = on_ray(search.camera, search.motion, pose, about_px);
+    if (!middle) continue;
+    cv::Mat scores = silhouette_scores(search, silhouette_cells(search, *middle));
+    for (int k = 0; k < kPerAttitude; ++k) {
+      double best = 0.0;
+      cv::Point at;
+      cv::minMaxLoc(scores, nullptr, &best, nullptr, &at);
+      const Eigen::Vector2d centre(search.map.window().x + (at.x + 0.5) * search.map.cell_px(),
+                                   search.map.window().y + (at.y + 0.5) * search.map.cell_px());
+      if (const auto placed = on_ray(search.camera, search.motion, pose, centre))
+        found.push_back({best, *placed, centre});
+      const cv::Rect around(at.x - 3, at.y - 3, 7, 7);
+      scores(around & cv::Rect({}, scores.size())).setTo(0.0);
+    }
+  }
+  return found;
+}
+
+// An axis through the pivot: the attitude and the distance along the axis place everything.
+std::vector<Candidate> seek_about_pivot(const Search& search, const Eigen::Vector3d& pivot_m) {
+  constexpr double kFarthest = 6.0;  // radii from the pivot
+  std::vector<Candidate> found;
+  const double cell_m = search.map.cell_px() * search.body.radius_m / search.radius_px;
+  const cv::Rect all({}, search.map.strength(0).size());
+  for (double along = 0.1 * search.body.radius_m; along < kFarthest * search.body.radius_m;
+       along += std::max(2.0 * cell_m, 0.1 * along)) {
+    const double step = std::clamp(1.5 * cell_m / along, 0.06, 0.21);
+    for (const auto& [theta, phi] : attitudes(step)) {
+      data::Pose<> pose;
+      pose.theta_rad = theta;
+      pose.phi_rad = phi;
+      pose.centre_m = pivot_m + along * data::symmetry_axis(theta, phi);
+      const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
+      const cv::Point cell(
+          static_cast<int>((centre.x() - search.map.window().x) / search.map.cell_px()),
+          static_cast<int>((centre.y() - search.map.window().y) / search.map.cell_px()));
+      if (!all.contains(cell)) continue;
+      const std::vector<CellPoint> cells = silhouette_cells(search, pose);
+      double sum = 0.0;
+      for (const CellPoint& c : cells)
+        if (const cv::Point at = cell + cv::Point(c.x, c.y); all.contains(at))
+          sum += search.map.strength(c.direction).at<float>(at);
+      found.push_back({sum / static_cast<double>(std::max<size_t>(1, cells.size())), pose, centre});
+    }
+  }
+  return found;
+}
+
+bool alike(const Candidate& a, const Candidate& b, double radius_px) {
+  constexpr double kSameAttitude = 0.25;
+  const Eigen::Vector3d k = data::symmetry_axis(a.pose.theta_rad, a.pose.phi_rad);
+  const Eigen::Vector3d m = data::symmetry_axis(b.pose.theta_rad, b.pose.phi_rad);
+  return (a.centre_px - b.centre_px).norm() < 0.2 * radius_px && (k - m).norm() < kSameAttitude;
+}
+
+std::vector<data::Pose<>> best_distinct(std::vector<Candidate> found, double radius_px) {
+  std::sort(found.begin(), found.end(),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  std::vector<Candidate> kept;
+  for (const Candidate& c : found) {
+    if (kept.size() == kMostStarts) break;
+    if (std::none_of(kept.begin(), kept.end(),
+                     [&](const Candidate& other) { return alike(c, other, radius_px); }))
+      kept.push_back(c);
+  }
+  std::vector<data::Pose<>> starts;
+  for (const Candidate& c : kept) starts.push_back(c.pose);
   return starts;
 }
 
-// With a pivot, where the centre is on its ray gives the axis: keep what fits the ellipse best.
-std::vector<data::Pose<>> pivot_starts(const data::Body& body, const data::Support& support,
-                                       const data::Camera& camera, const Detection& detection) {
-  struct Candidate {
-    double misfit;
-    data::Pose<> pose;
-  };
-  constexpr int kTried = 60;
-  constexpr size_t kKept = 4;
-  std::vector<Candidate> candidates;
-  const data::Ray ray = camera.ray_from_image(detection.centre_px);
-  const double nearest_m = (*support.pivot_m - ray.origin_m).dot(ray.direction);
-  const ViewFrame view = view_frame(camera, *support.pivot_m, detection.angle_rad);
-  const double tilt =
-      view_tilt(body, detection.semi_minor_px / std::max(detection.semi_major_px, 1e-9));
-  for (int i = 0; i < kTried; ++i) {
-    const double along = nearest_m + 6.0 * body.radius_m * (2.0 * (i + 0.5) / kTried - 1.0);
-    data::Pose<> pose;
-    pose.centre_m = ray.origin_m + along * ray.direction;
-    const Eigen::Vector3d arm = pose.centre_m - *support.pivot_m;
-    if (arm.norm() < 0.1 * body.radius_m || pose.centre_m.z() < 0.0) continue;
-    set_axis(arm.normalized(), pose);
-    const Eigen::Vector3d seen = axis_towards(camera, pose);
-    const Eigen::Vector3d expected =
-        std::cos(tilt) * view.towards +
-        std::copysign(std::sin(tilt), seen.dot(view.along_minor)) * view.along_minor;
-    candidates.push_back({(seen - expected).norm(), pose});
-  }
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.misfit < b.misfit; });
-  std::vector<data::Pose<>> starts;
-  for (size_t i = 0; i < std::min(kKept, candidates.size()); ++i)
-    starts.push_back(candidates[i].pose);
-  return starts;
+// How large the body appears about a pixel [px].
+double radius_in_picture(const data::Body& body, const data::Camera& camera,
+                         const PoseMotion& motion, const Eigen::Vector2d& at_px) {
+  const auto level = on_ray(camera, motion, {}, at_px);
+  if (!level) return 0.0;
+  const Eigen::Matrix<double, 2, 3> J = camera.jacobian_px_per_m(level->centre_m);
+  return body.radius_m * J.col(0).norm();
 }
 
 }  // namespace
 
-std::vector<data::Pose<>> starts_from_detection(const data::Body& body,
-                                                const data::Support& support,
-                                                const data::Camera& camera,
-                                                const PoseMotion& motion,
-                                                const Detection& detection) {
-  if (support.kind == data::SupportKind::pivot)
-    return pivot_starts(body, support, camera, detection);
-  return free_starts(body, camera, motion, detection);
+std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::Support& support,
+                                            const data::Camera& camera, const PoseMotion& motion,
+                                            const Detection& detection, const cv::Mat& luma,
+                                            const cv::Mat& plate) {
+  constexpr double kCellsPerRadius = 12.0;
+  constexpr int kLargestCellPx = 5;
+  const double radius_px = radius_in_picture(body, camera, motion, detection.centre_px);
+  if (!(radius_px > 2.0)) return {};
+  const int cell_px =
+      std::clamp(static_cast<int>(std::lround(radius_px / kCellsPerRadius)), 1, kLargestCellPx);
+  const int margin = static_cast<int>(0.6 * radius_px) + 4;
+  const cv::Rect window =
+      (detection.box + cv::Size(2 * margin, 2 * margin) - cv::Point(margin, margin)) &
+      cv::Rect({}, luma.size());
+  if (window.width < 3 || window.height < 3) return {};
+  const EdgeMap map(luma, plate, window, cell_px);
+  const Search search{body, camera, motion, map, radius_px};
+  return best_distinct(support.kind == data::SupportKind::pivot
+                           ? seek_about_pivot(search, *support.pivot_m)
+                           : seek_on_floor(search, detection.centre_px),
+                       radius_px);
 }
 
 data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,

@@ -7,10 +7,12 @@
 namespace trochoid::tracking {
 
 /// One measured edge for the linear fit: observed offset along the normal and how it depends on the
-/// pose. `swell` multiplies a nuisance common to the whole outline (+1 on outer rims, -1 on bores).
+/// pose. Two nuisances are common to the whole outline: `swell` multiplies an error of the size (+1
+/// on outer rims, -1 on bores), `polarity` a shift towards the brighter side (the sign of the
+/// contrast).
 struct EdgeEquation {
   PoseMotion::Step motion;
-  double swell = 1.0;
+  double swell = 1.0, polarity = 1.0;
   double offset_px = 0.0;
   double variance_px2 = 1.0;
   double arc_px = 1.0;
@@ -22,7 +24,7 @@ struct EdgeEquation {
 struct RobustSolution {
   PoseMotion::Step step;
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
-  double swell_px = 0.0;
+  double swell_px = 0.0, polarity_px = 0.0;
   double rms_px = 0.0;
   double accepted = 0.0;     ///< share of the arc with weight above one half
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
