@@ -124,53 +124,17 @@ RimRecord run_sundials(const RimJob& job, const System& system, const DualSystem
   Eigen::VectorXd y0(n);
   for (int i = 0; i < n; ++i) y0[i] = start[i];
   StepControl<n> control = rim_control<n>(job.model.body, job.options(tolerance, 1.0));
-  if constexpr (n == 10) {
-    // Stick lives at slips below eps_v: resolve them whatever the tolerance.
-    constexpr double kOfRegularisation = 1e-4;
-    for (const int c : {Rim::un, Rim::ut})
-      if (job.eps_v() > 0.0)
-        control.atol[c] = std::min(control.atol[c], kOfRegularisation * job.eps_v());
-  }
-  Ode ode = make_ode(duals);
-  ode.events = System::kEvents;
-  ode.event_functions = [&system](double t, const double* y, double* g) {
-    State<double, n> state;
-    State<double, System::kEvents> value;
-    for (int i = 0; i < n; ++i) state[i] = y[i];
-    system.events(t, state, value);
-    for (int i = 0; i < System::kEvents; ++i) g[i] = value[i];
-  };
-  const SundialsRun run = integrate_sundials(
-      ode, 0.0, y0, job.t_s, sundials_options(job.method, control.rtol, control.atol, n));
+  if constexpr (n == 10) resolve_stick(job.eps_v(), control);
+  const SundialsRun run =
+      integrate_sundials(rim_ode(system, duals), 0.0, y0, job.t_s,
+                         sundials_options(job.method, control.rtol, control.atol, n));
   State<double, n> y;
   for (Eigen::Index row = 0; row < run.states.rows(); ++row) {
     for (int i = 0; i < n; ++i) y[i] = run.states(row, i);
     record.rows.push_back(row_of(job.columns, system, job.t_s[static_cast<std::size_t>(row)], y));
   }
-  record.end.outcome = run.outcome;
-  record.end.end_s = run.end_s;
-  record.end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
-                           static_cast<int>(run.evaluations)};
-  constexpr Outcome kOutcomes[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
-                                   Outcome::inconsistent_contact};
-  if (run.event >= 0 && run.event < 4) {
-    record.end.outcome = kOutcomes[run.event];
-    record.end.events.push_back({run.end_s, std::string(name(record.end.outcome))});
-  }
+  note_end(run, record.end);
   return record;
-}
-
-template <class System>
-void place(const RimJob& job, System& system) {
-  system.body = job.model.body;
-  system.body.side = std::cos(job.input.theta) < 0.0 ? -1.0 : 1.0;
-  using S = typename System::Scalar;
-  LossValues<S> losses{};
-  for (int i = 0; i < kLosses; ++i) losses.value[i] = S(job.input.losses.value[i]);
-  losses.air_ratio = job.input.losses.air_ratio;
-  losses.quadratic_ratio = job.input.losses.quadratic_ratio;
-  losses.eps_w = job.input.losses.eps_w;
-  system.losses = make_losses<typename System::LossList>(losses);
 }
 
 template <template <class> class Friction>
@@ -182,8 +146,8 @@ RimRecord run_sliding_by(const RimJob& job, double tolerance) {
   Sliding<Jacobian, Friction, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
           PivotingFriction, ContourFriction>
       duals;
-  place(job, system);
-  place(job, duals);
+  place(job.model, job.input, system);
+  place(job.model, job.input, duals);
   if constexpr (Friction<double>::kActive) {
     system.friction = {job.input.friction, job.eps_v()};
     duals.friction = {Jacobian(job.input.friction), job.eps_v()};
@@ -198,8 +162,8 @@ RimRecord run_rolling_by(const RimJob& job, double tolerance) {
   Rolling<Dual<8>, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
           ContourFriction>
       duals;
-  place(job, system);
-  place(job, duals);
+  place(job.model, job.input, system);
+  place(job.model, job.input, duals);
   return run_sundials(job, system, duals, tolerance);
 }
 
@@ -227,18 +191,6 @@ RimRecord run_job(const RimJob& job, double tolerance, double stick) {
   });
 }
 
-/// Steps an explicit method needs: its stability limit times the fastest rate of the regularised
-/// law, at most (mu m g / eps_v)(1/m + R^2/C + (R^2 + h^2)/A) while N = m g (theory/sliding.md,
-/// (S19)).
-double explicit_steps(const RimJob& job) {
-  if (job.eps_v() == 0.0) return 0.0;
-  constexpr double kStability = 6.0;
-  const RimBody& b = job.model.body;
-  const double rate = job.input.friction * b.m * b.g / job.eps_v() *
-                      (1.0 / b.m + b.R * b.R / b.C + (b.h * b.h + b.R * b.R) / b.A);
-  return rate * job.t_s.back() / kStability;
-}
-
 struct ContactChoice {
   Method method = Method::dop853;
   std::string name = "dop853", reason;
@@ -249,7 +201,8 @@ ContactChoice choose(const RimJob& job, const std::string& asked) {
   const bool exact = job.law == "sliding" && job.eps_v() == 0.0;
   if (asked == "auto") {
     if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
-    const double steps = explicit_steps(job);
+    const double steps =
+        job.eps_v() > 0.0 ? explicit_steps(job.model, job.input.friction, job.t_s.back()) : 0.0;
     if (steps > kManySteps)
       return {
           Method::cvode_bdf, "cvode-bdf",

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <memory>
 #include <sundials/sundials_context.hpp>
+#include <vector>
 
 #include "trochoid/data/error.hpp"
 
@@ -73,6 +74,18 @@ int call_events(double t, N_Vector y, double* g, void* user) {
   return 0;
 }
 
+int call_sensitivities(int parameters, double t, N_Vector y, N_Vector, N_Vector* s, N_Vector* ds,
+                       void* user, N_Vector, N_Vector) {
+  const Ode& ode = *static_cast<const Ode*>(user);
+  Eigen::MatrixXd from(ode.states, parameters), rate(ode.states, parameters);
+  for (int p = 0; p < parameters; ++p)
+    from.col(p) = Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(s[p]), ode.states);
+  ode.sensitivities.derivative(t, N_VGetArrayPointer(y), from.data(), rate.data());
+  for (int p = 0; p < parameters; ++p)
+    Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(ds[p]), ode.states) = rate.col(p);
+  return rate.allFinite() ? 0 : kRecoverable;
+}
+
 void keep_quiet(int, const char*, const char*, char*, void*) {}  // outcomes say it instead
 
 // --- one stepper of SUNDIALS ---------------------------------------------------------------------
@@ -84,6 +97,8 @@ class Stepper {
   /// Advances to t_limit_s; @returns SUNDIALS' flag.
   virtual int advance(double t_limit_s, N_Vector y, double& t_s) = 0;
   virtual void root_signs(int* signs) = 0;
+  /// dy/dp where advance() ended, states x parameters by column; nothing if none are carried.
+  virtual void sensitivities(Eigen::Ref<Eigen::RowVectorXd>) {}
   virtual void count(SundialsRun& run) = 0;
   virtual std::string flag_name(int flag) const = 0;
 };
@@ -116,6 +131,7 @@ class Cvode : public Stepper {
     else
       use_fixed_point(y, context);
     if (ode.events > 0) require(CVodeRootInit(memory_, ode.events, call_events), "CVodeRootInit");
+    if (ode.sensitivities.start.cols() > 0) carry_sensitivities(ode, atol, options, context);
   }
   ~Cvode() override { CVodeFree(&memory_); }
 
@@ -124,6 +140,16 @@ class Cvode : public Stepper {
     return CVode(memory_, t_limit_s, y, &t_s, CV_NORMAL);
   }
   void root_signs(int* signs) override { CVodeGetRootInfo(memory_, signs); }
+  void sensitivities(Eigen::Ref<Eigen::RowVectorXd> row) override {
+    if (carried_.empty()) return;
+    double t_s = 0.0;
+    std::vector<N_Vector> raw = pointers(carried_);
+    require(CVodeGetSens(memory_, &t_s, raw.data()), "CVodeGetSens");
+    const Eigen::Index states = row.size() / static_cast<Eigen::Index>(raw.size());
+    for (std::size_t p = 0; p < raw.size(); ++p)
+      row.segment(static_cast<Eigen::Index>(p) * states, states) =
+          Eigen::Map<const Eigen::RowVectorXd>(N_VGetArrayPointer(raw[p]), states);
+  }
   void count(SundialsRun& run) override {
     CVodeGetNumSteps(memory_, &run.steps);
     CVodeGetNumRhsEvals(memory_, &run.evaluations);
@@ -144,11 +170,35 @@ class Cvode : public Stepper {
     require(CVodeSetNonlinearSolver(memory_, nonlinear_.get()), "CVodeSetNonlinearSolver");
   }
 
+  /// Staggered: the states' step is accepted first, then all sensitivities with its Jacobian.
+  void carry_sensitivities(const Ode& ode, const Vector& atol, const SundialsOptions& options,
+                           SUNContext context) {
+    const auto count = static_cast<int>(ode.sensitivities.start.cols());
+    std::vector<Vector> tolerances;
+    for (int p = 0; p < count; ++p) {
+      carried_.push_back(make_vector(ode.sensitivities.start.col(p), context));
+      tolerances.emplace_back(N_VClone(atol.get()));
+      N_VScale(1.0, atol.get(), tolerances.back().get());
+    }
+    require(
+        CVodeSensInit(memory_, count, CV_STAGGERED, call_sensitivities, pointers(carried_).data()),
+        "CVodeSensInit");
+    require(CVodeSensSVtolerances(memory_, options.rtol, pointers(tolerances).data()),
+            "CVodeSensSVtolerances");
+    require(CVodeSetSensErrCon(memory_, SUNTRUE), "CVodeSetSensErrCon");
+  }
+  static std::vector<N_Vector> pointers(const std::vector<Vector>& vectors) {
+    std::vector<N_Vector> raw;
+    for (const Vector& v : vectors) raw.push_back(v.get());
+    return raw;
+  }
+
   bool interpolate_;
   void* memory_ = nullptr;
   Matrix matrix_;
   LinearSolver linear_;
   NonlinearSolver nonlinear_;
+  std::vector<Vector> carried_;
 };
 
 class Erk : public Stepper {
@@ -250,6 +300,13 @@ void check_call(const Ode& ode, double start_s, const Eigen::VectorXd& y0,
         fmt::format("integrate_sundials: {} states, but {} initial values and {} "
                     "absolute tolerances; all must be equal",
                     ode.states, y0.size(), options.atol.size()));
+  const Eigen::MatrixXd& start = ode.sensitivities.start;
+  if (start.cols() > 0 &&
+      (start.rows() != ode.states || options.method != SundialsMethod::cvode_bdf))
+    throw InputError(
+        fmt::format("integrate_sundials: sensitivities of {} states with {} rows; they must agree, "
+                    "and cvode_bdf alone carries them",
+                    ode.states, start.rows()));
   for (std::size_t i = 0; i < t_s.size(); ++i)
     if (!(t_s[i] >= (i == 0 ? start_s : t_s[i - 1])))
       throw InputError(fmt::format("integrate_sundials: t_s[{}] = {} must not precede {}", i,
@@ -282,6 +339,9 @@ SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::Vect
 
   SundialsRun run;
   run.states.resize(static_cast<Eigen::Index>(t_s.size()), ode.states);
+  const Eigen::MatrixXd& start = ode.sensitivities.start;
+  run.sensitivities.resize(run.states.rows(), start.size());
+  Eigen::RowVectorXd carried = start.reshaped().transpose();
   run.end_s = start_s;
   Eigen::Index rows = 0;
   for (const double t : t_s) {
@@ -294,9 +354,12 @@ SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::Vect
       }
       if (flag < 0 || (flag == kRootFlag && run.end_s < t)) break;
     }
-    run.states.row(rows++) = state.transpose();
+    run.states.row(rows) = state.transpose();
+    if (run.end_s > start_s) stepper->sensitivities(carried);
+    run.sensitivities.row(rows++) = carried;
   }
   run.states.conservativeResize(rows, Eigen::NoChange);
+  run.sensitivities.conservativeResize(rows, Eigen::NoChange);
   run.end_state = state;
   stepper->count(run);
   return run;

@@ -82,6 +82,36 @@ TEST(Sundials, FollowsAStiffDecayInFewStepsWithTheExactJacobian) {
   EXPECT_LT(run.steps, 5000);  // an explicit method needs 1e6 of them for stability alone
 }
 
+TEST(Sundials, CarriesExactSensitivitiesThroughAStiffRelaxation) {
+  // y' = -k (y - a t), y(0) = y0:  y = a t - a/k + (y0 + a/k) exp(-k t); parameters a and k.
+  const double a = 2.0, k = 300.0;
+  Ode ode;
+  ode.states = 1;
+  ode.derivative = [=](double t, const double* y, double* dy) { dy[0] = -k * (y[0] - a * t); };
+  ode.jacobian = [=](double, const double*, double* j) { j[0] = -k; };
+  ode.sensitivities.start = Eigen::MatrixXd::Zero(1, 2);
+  ode.sensitivities.derivative = [=](double t, const double* y, const double* s, double* ds) {
+    ds[0] = -k * s[0] + k * t;
+    ds[1] = -k * s[1] - (y[0] - a * t);
+  };
+  SundialsOptions stiff = options(SundialsMethod::cvode_bdf, 1e-10);
+  stiff.atol = Eigen::VectorXd::Constant(1, 1e-12);
+  const std::array<double, 2> times{0.0, 0.5};
+  const SundialsRun run =
+      integrate_sundials(ode, 0.0, Eigen::VectorXd::Constant(1, 1.0), times, stiff);
+  ASSERT_EQ(run.sensitivities.rows(), 2);
+  EXPECT_EQ(run.sensitivities(0, 0), 0.0);
+  const double decay = std::exp(-k * 0.5);  // 1e-65: nothing of the start is left
+  ASSERT_LT(decay, 1e-60);
+  // Local errors of some hundred steps at 1e-10 of values below 1.
+  EXPECT_NEAR(run.sensitivities(1, 0), 0.5 - 1.0 / k, 1e-8);
+  EXPECT_NEAR(run.sensitivities(1, 1), a / (k * k), 1e-8 * a / (k * k) + 1e-10);
+
+  stiff.method = SundialsMethod::cvode_adams;
+  EXPECT_THROW((void)integrate_sundials(ode, 0.0, Eigen::VectorXd::Constant(1, 1.0), times, stiff),
+               InputError);
+}
+
 TEST(Sundials, NamesTheStepLimitInsteadOfGoingOnForEver) {
   SundialsOptions few = options(SundialsMethod::cvode_adams, 1e-12);
   few.max_steps = 3;

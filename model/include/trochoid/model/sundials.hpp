@@ -12,6 +12,14 @@
 /// solver of choice where the equations are stiff (regularised friction).
 namespace trochoid::model {
 
+/// Forward sensitivities s = dy/dp carried beside the states: s' = (df/dy) s + df/dp. They take
+/// part in the error control, with the states' absolute tolerances per unit of the parameter.
+struct Sensitivities {
+  Eigen::MatrixXd start;  ///< dy/dp at the start, states x parameters
+  /// Writes s' to ds, both states x parameters, column by column.
+  std::function<void(double t_s, const double* y, const double* s, double* ds)> derivative;
+};
+
 /// y' = f(t, y) with what an implicit or event-seeking solver may want besides. Functions may write
 /// NaN: the solver then shortens its step and, if that does not help, ends with
 /// tolerance_not_reachable.
@@ -22,6 +30,7 @@ struct Ode {
   std::function<void(double t_s, const double* y, double* jacobian)> jacobian;
   int events = 0;
   std::function<void(double t_s, const double* y, double* g)> event_functions;
+  Sensitivities sensitivities;  ///< of no parameter unless asked; cvode_bdf only
 };
 
 enum class SundialsMethod {
@@ -44,8 +53,9 @@ struct SundialsOptions {
 };
 
 struct SundialsRun {
-  Eigen::MatrixXd states;     ///< one row per time reached
-  Eigen::VectorXd end_state;  ///< where the run ended: last time, or the event
+  Eigen::MatrixXd states;         ///< one row per time reached
+  Eigen::MatrixXd sensitivities;  ///< one row per time reached: states x parameters, by column
+  Eigen::VectorXd end_state;      ///< where the run ended: last time, or the event
   double end_s = 0.0;
   int event = -1;  ///< index of the event function that changed sign, -1 if none
   Outcome outcome = Outcome::reached_end;
@@ -55,7 +65,8 @@ struct SundialsRun {
 
 /// Integrates from (start_s, y0) through ascending times; stops at the first sign change of an
 /// event function (times after it have no row) or when the solver gives up (outcome says so).
-/// @throws InputError if sizes do not match or a time precedes the start.
+/// @throws InputError if sizes do not match, a time precedes the start or the method carries no
+///         sensitivities.
 [[nodiscard]] SundialsRun integrate_sundials(const Ode& ode, double start_s,
                                              const Eigen::VectorXd& y0, std::span<const double> t_s,
                                              const SundialsOptions& options);

@@ -1,0 +1,121 @@
+#include "rim_kernel.hpp"
+
+namespace trochoid::model {
+namespace {
+
+/// Beside a stiff solver's linear algebra terms that are zero cost nothing: one list holds them
+/// all.
+template <class S>
+using Stiff = Sliding<S, Coulomb, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                      PivotingFriction, ContourFriction>;
+constexpr int kStates = Stiff<double>::kStates;
+
+template <class S, class From>
+Stiff<S> stiff_system(const RimModel& model, const RimInput<From>& input) {
+  Stiff<S> system;
+  place(model, input, system);
+  system.friction.eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
+  if constexpr (std::is_same_v<S, From>)
+    system.friction.mu = input.friction;
+  else
+    system.friction.mu = S(value_of(input.friction));
+  return system;
+}
+
+State<double, kStates> numbers(const State<double, kStates>& y) {
+  return y;
+}
+State<double, kStates> numbers(const State<Dual8, kStates>& y) {
+  State<double, kStates> result;
+  for (int i = 0; i < kStates; ++i) result[i] = y[i].value;
+  return result;
+}
+
+/// One evaluation over Dual8 gives df/dy s + df/dp for eight parameters at once.
+Sensitivities sensitivities_of(const RimModel& model, const RimInput<Dual8>& input,
+                               const State<Dual8, kStates>& start) {
+  Sensitivities s;
+  s.start.resize(kStates, Dual8::kLanes);
+  for (int i = 0; i < kStates; ++i)
+    for (int p = 0; p < Dual8::kLanes; ++p) s.start(i, p) = start[i].derivative[p];
+  s.derivative = [system = stiff_system<Dual8>(model, input)](double t_s, const double* y,
+                                                              const double* from, double* rate) {
+    State<Dual8, kStates> state, change;
+    for (int i = 0; i < kStates; ++i) {
+      state[i] = Dual8(y[i]);
+      for (int p = 0; p < Dual8::kLanes; ++p) state[i].derivative[p] = from[i + p * kStates];
+    }
+    system.derivative(t_s, state, change);
+    for (int i = 0; i < kStates; ++i)
+      for (int p = 0; p < Dual8::kLanes; ++p) rate[i + p * kStates] = change[i].derivative[p];
+  };
+  return s;
+}
+
+State<double, kStates> state_at(const SundialsRun& run, Eigen::Index row, double) {
+  State<double, kStates> y;
+  for (int i = 0; i < kStates; ++i) y[i] = run.states(row, i);
+  return y;
+}
+State<Dual8, kStates> state_at(const SundialsRun& run, Eigen::Index row, const Dual8&) {
+  State<Dual8, kStates> y;
+  for (int i = 0; i < kStates; ++i) {
+    y[i] = Dual8(run.states(row, i));
+    for (int p = 0; p < Dual8::kLanes; ++p)
+      y[i].derivative[p] = run.sensitivities(row, i + p * kStates);
+  }
+  return y;
+}
+
+}  // namespace
+
+double explicit_steps(const RimModel& model, double friction, double duration_s) {
+  const double eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
+  if (eps_v == 0.0) return 0.0;
+  constexpr double kStability = 6.0;
+  const RimBody& b = model.body;
+  const double rate =
+      friction * b.m * b.g / eps_v * (1.0 / b.m + b.R * b.R / b.C + (b.h * b.h + b.R * b.R) / b.A);
+  return rate * duration_s / kStability;
+}
+
+template <class S>
+RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimRunOptions& options,
+                     std::span<const double> t_s) {
+  const State<S, kStates> start = rim_state(model.body, input);
+  Ode ode = rim_ode(stiff_system<double>(model, input), stiff_system<Dual<16>>(model, input));
+  if constexpr (std::is_same_v<S, Dual8>) ode.sensitivities = sensitivities_of(model, input, start);
+  StepControl<kStates> control = rim_control<kStates>(model.body, options);
+  resolve_stick(model.terms.slip_regularisation_m_s.value_or(0.0), control);
+  SundialsOptions sundials;
+  sundials.method = SundialsMethod::cvode_bdf;
+  constexpr double kFinest = 1e-14;
+  sundials.rtol = std::max(control.rtol, kFinest);
+  sundials.atol = Eigen::Map<const Eigen::VectorXd>(control.atol, kStates);
+  sundials.max_steps = options.max_steps;
+  const State<double, kStates> y = numbers(start);
+  const SundialsRun run =
+      integrate_sundials(ode, 0.0, Eigen::Map<const Eigen::VectorXd>(y.v, kStates), t_s, sundials);
+
+  constexpr int kComponents[] = {Rim::phi, Rim::theta, Rim::psi, Rim::x, Rim::y};
+  RimPath<S> path;
+  path.end.y = start;
+  for (Eigen::Index row = 0; row < run.states.rows(); ++row) {
+    path.end.y = state_at(run, row, S(0.0));
+    State<S, 5> seen;
+    for (int c = 0; c < 5; ++c) seen[c] = path.end.y[kComponents[c]];
+    path.rows.push_back(seen);
+  }
+  path.end.regime = Regime::sliding;
+  path.end.side = std::cos(value_of(input.theta)) < 0.0 ? -1.0 : 1.0;
+  path.end.error_sum = static_cast<double>(run.steps);
+  note_end(run, path.end);
+  return path;
+}
+
+template RimPath<double> run_stiff(const RimModel&, const RimInput<double>&, const RimRunOptions&,
+                                   std::span<const double>);
+template RimPath<Dual8> run_stiff(const RimModel&, const RimInput<Dual8>&, const RimRunOptions&,
+                                  std::span<const double>);
+
+}  // namespace trochoid::model
