@@ -15,6 +15,7 @@ void add_fit_command(CLI::App& app);
 void add_study_command(CLI::App& app);
 void add_study_reference(CLI::App& study);
 void add_report_command(CLI::App& app);
+void add_study_lean(CLI::App& study);
 void add_study_retrograde(CLI::App& study);
 void add_study_solvers(CLI::App& study);
 void add_study_stability(CLI::App& study);

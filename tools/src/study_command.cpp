@@ -8,6 +8,7 @@ void add_study_command(CLI::App& app) {
       "Measure the program itself: error against run time, and what survives the extremes");
   study->require_subcommand(1);
   add_study_reference(*study);
+  add_study_lean(*study);
   add_study_retrograde(*study);
   add_study_solvers(*study);
   add_study_stability(*study);
