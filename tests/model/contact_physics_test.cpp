@@ -207,8 +207,8 @@ double exponent(const data::Scene& scene) {
   return -(t[late] - t[early]) / (p(late) - p(early));
 }
 
-// alpha ~ (t0 - t)^n while the disc falls through nearly steady motions (sliding.md, (S20)): n = 2/3
-// for dry contour friction, 2 for dry rolling friction, 1/3 for the viscous layer of air. Runs
+// alpha ~ (t0 - t)^n while the disc falls through nearly steady motions (sliding.md, (S20)): n =
+// 2/3 for dry contour friction, 2 for dry rolling friction, 1/3 for the viscous layer of air. Runs
 // start at 0.05 rad and end well before the singularity; the rest is of second order in the tilt.
 TEST(LastStage, FollowsThePowerLawOfEachLoss) {
   constexpr double kSecondOrder = 0.02;

@@ -19,6 +19,7 @@ void add_study_lean(CLI::App& study);
 void add_study_retrograde(CLI::App& study);
 void add_study_solvers(CLI::App& study);
 void add_study_stability(CLI::App& study);
+void add_study_thesis(CLI::App& study);
 #ifdef TROCHOID_HAS_TRACKING
 void add_track_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);

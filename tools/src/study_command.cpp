@@ -12,6 +12,7 @@ void add_study_command(CLI::App& app) {
   add_study_retrograde(*study);
   add_study_solvers(*study);
   add_study_stability(*study);
+  add_study_thesis(*study);
 }
 
 }  // namespace trochoid::tools
