@@ -15,8 +15,6 @@ class LightWindow {
   LightWindow(const cv::Mat& luma, const cv::Rect& window);
   /// The same window blurred by a Gaussian.
   [[nodiscard]] LightWindow blurred(double sigma_px) const;
-  /// Brightens a plate by the median ratio to the picture: exposure drifts, lamps flicker.
-  void scale_to(const LightWindow& picture);
   [[nodiscard]] bool empty() const { return light_.empty(); }
   [[nodiscard]] const cv::Rect& window() const { return window_; }
   /// Bilinear sample; `holds` must be true for the point.
@@ -46,12 +44,6 @@ struct Profile {
     constexpr float kClipped = 245.0f;
     return *std::max_element(light.begin(), light.begin() + count) > kClipped;
   }
-  /// Forgets the samples before s.
-  void begin_at(double s);
-  /// Forgets the samples beyond s.
-  void end_at(double s) {
-    while (count > 1 && s_px(count - 1) > s) --count;
-  }
   [[nodiscard]] double background_at(double s) const {
     const int i = static_cast<int>((s - first_px) / kStepPx);
     return background[static_cast<size_t>(i < 0 ? 0 : i >= count ? count - 1 : i)];
@@ -62,32 +54,6 @@ struct Profile {
 bool sample_profile(const LightWindow& picture, const LightWindow& plate,
                     const Eigen::Vector2d& at_px, const Eigen::Vector2d& normal_px,
                     double inside_px, double outside_px, Profile& profile);
-
-/// What is assumed of the edge in a profile.
-struct EdgeModel {
-  double blur_px = 0.7;  ///< standard deviation of the Gaussian that blurs the step
-  bool plate = false;    ///< the outer level is a multiple of the background plate
-  bool slopes = false;   ///< both levels change linearly along the profile (shading, soft shadows)
-};
-
-/// A blurred step found in a profile.
-struct ProfileEdge {
-  double offset_px = 0.0;     ///< of the edge along the normal
-  double variance_px2 = 0.0;  ///< from the residuals of the profile itself
-  double information = 0.0;   ///< variance is noise^2 / information
-  double contrast = 0.0;      ///< outer minus inner level at the edge
-  double inner = 0.0;         ///< level of the body at the edge
-  double noise = 0.0;         ///< rms residual of the profile
-  double square = 0.0;        ///< squared residuals of independent samples, `freedom` of them
-  double freedom = 1.0;
-  double gain = 0.0;  ///< log-likelihood over "no edge here"
-};
-
-/// Fits the levels beside a blurred step and its position in `iterations` Gauss-Newton steps from
-/// `start_px`; one step gives the best linear estimate, fit for averaging however noisy. False if
-/// no edge is found within `reach_px` of the start.
-bool fit_edge(const Profile& profile, const EdgeModel& model, double start_px, double reach_px,
-              int iterations, ProfileEdge& edge);
 
 /// Whether a multiple of the plate explains the part of the profile beyond `from_px` better than a
 /// constant does: not so where the body rests in the plate.

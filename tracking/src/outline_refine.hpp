@@ -2,7 +2,7 @@
 #include <optional>
 #include <vector>
 
-#include "edge_profile.hpp"
+#include "edge_fit.hpp"
 #include "outline_samples.hpp"
 #include "robust_step.hpp"
 
@@ -33,7 +33,7 @@ struct Search {
   double step_px;    ///< between outline points
   int iterations;
   bool own_edges;       ///< also edges between two surfaces of the body
-  bool slopes;          ///< let the levels beside an edge change along the profile where they do
+  bool shading;         ///< the levels beside an edge may change along the profile
   int edge_iterations;  ///< 1: best linear estimate of each edge
 };
 

@@ -6,6 +6,8 @@
 
 namespace trochoid::tracking {
 
+inline constexpr int kGroups = 3;  ///< outer silhouette, bore, the body's own edges
+
 /// One measured edge for the linear fit: observed offset along the normal and how it depends on the
 /// pose. Two nuisances are common to the whole outline: `swell` multiplies an error of the size (+1
 /// on outer rims, -1 on bores), `polarity` a shift towards the brighter side (the sign of the
@@ -13,6 +15,10 @@ namespace trochoid::tracking {
 struct EdgeEquation {
   PoseMotion::Step motion;
   double swell = 1.0, polarity = 1.0;
+  /// What the edge model may be wrong by [px], alike for neighbours in direction within a group.
+  double model_px = 0.0;
+  int group = 0;               ///< 0 .. kGroups - 1
+  double direction_rad = 0.0;  ///< of the normal
   double offset_px = 0.0;
   double variance_px2 = 1.0;
   double arc_px = 1.0;
@@ -30,8 +36,8 @@ struct RobustSolution {
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
 };
 
-/// Tukey-weighted least squares of  offset = motion . step + swell * c  with weak priors:
-/// `prior_sd` per parameter and kSwellSdPx on c. False if fewer than 8 equations.
+/// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
+/// `prior_sd` per parameter. False if fewer than 8 equations.
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
                     double least_scale_px, RobustSolution& out);
 
