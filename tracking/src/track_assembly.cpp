@@ -46,9 +46,12 @@ void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const Metr
   sample.covariance_m2 = m_per_px * seen.covariance_px2 * m_per_px.transpose();
 }
 
-void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold) {
+/// @param mark_rad angle of the mark in the body: turned over about the axis of its mark, a body
+/// with the same mark on both faces shows the spin pi - psi - 2 mark.
+void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold,
+                      double mark_rad) {
   double theta = pose.pose.theta_rad, phi = pose.pose.phi_rad, psi = pose.pose.psi_rad;
-  if (fold && theta > 0.5 * kPi) theta = kPi - theta, phi += kPi, psi = -psi;
+  if (fold && theta > 0.5 * kPi) theta = kPi - theta, phi += kPi, psi = kPi - psi - 2.0 * mark_rad;
   if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {theta, pose.sigma_theta_rad};
   if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {phi, pose.sigma_phi_rad};
   if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
@@ -68,8 +71,8 @@ double usual_radius_px(const BodyPath& path) {
   return *middle;
 }
 
-data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule, bool fold,
-                           double readout_s, int height_px) {
+data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+                           const AssemblyOptions& options) {
   data::Track track{.object = object, .samples = {}};
   Unwrapper phi(2.0 * kPi);
   Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
@@ -78,13 +81,14 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     data::TrackSample sample;
     sample.frame = index;
     sample.t_s =
-        at.t_s + readout_s * std::clamp(seen.centre_px.y() / std::max(1, height_px - 1), 0.0, 1.0);
+        at.t_s + options.readout_s *
+                     std::clamp(seen.centre_px.y() / std::max(1, options.height_px - 1), 0.0, 1.0);
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
     if (seen.pose) {
       sample.centre_m = seen.pose->pose.centre_m.head<2>();
       sample.covariance_m2 = seen.pose->covariance_m2;
-      angles_from_pose(sample, *seen.pose, fold);
+      angles_from_pose(sample, *seen.pose, options.fold, options.mark_rad);
     } else {
       metres_from_rim(sample, seen, rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.

@@ -29,11 +29,17 @@ struct MetreRule {
   double height_m = 0.0;               ///< of the measured rim above the floor
 };
 
-/// Track samples of a path: metres and their covariance, unwrapped and (for faces that look alike)
-/// folded angles, rolling-shutter times.
-/// @param readout_s time from the first to the last row.
+struct AssemblyOptions {
+  bool fold = false;       ///< faces look alike: report min(theta, pi - theta)
+  double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
+  double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
+  int height_px = 1;
+};
+
+/// Track samples of a path: metres and their covariance, unwrapped and folded angles, times of the
+/// sample's own row.
 [[nodiscard]] data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
-                                         bool fold, double readout_s, int height_px);
+                                         const AssemblyOptions& options);
 
 /// Median of the rim's semi-major axis over the path [px]: what the known radius is compared with.
 [[nodiscard]] double usual_radius_px(const BodyPath& path);

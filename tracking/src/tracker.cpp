@@ -200,13 +200,16 @@ class Tracking {
     result.summary.frames = frames_;
     result.summary.damaged = damaged_;
     std::string words = "camera and known body: the CoM of the fitted cylinder";
+    AssemblyOptions how{.fold = result.file.angles_folded,
+                        .readout_s = scene_.camera.readout_s,
+                        .height_px = recording_.info().height_px};
+    if (scene_.body && !scene_.body->marks.empty())
+      how.mark_rad = scene_.body->marks.front().angle_rad;
     for (std::size_t k = 0; k < paths_.size(); ++k) {
       const BodyPath& path = paths_[k];
       MetreRule rule;
       if (!(has_shape(scene_) && camera_)) rule = metre_rule(path, words);
-      result.file.tracks.push_back(
-          assemble_track(path, static_cast<int>(k), rule, result.file.angles_folded,
-                         scene_.camera.readout_s, recording_.info().height_px));
+      result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), rule, how));
       const auto& samples = result.file.tracks.back().samples;
       const auto found = static_cast<std::int64_t>(samples.size());
       result.summary.found += found;

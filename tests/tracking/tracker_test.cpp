@@ -1,0 +1,127 @@
+#include "trochoid/tracking/tracker.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "drawn_clip.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr int kFrames = 90;
+
+/// Largest distance between track and truth over the frames both have.
+double largest_error_px(const data::Track& track,
+                        const std::function<Eigen::Vector2d(int)>& truth) {
+  double largest = 0.0;
+  for (const auto& s : track.samples)
+    largest = std::max(largest, (s.centre_px - truth(static_cast<int>(s.frame))).norm());
+  return largest;
+}
+
+// Rests for a third of the clip, is pushed, rests again: a row in every frame, resting ones too.
+TEST(TrackVideo, FollowsADiscThatRestsFirstAndLast) {
+  const ScratchFolder folder("rests");
+  const auto truth = [](int i) {
+    const double t = std::clamp(i - 30, 0, 40);
+    return Eigen::Vector2d(50.0 + 2.6 * t, 60.0 + 0.9 * t);
+  };
+  write_clip(folder / "clip.mkv", drawn_floor(220, 160, 150.0), kFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, truth(i).x(), truth(i).y(), 16.0, 16.0, 0.0, 50.0);
+             });
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt);
+  ASSERT_EQ(result.file.tracks.size(), 1u);
+  EXPECT_EQ(result.file.tracks[0].samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 0.2);
+  EXPECT_FALSE(result.file.tracks[0].samples[0].has_metres()) << "no scale is known";
+}
+
+// Equal discs meet head on and exchange their motion; the one that stood must not inherit the
+// other's name.
+TEST(TrackVideo, TwoDiscsKeepTheirNamesThroughACollision) {
+  const ScratchFolder folder("collision");
+  const auto hit = [](int i) {
+    return Eigen::Vector2d(std::min(30.0 + 3.0 * i, 120.0 - 33.0), 70.0);
+  };
+  const auto stood = [](int i) {
+    return Eigen::Vector2d(120.0 + std::max(0.0, 3.0 * (i - 19)), 70.0);
+  };
+  write_clip(folder / "clip.mkv", drawn_floor(320, 140, 40.0), 70, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, hit(i).x(), hit(i).y(), 16.0, 16.0, 0.0, 160.0);
+               draw_disc(picture, stood(i).x(), stood(i).y(), 16.0, 16.0, 0.0, 160.0);
+             });
+  TrackOptions options;
+  options.objects = 2;
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt, options);
+  ASSERT_EQ(result.file.tracks.size(), 2u);
+  for (const auto& track : result.file.tracks) {
+    EXPECT_EQ(track.samples.size(), 70u);
+    const bool is_hit = track.samples.front().centre_px.x() < 80.0;
+    // Where the discs touch, each hides the other's rim for a quarter of the turn.
+    EXPECT_LT(is_hit ? largest_error_px(track, hit) : largest_error_px(track, stood), 0.6);
+  }
+}
+
+TEST(TrackVideo, ABarInFrontLeavesAGapAndTheDiscIsFoundAgain) {
+  const ScratchFolder folder("bar");
+  const auto truth = [](int i) {
+    return Eigen::Vector2d(25.0 + 2.2 * i, 60.0 + 8.0 * std::sin(0.1 * i));
+  };
+  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, truth(i).x(), truth(i).y(), 14.0, 14.0, 0.0, 60.0);
+               picture.colRange(110, 142) = cv::Scalar(100.0);
+             });
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt);
+  const auto& samples = result.file.tracks.at(0).samples;
+  EXPECT_LT(samples.size(), static_cast<std::size_t>(kFrames)) << "hidden frames have no row";
+  EXPECT_GT(samples.back().frame, 80) << "found again behind the bar";
+  EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 1.0);
+}
+
+TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
+  const ScratchFolder folder("mark");
+  const auto psi = [](int i) { return 0.3 + 0.11 * i; };  // seen from above, anticlockwise
+  const auto x = [](int i) { return 50.0 + 1.5 * i; };
+  write_clip(folder / "clip.mkv", drawn_floor(240, 120, 60.0), kFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, x(i), 60.0, 24.0, 24.0, 0.0, 190.0);
+               draw_disc(picture, x(i) + 14.0 * std::cos(psi(i)), 60.0 - 14.0 * std::sin(psi(i)),
+                         4.0, 4.0, 0.0, 40.0);
+             });
+  data::Scene scene;
+  scene.body.emplace();
+  scene.body->radius_m = 0.012;  // 2000 px/m
+  scene.support.kind = data::SupportKind::flat;
+  const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
+  const auto& samples = result.file.tracks.at(0).samples;
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  const double turns = 2.0 * std::numbers::pi;
+  const double offset = samples[0].psi->value_rad - psi(0);
+  EXPECT_NEAR(offset, turns * std::round(offset / turns), 0.03) << "absolute: the mark's direction";
+  for (const auto& s : samples) {
+    ASSERT_TRUE(s.psi);
+    EXPECT_NEAR(s.psi->value_rad, psi(static_cast<int>(s.frame)) + offset, 0.03);
+  }
+  const double length_m = (samples.back().centre_m - samples.front().centre_m).norm();
+  EXPECT_NEAR(length_m, 1.5 * (kFrames - 1) / 2000.0, 0.002 * length_m + 1e-4);
+}
+
+TEST(TrackVideo, AWallWithoutABodyIsAnErrorThatHelps) {
+  const ScratchFolder folder("empty");
+  write_clip(folder / "clip.mkv", drawn_floor(120, 90, 120.0), 20, 2.0, [](cv::Mat&, int) {});
+  try {
+    (void)track_video(folder / "clip.mkv", {}, std::nullopt);
+    FAIL() << "tracked a body that is not there";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("no moving body found"));
+  }
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
