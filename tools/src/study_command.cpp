@@ -13,6 +13,9 @@ void add_study_command(CLI::App& app) {
   add_study_solvers(*study);
   add_study_stability(*study);
   add_study_thesis(*study);
+#ifdef TROCHOID_HAS_TRACKING
+  add_study_tracking(*study);
+#endif
 }
 
 }  // namespace trochoid::tools
