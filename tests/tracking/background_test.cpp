@@ -33,7 +33,8 @@ TEST(Background, ABodyThatRestsMostOfTheTimeIsNotFloor) {
   EXPECT_NEAR(level_at(background.plate(), 150, 60), level_at(floor, 150, 60), 3.0);
   const auto seen = find_silhouettes(frames.back(), background.plate(), background.noise_levels());
   ASSERT_EQ(seen.size(), 1u);
-  EXPECT_NEAR(seen[0].detection.centre_px.x(), 150.0, 1.0);
+  // A silhouette is for finding, not for measuring: a pixel or so.
+  EXPECT_NEAR(seen[0].detection.centre_px.x(), 150.0, 1.5);
   EXPECT_NEAR(seen[0].detection.semi_major_px, 15.0, 1.5);
 }
 

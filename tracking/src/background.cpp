@@ -5,8 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
-
-#include "silhouette.hpp"
+#include <optional>
 
 namespace trochoid::tracking {
 namespace {
@@ -95,6 +94,16 @@ Quantiles quantiles_of(const std::vector<cv::Mat>& samples) {
   return q;
 }
 
+/// A mask without specks, its gaps closed and a margin added.
+cv::Mat smoothed_mask(const cv::Mat& mask) {
+  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5});
+  cv::Mat smooth;
+  cv::morphologyEx(mask, smooth, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));
+  cv::morphologyEx(smooth, smooth, cv::MORPH_CLOSE, disc, {-1, -1}, 3);
+  cv::dilate(smooth, smooth, disc, {-1, -1}, 2);
+  return smooth;
+}
+
 double median_of(const cv::Mat& image) {
   std::array<int, 256> count{};
   int total = 0;
@@ -105,26 +114,62 @@ double median_of(const cv::Mat& image) {
   return level;
 }
 
-/// Mean step across the outline of a silhouette in an image [levels].
-double outline_step(const cv::Mat& image, const Silhouette& body) {
-  const auto& outline = body.outline_px;
+/// Smooth estimate of the static scene from pixels that never changed, and how much those scatter
+/// about it (texture), at reduced size.
+struct Surroundings {
+  static constexpr int kFactor = 2;
+  cv::Mat level, scatter;  ///< CV_32F; level < 0 where nothing static is near
+
+  static Surroundings of(const cv::Mat& plate, const cv::Mat& active) {
+    const cv::Size size((plate.cols + 1) / kFactor, (plate.rows + 1) / kFactor);
+    cv::Mat value, hidden, weight;
+    cv::resize(plate, value, size, 0, 0, cv::INTER_AREA);
+    // A reduced pixel counts only if all of it was static, a margin for blur and shadow included.
+    cv::Mat wide;
+    cv::dilate(active, wide, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
+    cv::resize(wide, hidden, size, 0, 0, cv::INTER_AREA);
+    cv::threshold(hidden, hidden, 0, 1, cv::THRESH_BINARY_INV);
+    hidden.convertTo(weight, CV_32F);
+    value.convertTo(value, CV_32F);
+    const cv::Mat first = value.mul(weight), second = first.mul(value);
+    Surroundings s;
+    s.level = cv::Mat(size, CV_32F, cv::Scalar(-1.0));
+    s.scatter = cv::Mat::zeros(size, CV_32F);
+    // Normalised smoothing at growing width, narrowest first that sees enough.
+    for (int width = 9; width < 2 * std::max(size.width, size.height); width = 2 * width + 1) {
+      cv::Mat sum, square, count;
+      cv::blur(first, sum, {width, width});
+      cv::blur(second, square, {width, width});
+      cv::blur(weight, count, {width, width});
+      bool all = true;
+      for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+          float& level = s.level.at<float>(y, x);
+          if (level >= 0.0F) continue;
+          const float n = count.at<float>(y, x);
+          if (n < 0.15F) {
+            all = false;
+            continue;
+          }
+          level = sum.at<float>(y, x) / n;
+          s.scatter.at<float>(y, x) =
+              std::sqrt(std::max(0.0F, square.at<float>(y, x) / n - level * level));
+        }
+      if (all) break;
+    }
+    return s;
+  }
+};
+
+/// Mean of the samples that the surroundings would explain; nothing if there is none.
+std::optional<double> floor_like(const std::array<int, kSamples>& levels, double level,
+                                 double tolerance) {
   double sum = 0.0;
   int count = 0;
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    const cv::Point2f p = outline[i];
-    const cv::Point2f along =
-        outline[(i + 2) % outline.size()] - outline[(i + outline.size() - 2) % outline.size()];
-    const float length = std::hypot(along.x, along.y);
-    if (length < 0.5F) continue;
-    const cv::Point2f n(along.y / length * 3.0F, -along.x / length * 3.0F);
-    const cv::Point a(cvRound(p.x + n.x), cvRound(p.y + n.y)),
-        b(cvRound(p.x - n.x), cvRound(p.y - n.y));
-    const cv::Rect frame(0, 0, image.cols, image.rows);
-    if (!frame.contains(a) || !frame.contains(b)) continue;
-    sum += std::abs(image.at<std::uint8_t>(a) - image.at<std::uint8_t>(b));
-    ++count;
-  }
-  return count > 0 ? sum / count : 0.0;
+  for (const int v : levels)
+    if (std::abs(v - level) <= tolerance) sum += v, ++count;
+  if (count == 0) return std::nullopt;
+  return sum / count;
 }
 
 }  // namespace
@@ -152,55 +197,37 @@ Background Background::from_samples(const std::vector<cv::Mat>& samples) {
   cv::threshold(q.half, restless, 8.0 + 4.0 * background.noise_, 255, cv::THRESH_BINARY);
   background.restless_ =
       static_cast<double>(cv::countNonZero(restless)) / static_cast<double>(restless.total());
-  background.remove_rested_bodies(level);
-  background.fill_untrusted(restless);
+  background.uncover(level, restless);
   return background;
 }
 
-void Background::remove_rested_bodies(const std::vector<cv::Mat>& samples) {
-  for (const cv::Mat& image : samples)
-    for (const Silhouette& body : find_silhouettes(image, plate_, noise_)) {
-      if (body.outline_px.size() < 12) continue;
-      if (outline_step(plate_, body) < 1.5 * outline_step(image, body) + 4.0) continue;
-      // The plate, not the sample, has the edge: the sample shows the floor that was hidden.
-      cv::Mat mask = cv::Mat::zeros(image.size(), CV_8U);
-      std::vector<cv::Point> polygon;
-      for (const cv::Point2f& p : body.outline_px) polygon.emplace_back(cvRound(p.x), cvRound(p.y));
-      cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{polygon}, 255);
-      cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
-      image.copyTo(plate_, mask);
+void Background::uncover(const std::vector<cv::Mat>& samples, const cv::Mat& restless) {
+  constexpr double kMostActive = 0.7;  // beyond, the camera moves and nothing is static
+  const int active = cv::countNonZero(active_);
+  if (active == 0 || active > kMostActive * static_cast<double>(active_.total())) return;
+  const Surroundings around = Surroundings::of(plate_, active_);
+  const cv::Mat doubtful = smoothed_mask(restless);
+  // The rim of what changed changed too, by less than counts.
+  cv::Mat changed;
+  cv::dilate(active_, changed, cv::Mat::ones(5, 5, CV_8U));
+  std::array<int, kSamples> levels{};
+  for (int y = 0; y < plate_.rows; ++y)
+    for (int x = 0; x < plate_.cols; ++x) {
+      if (changed.at<std::uint8_t>(y, x) == 0) continue;
+      const int sy = std::min(y / Surroundings::kFactor, around.level.rows - 1);
+      const int sx = std::min(x / Surroundings::kFactor, around.level.cols - 1);
+      const double level = around.level.at<float>(sy, sx);
+      if (level < 0.0) continue;
+      const double tolerance = 5.0 + 2.5 * (noise_ + around.scatter.at<float>(sy, sx));
+      std::uint8_t& plate = plate_.at<std::uint8_t>(y, x);
+      if (std::abs(plate - level) <= tolerance) continue;
+      for (std::size_t k = 0; k < kSamples; ++k)
+        levels[k] = samples[k * samples.size() / kSamples].at<std::uint8_t>(y, x);
+      if (const auto floor = floor_like(levels, level, tolerance))
+        plate = cv::saturate_cast<std::uint8_t>(*floor);
+      else if (doubtful.at<std::uint8_t>(y, x) != 0)
+        plate = cv::saturate_cast<std::uint8_t>(level);
     }
-}
-
-void Background::fill_untrusted(const cv::Mat& restless) {
-  if (restless_ < 1e-5 || restless_ > 0.3) return;
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5});
-  cv::Mat mask;
-  cv::morphologyEx(restless, mask, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));
-  cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, disc, {-1, -1}, 3);
-  if (cv::countNonZero(mask) == 0) return;
-  cv::dilate(mask, mask, disc, {-1, -1}, 2);
-  // Normalised smoothing at growing width: every hidden pixel takes the mean of what is seen about
-  // it.
-  cv::Mat seen, value, weight;
-  cv::threshold(mask, seen, 0, 1, cv::THRESH_BINARY_INV);
-  seen.convertTo(weight, CV_32F);
-  plate_.convertTo(value, CV_32F);
-  value = value.mul(weight);
-  cv::Mat open = mask.clone();
-  for (int width = 9; width < std::max(plate_.rows, plate_.cols) && cv::countNonZero(open) > 0;
-       width = 2 * width + 1) {
-    cv::Mat smooth_value, smooth_weight;
-    cv::blur(value, smooth_value, {width, width});
-    cv::blur(weight, smooth_weight, {width, width});
-    for (int y = 0; y < open.rows; ++y)
-      for (int x = 0; x < open.cols; ++x) {
-        if (open.at<std::uint8_t>(y, x) == 0 || smooth_weight.at<float>(y, x) < 0.15F) continue;
-        plate_.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
-            smooth_value.at<float>(y, x) / smooth_weight.at<float>(y, x));
-        open.at<std::uint8_t>(y, x) = 0;
-      }
-  }
 }
 
 double Background::gain(const cv::Mat& luma) const {

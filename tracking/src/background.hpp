@@ -11,10 +11,10 @@ class Background {
   /// Number of frames the estimate works with; fewer are repeated.
   static constexpr int kSamples = 16;
 
-  /// Per-pixel median of the samples, each brought to the brightness of the first. Where the median
-  /// shows a body that rested there most of the time, a sample without it takes its place (the
-  /// plate then has the edge round that place, the sample has none); where no sample may be trusted
-  /// (a body that never leaves), the plate is filled in from its surroundings.
+  /// Per-pixel median of the samples, each brought to the brightness of one of them. Where pixels
+  /// changed and the median does not look like the static surroundings - a body rested or hovered
+  /// there most of the time - samples that do take its place; where none does and the picture never
+  /// settles, the surroundings themselves do.
   /// @param samples CV_8UC1 of one size, at least one.
   static Background from_samples(const std::vector<cv::Mat>& samples);
 
@@ -34,8 +34,7 @@ class Background {
   void scaled_into(cv::Mat& image, double gain, const cv::Rect& box) const;
 
  private:
-  void remove_rested_bodies(const std::vector<cv::Mat>& samples);
-  void fill_untrusted(const cv::Mat& restless);
+  void uncover(const std::vector<cv::Mat>& samples, const cv::Mat& restless);
 
   cv::Mat plate_, active_;
   double noise_ = 1.0;
