@@ -177,8 +177,11 @@ bool study(const fs::path& folder, const Options& options) {
 void run(const Options& options) {
   fs::create_directories(options.out);
   int refused = 0;
-  for (const fs::path& folder : options.folders)
+  for (const fs::path& folder : options.folders) {
+    // What a shell's * brings along: a README beside the folders.
+    if (fs::is_regular_file(folder)) continue;
     if (!study(folder, options)) ++refused;
+  }
   if (refused > 0)
     throw NotGood(
         fmt::format("{} of {} recordings could not be tracked", refused, options.folders.size()));
