@@ -4,10 +4,20 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/outline.hpp"
 
 namespace trochoid::tracking {
 namespace {
+
+/// Distance from an edge beyond the blur of optics, codec and motion during the exposure.
+double gap_px(const Look& look, const Eigen::Vector2d& normal_px, double exposure_fraction) {
+  constexpr double kStillPx = 2.0;
+  return kStillPx + 0.5 * exposure_fraction * std::abs(normal_px.dot(look.motion_px));
+}
 
 class RimFinder final : public BodyFinder {
  public:
@@ -39,11 +49,31 @@ class RimFinder final : public BodyFinder {
                   .turned_rad = {},
                   .rms_px = fit->rms_px,
                   .accepted = fit->accepted,
+                  .evidence = evidence_of(look, fit->ellipse),
                   .edges = std::move(fit->edges)};
     return seen;
   }
 
+  void place(Sighting& /*guess*/) const override {}
+
  private:
+  /// Of a body known by its rim only a band inside it is sure to be there: the middle may be a
+  /// hole.
+  [[nodiscard]] static Evidence evidence_of(const Look& look, const Ellipse& rim) {
+    constexpr int kPoints = 48;
+    std::vector<Eigen::Vector2d> face;
+    std::vector<Border> outline;
+    const Eigen::Matrix2d inverse = rim.shape_px.inverse();
+    for (int i = 0; i < kPoints; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / kPoints;
+      const Eigen::Vector2d u(std::cos(angle), std::sin(angle));
+      face.emplace_back(rim.centre_px + 0.85 * (rim.shape_px * u));
+      outline.push_back({rim.centre_px + rim.shape_px * u, (inverse * u).normalized(),
+                         gap_px(look, (inverse * u).normalized(), 0.5)});
+    }
+    return weigh(look.frame.luma, look.background, look.noise_levels, face, outline);
+  }
+
   bool circle_;
 };
 
@@ -54,6 +84,7 @@ class CylinderFinder final : public BodyFinder {
       : body_(body),
         camera_(camera),
         exposure_fraction_(exposure_fraction),
+        alike_(body.faces_look_alike() && support.kind != data::SupportKind::pivot),
         fitter_(body, support, camera) {}
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
@@ -73,13 +104,55 @@ class CylinderFinder final : public BodyFinder {
                   .turned_rad = {},
                   .rms_px = measured->rms_px,
                   .accepted = measured->accepted,
+                  .evidence = evidence_of(look, measured->pose),
                   .edges = std::move(measured->edges)};
     measured->edges.clear();
     seen.pose = std::move(*measured);
     return seen;
   }
 
+  void place(Sighting& guess) const override {
+    if (!guess.pose) return;
+    guess.rim = rim_of(guess.pose->pose);
+    guess.centre_px = guess.pose->centre_px = guess.rim.centre_px;
+  }
+  [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
+    try {
+      const Eigen::Vector3d at = camera_.table_from_image(at_px, body_.half_thickness_m());
+      const Eigen::Matrix2d J = camera_.jacobian_px_per_m(at).leftCols<2>();
+      return body_.radius_m * std::sqrt(std::abs(J.determinant()));
+    } catch (const NumericalError&) {  // looks above the horizon
+      return 0.0;
+    }
+  }
+  [[nodiscard]] bool faces_look_alike() const override { return alike_; }
+  [[nodiscard]] double mark_rad() const override {
+    return body_.marks.empty() ? 0.0 : body_.marks.front().angle_rad;
+  }
+
  private:
+  [[nodiscard]] Evidence evidence_of(const Look& look, const data::Pose<>& pose) const {
+    constexpr double kStepPx = 4.0;
+    constexpr int kSpokes = 16;
+    std::vector<Border> outline;
+    for (const auto& point : data::visible_outline(body_, pose, camera_, kStepPx))
+      if (point.silhouette)
+        outline.push_back(
+            {point.image_px, point.normal_px, gap_px(look, point.normal_px, exposure_fraction_)});
+    std::vector<Eigen::Vector2d> face;
+    const Eigen::Vector3d node(std::cos(pose.phi_rad), std::sin(pose.phi_rad), 0.0);
+    const Eigen::Vector3d across = data::symmetry_axis(pose.theta_rad, pose.phi_rad).cross(node);
+    for (const double share : {0.25, 0.5, 0.75}) {
+      const double radius = body_.inner_radius_m + share * (body_.radius_m - body_.inner_radius_m);
+      for (int i = 0; i < kSpokes; ++i) {
+        const double angle = 2.0 * std::numbers::pi * i / kSpokes;
+        face.emplace_back(camera_.image_from_table<double>(
+            pose.centre_m + radius * (std::cos(angle) * node + std::sin(angle) * across)));
+      }
+    }
+    return weigh(look.frame.luma, look.background, look.noise_levels, face, outline);
+  }
+
   /// The ellipse the outer rim of the middle plane appears as, to first order.
   [[nodiscard]] Ellipse rim_of(const data::Pose<>& pose) const {
     const Eigen::Matrix<double, 2, 3> px_per_m = camera_.jacobian_px_per_m(pose.centre_m);
@@ -99,6 +172,7 @@ class CylinderFinder final : public BodyFinder {
   data::Body body_;
   data::Camera camera_;
   double exposure_fraction_;
+  bool alike_;
   OutlineFitter fitter_;
 };
 

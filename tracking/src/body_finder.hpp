@@ -2,6 +2,7 @@
 #include <memory>
 #include <optional>
 
+#include "evidence.hpp"
 #include "rim_fit.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
@@ -18,6 +19,7 @@ struct Sighting {
   double turned_sigma_rad = 0.0;
   double rms_px = 0.0;
   double accepted = 0.0;  ///< share of the outline with an edge
+  Evidence evidence{};
   std::vector<EdgePoint> edges;
 };
 
@@ -39,6 +41,16 @@ class BodyFinder {
   virtual ~BodyFinder() = default;
   /// Nothing if the picture does not show the body there.
   [[nodiscard]] virtual std::optional<Sighting> find(const Look& look) const = 0;
+  /// Puts centre and rim of a guessed sighting where its pose, if it has one, would be seen.
+  virtual void place(Sighting& guess) const = 0;
+  /// Semi-major axis of the rim of the body lying there [px]; 0 if its size is not known.
+  [[nodiscard]] virtual double expected_major_px(const Eigen::Vector2d& /*at_px*/) const {
+    return 0.0;
+  }
+  /// Poses (theta, phi) and (pi - theta, phi + pi) show the same picture.
+  [[nodiscard]] virtual bool faces_look_alike() const { return false; }
+  /// Angle of the spin mark in the body, 0 without one.
+  [[nodiscard]] virtual double mark_rad() const { return 0.0; }
 };
 
 /// By its rim alone: an ellipse in the picture. For want of a camera or a body.

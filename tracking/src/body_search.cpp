@@ -17,17 +17,8 @@ struct Candidate {
   double score = 0.0;
 };
 
-/// 1 for a filled ellipse clear of the border; a hand, a merged pair or a shadowed body less.
-double likeness(const Silhouette& body) {
-  const Detection& d = body.detection;
-  const double flatness = d.semi_minor_px / d.semi_major_px;
-  double score = body.solidity * std::min(1.0, 4.0 * flatness);
-  if (d.touches_border) score *= 0.3;
-  if (d.semi_minor_px < 3.0) score *= 0.3;
-  return score;
-}
-
 std::vector<Candidate> collect(const std::vector<Frame>& held, const Background& background,
+                               const BodyFinder& finder,
                                const std::vector<Follower::Others>& explained) {
   std::vector<Candidate> candidates;
   cv::Mat plate;
@@ -36,7 +27,7 @@ std::vector<Candidate> collect(const std::vector<Frame>& held, const Background&
     const std::size_t index = (2 * k + 1) * held.size() / (2 * looks);
     const cv::Mat& luma = held[index].luma;
     background.scaled_into(plate, background.gain(luma), cv::Rect({}, luma.size()));
-    for (const Silhouette& body : find_silhouettes(luma, plate, background.noise_levels())) {
+    for (const Silhouette& body : find_bodies(luma, plate, background.noise_levels())) {
       const Detection& d = body.detection;
       const auto& taken = explained[index];
       // Also when the region covers the other body and more: two in contact look like one.
@@ -48,7 +39,8 @@ std::vector<Candidate> collect(const std::vector<Frame>& held, const Background&
             return off.norm() < 1.1 * other.second || (to_unit * off).norm() < 1.0;
           }))
         continue;
-      candidates.push_back({index, d, likeness(body)});
+      const double score = likeness(body, finder);
+      if (score > 1e-3) candidates.push_back({index, d, score});
     }
   }
   return candidates;
@@ -83,29 +75,57 @@ void weigh_by_size(std::vector<Candidate>& candidates, std::size_t frames) {
 
 }  // namespace
 
+double likeness(const Silhouette& body, const BodyFinder& finder) {
+  const Detection& d = body.detection;
+  const double flatness = d.semi_minor_px / d.semi_major_px;
+  double score = body.solidity * std::min(1.0, 4.0 * flatness);
+  // A body with its shadow, or two at once, fill the ellipse of their moments badly.
+  score *= std::exp(-30.0 * std::pow(1.0 - body.ellipticity, 2));
+  if (d.touches_border) score *= 0.3;
+  if (d.semi_minor_px < 3.0) score *= 0.3;
+  if (const double size = finder.expected_major_px(d.centre_px); size > 0.0) {
+    constexpr double kPerspective = 0.15;  // the nearer rim looks larger, a bitten one smaller
+    const double off = std::log(d.semi_major_px / size) / kPerspective;
+    score *= std::exp(-0.5 * off * off);
+  }
+  return score;
+}
+
+double clarity(const Sighting& seen) {
+  const double evidence = seen.evidence.cover * seen.evidence.edges;
+  if (!seen.pose) return evidence * seen.accepted * 0.5 / (0.3 + seen.rms_px);
+  constexpr double kClearScore = 2.0;
+  return evidence * seen.accepted * std::min(1.0, seen.pose->score / kClearScore);
+}
+
 std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& background,
                               const BodyFinder& finder,
                               const std::vector<Follower::Others>& explained) {
-  std::vector<Candidate> candidates = collect(held, background, explained);
+  std::vector<Candidate> candidates = collect(held, background, finder, explained);
   weigh_by_size(candidates, held.size());
+  // One picture may fit a mirrored tilt or a shadow nearly as well as the body: the best of a few
+  // counts, unless one is beyond doubt.
+  constexpr int kMostTries = 16, kEnough = 4;
   std::optional<Seed> best;
   double best_value = 0.0;
   cv::Mat plate;
-  int tries = 0;
+  int tries = 0, good = 0;
   for (const Candidate& c : candidates) {
-    if (++tries > 16) break;
+    if (++tries > kMostTries || good >= kEnough) break;
     const Frame& frame = held[c.held_index];
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
     Look look{.frame = frame, .background = plate, .noise_levels = background.noise_levels()};
     look.detection = c.detection;
     const auto seen = finder.find(look);
     if (!seen || seen->accepted < 0.4) continue;
-    const double value = seen->accepted * c.score;
+    const double clear = clarity(*seen);
+    const double value = clear * std::sqrt(c.score);
     if (value > best_value) {
       best_value = value;
       best = Seed{c.held_index, *seen};
     }
-    if (seen->accepted > 0.8 && c.score > 0.5) break;
+    if (clear > 0.5) ++good;
+    if (clear > 0.85) break;
   }
   return best;
 }

@@ -5,8 +5,16 @@
 #include "background.hpp"
 #include "body_finder.hpp"
 #include "follower.hpp"
+#include "silhouette.hpp"
 
 namespace trochoid::tracking {
+
+/// How much a region looks like a body, 0..1: a filled ellipse of the expected size clear of the
+/// border; a hand, a merged pair or a shadowed body less.
+[[nodiscard]] double likeness(const Silhouette& body, const BodyFinder& finder);
+
+/// How clearly a body found without a prediction is seen, 0..1.
+[[nodiscard]] double clarity(const Sighting& seen);
 
 /// Where a body may be followed from.
 struct Seed {

@@ -1,10 +1,10 @@
 #pragma once
-#include <deque>
 #include <memory>
 #include <optional>
 
 #include "background.hpp"
 #include "body_finder.hpp"
+#include "forecast.hpp"
 #include "spin_profile.hpp"
 
 namespace trochoid::tracking {
@@ -27,36 +27,32 @@ class Follower {
   [[nodiscard]] int frames_lost() const { return lost_; }
 
  private:
-  struct Moment {
-    double t_s;
-    Sighting seen;
-  };
-  [[nodiscard]] Sighting predict(double t_s) const;
   [[nodiscard]] std::optional<Sighting> look_near(const Frame& frame, const Sighting& predicted,
                                                   const Others& others);
   [[nodiscard]] std::optional<Sighting> look_at(const Frame& frame, const Sighting& expected,
                                                 double reach_px);
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
+  [[nodiscard]] double wholeness(const Sighting& seen) const;
   [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
                                double reach_px) const;
   void set_shape_knowledge(Look& look, Sighting& guess) const;
   void read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const;
-  void accept(const Frame& frame, const Sighting& seen, const Sighting& predicted);
+  void accept(const Frame& frame, Sighting& seen, const Sighting& predicted);
 
   const BodyFinder& finder_;
   const Background& background_;
   std::shared_ptr<const SpinProfile> marks_;
-  std::deque<Moment> past_;  ///< newest last, at most three
-  cv::Mat plate_;            ///< background at the brightness of the frame, valid near the body
+  Forecast forecast_;
+  cv::Mat plate_;  ///< background at the brightness of the frame, valid near the body
   double gain_ = 1.0;
-  double frame_s_ = 0.0;      ///< typical time between frames
-  double surprise_px_ = 1.0;  ///< running size of prediction error of the centre
   double shape_surprise_px_ = 0.3;
   Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();  ///< running mean of whole sightings
   double shape_scatter_px_ = 1.0;                            ///< running deviation from it
   double usual_major_px_ = 0.0;
   double usual_accepted_ = 0.0;
+  Evidence usual_{};            ///< running mean over whole sightings
+  double usual_clarity_ = 0.0;  ///< of the seed
   int lost_ = 0;
 };
 

@@ -1,8 +1,11 @@
 #include "silhouette.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 namespace trochoid::tracking {
 namespace {
@@ -47,41 +50,133 @@ Silhouette describe(const std::vector<cv::Point>& contour, int factor, const cv:
                      d.box.br().x >= picture.width - factor ||
                      d.box.br().y >= picture.height - factor;
   body.solidity = cv::contourArea(contour) / m.m00;
+  body.ellipticity =
+      m.m00 / (4.0 * std::numbers::pi * std::sqrt(std::max(1e-9, xx * yy - xy * xy)));
   for (const cv::Point& p : contour)
     body.outline_px.emplace_back(static_cast<float>(scale * p.x + shift + origin.x),
                                  static_cast<float>(scale * p.y + shift + origin.y));
   return body;
 }
 
-}  // namespace
+/// What both searches work on: the reduced difference to the background.
+struct Difference {
+  cv::Rect box;
+  int factor = 1;
+  double threshold = 0.0;
+  cv::Mat size, brighter;  ///< absolute, and where the picture is brighter
+};
 
-std::vector<Silhouette> find_silhouettes(const cv::Mat& luma, const cv::Mat& background,
-                                         double noise_levels, cv::Rect box) {
+bool difference_in(const cv::Mat& luma, const cv::Mat& background, double noise_levels,
+                   cv::Rect box, Difference& d) {
   const cv::Rect whole(0, 0, luma.cols, luma.rows);
-  box = box.empty() ? whole : (box & whole);
-  if (box.width < 4 || box.height < 4) return {};
-  const int factor = reduction(luma.size());
-  const cv::Mat now = reduced(luma(box), factor), plate = reduced(background(box), factor);
-  cv::Mat difference, mask;
-  cv::absdiff(now, plate, difference);
+  d.box = box.empty() ? whole : (box & whole);
+  if (d.box.width < 4 || d.box.height < 4) return false;
+  d.factor = reduction(luma.size());
+  const cv::Mat now = reduced(luma(d.box), d.factor), plate = reduced(background(d.box), d.factor);
+  cv::absdiff(now, plate, d.size);
+  cv::subtract(now, plate, d.brighter);
   // Averaging factor^2 pixels beats the noise down; compression and grain leave a floor.
-  const double threshold = std::max(7.0, 4.5 * noise_levels / factor);
+  d.threshold = std::max(7.0, 4.5 * noise_levels / d.factor);
+  return true;
+}
+
+using Contour = std::vector<cv::Point>;
+
+std::vector<Contour> contours_above(const cv::Mat& difference, double threshold) {
+  constexpr double kSmallest = 12.0;  // reduced pixels; below, compression noise
+  cv::Mat mask;
   cv::threshold(difference, mask, threshold, 255, cv::THRESH_BINARY);
   const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3});
   cv::morphologyEx(mask, mask, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));
   cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, disc, {-1, -1}, 2);
-  std::vector<std::vector<cv::Point>> contours;
+  std::vector<Contour> contours;
   cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-  std::vector<Silhouette> bodies;
-  constexpr double kSmallest = 12.0;  // reduced pixels; below, compression noise
-  for (const auto& contour : contours) {
-    if (contour.size() < 8 || cv::contourArea(contour) < kSmallest) continue;
-    Silhouette body = describe(contour, factor, box.tl(), luma.size());
-    if (body.detection.area_px2 > 0.0) bodies.push_back(std::move(body));
+  std::erase_if(contours,
+                [](const Contour& c) { return c.size() < 8 || cv::contourArea(c) < kSmallest; });
+  return contours;
+}
+
+/// Otsu's threshold of the differences inside a contour; nothing if they do not fall into two.
+std::optional<double> split_inside(const cv::Mat& difference, const Contour& contour) {
+  const cv::Rect box = cv::boundingRect(contour);
+  cv::Mat inside = cv::Mat::zeros(box.size(), CV_8U);
+  cv::fillPoly(inside, std::vector<Contour>{contour}, 255, cv::LINE_8, 0, -box.tl());
+  std::array<double, 256> count{};
+  double total = 0.0, sum = 0.0, square = 0.0;
+  for (int y = 0; y < box.height; ++y)
+    for (int x = 0; x < box.width; ++x) {
+      if (inside.at<std::uint8_t>(y, x) == 0) continue;
+      const int level = difference.at<std::uint8_t>(box.y + y, box.x + x);
+      count[static_cast<std::size_t>(level)] += 1.0;
+      total += 1.0, sum += level, square += static_cast<double>(level) * level;
+    }
+  double below = 0.0, below_sum = 0.0, best = 0.0;
+  int at = 0;
+  for (int level = 0; level < 255; ++level) {
+    below += count[static_cast<std::size_t>(level)];
+    below_sum += level * count[static_cast<std::size_t>(level)];
+    const double above = total - below;
+    if (below <= 0.0 || above <= 0.0) continue;
+    const double apart = below_sum / below - (sum - below_sum) / above;
+    const double between = below * above * apart * apart / (total * total);
+    if (between > best) best = between, at = level;
   }
+  const double variance = square / total - sum * sum / (total * total);
+  constexpr double kTwoClasses = 0.65;  // share of the variance a real split explains
+  if (best < kTwoClasses * variance) return std::nullopt;
+  return at;
+}
+
+void largest_first(std::vector<Silhouette>& bodies) {
   std::sort(bodies.begin(), bodies.end(), [](const Silhouette& a, const Silhouette& b) {
     return a.detection.area_px2 > b.detection.area_px2;
   });
+}
+
+}  // namespace
+
+std::vector<Silhouette> find_silhouettes(const cv::Mat& luma, const cv::Mat& background,
+                                         double noise_levels, cv::Rect box) {
+  Difference d;
+  std::vector<Silhouette> bodies;
+  if (!difference_in(luma, background, noise_levels, box, d)) return bodies;
+  for (const Contour& contour : contours_above(d.size, d.threshold)) {
+    Silhouette body = describe(contour, d.factor, d.box.tl(), luma.size());
+    if (body.detection.area_px2 > 0.0) bodies.push_back(std::move(body));
+  }
+  largest_first(bodies);
+  return bodies;
+}
+
+std::vector<Silhouette> find_bodies(const cv::Mat& luma, const cv::Mat& background,
+                                    double noise_levels, cv::Rect box) {
+  Difference d;
+  std::vector<Silhouette> bodies;
+  if (!difference_in(luma, background, noise_levels, box, d)) return bodies;
+  const auto add = [&](const Contour& contour) {
+    Silhouette body = describe(contour, d.factor, d.box.tl(), luma.size());
+    if (body.detection.area_px2 <= 0.0) return;
+    const bool known = std::any_of(bodies.begin(), bodies.end(), [&](const Silhouette& other) {
+      const Detection &a = other.detection, &b = body.detection;
+      const double size = 0.04 * a.semi_major_px + 1.0;
+      return (a.centre_px - b.centre_px).norm() < size &&
+             std::abs(a.semi_major_px - b.semi_major_px) < size &&
+             std::abs(a.semi_minor_px - b.semi_minor_px) < size;
+    });
+    if (!known) bodies.push_back(std::move(body));
+  };
+  for (const Contour& contour : contours_above(d.size, d.threshold)) {
+    add(contour);
+    const auto split = split_inside(d.size, contour);
+    if (!split) continue;
+    const cv::Rect part = cv::boundingRect(contour);
+    for (Contour core : contours_above(d.size(part), *split)) {
+      for (cv::Point& p : core) p += part.tl();
+      add(core);
+    }
+  }
+  for (const Contour& contour : contours_above(d.brighter, d.threshold)) add(contour);
+  largest_first(bodies);
   return bodies;
 }
 

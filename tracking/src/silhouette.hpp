@@ -11,6 +11,7 @@ struct Silhouette {
   Detection detection;
   std::vector<cv::Point2f> outline_px;  ///< its outer contour
   double solidity = 0.0;                ///< area inside the contour over that of its convex hull
+  double ellipticity = 0.0;  ///< area of the hull over that of the ellipse with its moments
 };
 
 /// Regions of `luma` that differ from `background` (of the same brightness) by more than noise,
@@ -19,5 +20,11 @@ struct Silhouette {
 [[nodiscard]] std::vector<Silhouette> find_silhouettes(const cv::Mat& luma,
                                                        const cv::Mat& background,
                                                        double noise_levels, cv::Rect box = {});
+
+/// Readings of the same regions as bodies, largest first: each region as it is, its part that
+/// differs most (a body without the shadow it casts), and what is brighter than the background
+/// alone (no shadow is).
+[[nodiscard]] std::vector<Silhouette> find_bodies(const cv::Mat& luma, const cv::Mat& background,
+                                                  double noise_levels, cv::Rect box = {});
 
 }  // namespace trochoid::tracking

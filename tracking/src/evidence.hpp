@@ -1,0 +1,29 @@
+#pragma once
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace trochoid::tracking {
+
+/// How far a picture speaks for a body being where a fit puts it. A fit to floor texture or to an
+/// occluder may have edges enough; it does not cover what the background fails to explain, and its
+/// outline is not where that ends.
+struct Evidence {
+  double cover = 0.0;  ///< share of the body's face that differs from the background
+  double edges = 0.0;  ///< share of the outline across which the picture steps
+};
+
+/// A place on the outline: where, and the unit normal pointing away from the body.
+struct Border {
+  Eigen::Vector2d at_px, normal_px;
+  double gap_px = 1.5;  ///< distance from the edge at which its two levels are pure
+};
+
+/// Weighs face and outline of a body in `luma` against the background at the frame's brightness.
+/// Points outside the picture count as not seen.
+/// @param noise_levels standard deviation of one pixel.
+[[nodiscard]] Evidence weigh(const cv::Mat& luma, const cv::Mat& background, double noise_levels,
+                             const std::vector<Eigen::Vector2d>& face_px,
+                             const std::vector<Border>& outline);
+
+}  // namespace trochoid::tracking
