@@ -161,9 +161,10 @@ Found find_arc(const Problem& problem, const Starter& starter, const FitOptions&
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   if (options.strategy == "single") return grow(problem, given, all);
   if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
+  if (options.strategy == "integral") return from_best_start(problem, starter);
   if (options.strategy != "auto")
-    throw InputError(
-        fmt::format("strategy '{}' is unknown; it is auto, single or growing", options.strategy));
+    throw InputError(fmt::format(
+        "strategy '{}' is unknown; it is auto, single, growing or integral", options.strategy));
   Found best = search(problem, starter);
   if (best.passed || !start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
@@ -285,29 +286,49 @@ void warn_short_top(const Problem& problem, data::Fit& fit) {
       periods));
 }
 
-// A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
-// samples scatter far less about a smooth curve.
-bool explains_path(const Problem& problem, const Solution& solution) {
+// Squares of the positions, in units of the track's sigmas: about the prediction, about their mean,
+// and about a smooth curve.
+struct Squares {
+  bool ok = true;
   double residual = 0.0, motion = 0.0, scatter = 0.0;
+};
+
+Squares squares(const Problem& problem, const Solution& solution) {
+  Squares sum;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     const ArcData& data = problem.arcs[arc];
     if (data.observable_index(model::Observable::x_m) < 0) continue;
     Problem plain = problem;
     plain.noise_scale.fill(1.0);
     Eigen::VectorXd r;
-    if (!evaluate(plain, arc, solution.u, r, nullptr)) return false;
+    if (!evaluate(plain, arc, solution.u, r, nullptr)) return {.ok = false};
     const Eigen::MatrixX2d xy = data.positions_m();
     const Eigen::RowVector2d mean = xy.colwise().mean();
     const double noise_m = noise_about_smooth_curve(data.t_s, xy);
     for (const Reading& reading : data.readings) {
       if (reading.channel != Channel::position) continue;
       const Eigen::Matrix2d wt = reading.whitener.transpose();
-      residual += r.segment<2>(reading.row).squaredNorm();
-      motion += (wt * (reading.value - mean.transpose())).squaredNorm();
-      scatter += wt.squaredNorm() * noise_m * noise_m;
+      sum.residual += r.segment<2>(reading.row).squaredNorm();
+      sum.motion += (wt * (reading.value - mean.transpose())).squaredNorm();
+      sum.scatter += wt.squaredNorm() * noise_m * noise_m;
     }
   }
-  return residual <= 0.03 * motion || residual <= 4.0 * scatter;
+  return sum;
+}
+
+// A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
+// samples scatter far less about a smooth curve.
+bool explains_path(const Squares& sum) {
+  return sum.ok && (sum.residual <= 0.03 * sum.motion || sum.residual <= 4.0 * sum.scatter);
+}
+
+void warn_unexplained(const Squares& sum, data::Fit& fit) {
+  // Twice the scatter: more than a smoothing curve misjudges the noise.
+  if (!sum.ok || sum.residual <= 4.0 * sum.scatter) return;
+  fit.warnings.push_back(
+      fmt::format("the residuals are {:.1f} times the scatter of the samples about a smooth curve: "
+                  "the model lacks something, or a better minimum exists",
+                  std::sqrt(sum.residual / sum.scatter)));
 }
 
 }  // namespace
@@ -357,7 +378,16 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
   problem.set_base(solution.u);
   solution.u = problem.start();
 
-  const Uncertainty error = uncertainty(problem, solution.u);
+  Uncertainty error;
+  try {
+    error = uncertainty(problem, solution.u);
+  } catch (const NumericalError& failure) {
+    // A finer tolerance can run into the step limit where a coarse one did not.
+    result.outcome = "no_convergence";
+    result.reason = failure.what();
+    report_arcs(problem, result);
+    return result;
+  }
   const Criteria score = criteria(problem, solution.u, error.whiteness.inflation);
   result.chi2 = score.chi2;
   result.dof = score.rows - needed;
@@ -377,7 +407,9 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
     add_derived_top(problem, solution.u, error.covariance, scene, result);
     warn_short_top(problem, result);
   }
-  result.converged = solution.converged && explains_path(problem, solution);
+  const Squares sum = squares(problem, solution);
+  warn_unexplained(sum, result);
+  result.converged = solution.converged && explains_path(sum);
   result.outcome = outcome_word(result);
   result.reason = result.converged
                       ? fmt::format("{} iterations from {}", solution.iterations, result.start_path)

@@ -126,6 +126,12 @@ Found search(const Problem& problem, const Starter& starter) {
   return best;
 }
 
+Found from_best_start(const Problem& problem, const Starter& starter) {
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const std::vector<Start> starts = screened(windowed(problem, all), starter);
+  return starts.empty() ? Found{} : grow(problem, starts.front(), all);
+}
+
 void start_top_spin(Problem& problem, int arc) {
   const int psi = problem.predictor->index_of("psi_rad");
   const int omega = problem.predictor->index_of("omega_s_rad_s");

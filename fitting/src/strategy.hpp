@@ -34,6 +34,9 @@ void apply(const Start& start, Problem& problem);
 /// each, grown; stops at the first solution that passes the gate, else returns the best one.
 [[nodiscard]] Found search(const Problem& problem, const Starter& starter);
 
+/// The best start of the whole arc, taken to its minimum and no further: what search() improves on.
+[[nodiscard]] Found from_best_start(const Problem& problem, const Starter& starter);
+
 /// Spin angle and spin of a top from the measured spin angle, once its path is known: both enter
 /// the prediction as psi_0 + omega_s t, so the difference to a prediction without them is a line.
 void start_top_spin(Problem& problem, int arc);

@@ -13,6 +13,7 @@ struct NotGood : std::runtime_error {
 void add_simulate_command(CLI::App& app);
 void add_fit_command(CLI::App& app);
 void add_study_command(CLI::App& app);
+void add_study_fits(CLI::App& study);
 void add_study_reference(CLI::App& study);
 void add_report_command(CLI::App& app);
 void add_study_lean(CLI::App& study);

@@ -23,9 +23,9 @@ struct FitOptions {
   std::uint64_t seed = 1;
   int threads = 0;         ///< 0 = all cores; the result does not depend on it
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
-  /// auto: data-driven starts, then the given one, then multiple shooting. For comparisons, from
-  /// the given start alone: single (single shooting), growing (windows), multiple (multiple
-  /// shooting).
+  /// auto: data-driven starts, then the given one, then multiple shooting. For comparisons:
+  /// integral, the data-driven start and nothing after it; and from the given start alone single
+  /// (single shooting), growing (windows), multiple (multiple shooting).
   std::string strategy = "auto";
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   std::function<void(const std::string& stage, double fraction)> progress;
