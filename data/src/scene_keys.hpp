@@ -100,7 +100,7 @@ void model_keys(Visit&& visit) {
   visit("rolling_friction_m", &M::rolling_friction_m, kNonNegative);
   visit("pivoting_friction_m", &M::pivoting_friction_m, kNonNegative);
   visit("contour_friction_m", &M::contour_friction_m, kNonNegative);
-  visit("couple_regularisation_rad_s", &M::couple_regularisation_rad_s, kNonNegative);
+  visit("couple_regularisation_rad_s", &M::couple_regularisation_rad_s, kPositive);
   visit("drag_transverse_N_m_s", &M::drag_transverse_N_m_s, kNonNegative);
   visit("drag_spin_N_m_s", &M::drag_spin_N_m_s, kNonNegative);
   visit("spin_down_dry_rad_s2", &M::spin_down_dry_rad_s2, kNonNegative);

@@ -154,6 +154,9 @@ LossValues<double> loss_values(const data::ModelSettings& model) {
   out[7] = model.pivoting_friction_m.value_or(0.0);
   out[8] = model.contour_friction_m.value_or(0.0);
   v.eps_w = model.couple_regularisation_rad_s.value_or(v.eps_w);
+  if (!(v.eps_w > 0.0) || !std::isfinite(v.eps_w))  // the couples would be 0/0 where a rate is zero
+    throw InputError(
+        fmt::format("model.couple_regularisation_rad_s = {} must be greater than 0", v.eps_w));
   for (int i = 0; i < kLosses; ++i)
     if (!(out[i] >= 0.0) || !std::isfinite(out[i]))
       throw InputError(fmt::format("model.{} = {} must be 0 or greater: a loss takes energy",

@@ -126,6 +126,14 @@ TEST(RimSimulation, AgreesBetweenItsIntegrators) {
   }
 }
 
+// With 0 the contact couples are 0/0 where a rate is zero.
+TEST(RimSimulation, RefusesCouplesWithoutRegularisation) {
+  data::Scene scene = reference_scene("s06_roll_disc");
+  scene.model.pivoting_friction_m = 1e-4;
+  scene.model.couple_regularisation_rad_s = 0.0;
+  EXPECT_THROW(simulate(scene), InputError);
+}
+
 TEST(RimSimulation, LeavesForceAndEnergyOutWithoutAMass) {
   data::Scene scene = reference_scene("s06_roll_disc");
   const Trajectory weighed = simulate(scene);
