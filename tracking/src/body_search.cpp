@@ -92,10 +92,8 @@ double likeness(const Silhouette& body, const BodyFinder& finder) {
 }
 
 double clarity(const Sighting& seen) {
-  const double evidence = seen.evidence.cover * seen.evidence.edges;
-  if (!seen.pose) return evidence * seen.accepted * 0.5 / (0.3 + seen.rms_px);
-  constexpr double kClearScore = 2.0;
-  return evidence * seen.accepted * std::min(1.0, seen.pose->score / kClearScore);
+  const double evidence = seen.evidence.cover * seen.evidence.edges * seen.accepted;
+  return seen.pose ? evidence : evidence * 0.5 / (0.3 + seen.rms_px);
 }
 
 std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& background,

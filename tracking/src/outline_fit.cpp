@@ -177,7 +177,6 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   }
   if (!best || !believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
-  m.score = best_score;
   if (alike) fold(m.pose);
   return m;
 }

@@ -31,8 +31,6 @@ struct PoseMeasurement {
   std::optional<double> sigma_psi_rad;
   double rms_px = 0.0;                 ///< of the accepted edge points about the outline
   double accepted = 0.0;               ///< fraction of the predicted outline with an accepted edge
-  /// Log-likelihood of the outline over none, per px of outline; only when several starts competed.
-  double score = 0.0;
   std::vector<EdgePoint> edges;
 };
 
