@@ -58,6 +58,32 @@ void score_keys(Visit&& visit) {
 }
 
 template <class Visit>
+void profile_keys(Visit&& visit) {
+  visit("parameter", &Profile::parameter);
+  visit("verdict", &Profile::verdict);
+  visit("lower_95", &Profile::lower_95);
+  visit("upper_95", &Profile::upper_95);
+  visit("values", &Profile::values);
+  visit("delta_chi2", &Profile::delta_chi2);
+}
+
+template <class Visit>
+void spread_keys(Visit&& visit) {
+  visit("parameter", &BootstrapSpread::parameter);
+  visit("sigma", &BootstrapSpread::sigma);
+  visit("lower_95", &BootstrapSpread::lower_95);
+  visit("upper_95", &BootstrapSpread::upper_95);
+}
+
+template <class Visit>
+void bootstrap_keys(Visit&& visit) {
+  visit("draws", &Bootstrap::draws);
+  visit("failed", &Bootstrap::failed);
+  visit("block_s", &Bootstrap::block_s);
+  visit("parameters", &Bootstrap::parameters);
+}
+
+template <class Visit>
 void fit_keys(Visit&& visit) {
   visit("model", &Fit::model);
   visit("converged", &Fit::converged);
@@ -81,6 +107,9 @@ void fit_keys(Visit&& visit) {
   visit("time_origin_s", &Fit::time_origin_s);
   visit("arcs", &Fit::arcs);
   visit("comparison", &Fit::comparison);
+  visit("recommendation", &Fit::recommendation);
+  visit("profiles", &Fit::profiles);
+  visit("bootstrap", &Fit::bootstrap);
   visit("warnings", &Fit::warnings);
   visit("inputs", &Fit::inputs);
   visit("versions", &Fit::versions);
@@ -104,6 +133,18 @@ void keys_of(const NullVector*, Visit&& visit) {
 template <class Visit>
 void keys_of(const ModelScore*, Visit&& visit) {
   score_keys(visit);
+}
+template <class Visit>
+void keys_of(const Profile*, Visit&& visit) {
+  profile_keys(visit);
+}
+template <class Visit>
+void keys_of(const BootstrapSpread*, Visit&& visit) {
+  spread_keys(visit);
+}
+template <class Visit>
+void keys_of(const Bootstrap*, Visit&& visit) {
+  bootstrap_keys(visit);
 }
 template <class Visit>
 void keys_of(const Fit*, Visit&& visit) {

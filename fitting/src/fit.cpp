@@ -7,8 +7,10 @@
 #include <limits>
 
 #include "arcs.hpp"
+#include "bootstrap.hpp"
 #include "derived.hpp"
 #include "problem.hpp"
+#include "profile.hpp"
 #include "smoothing.hpp"
 #include "statistics.hpp"
 #include "strategy.hpp"
@@ -402,6 +404,13 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
   result.null_vectors = error.null_vectors;
   report_parameters(problem, error, result);
   report_arcs(problem, result);
+  const double inflation = error.whiteness.inflation;
+  if (options.profile)
+    result.profiles = profiles(problem, solution, error.covariance.diagonal().cwiseSqrt(),
+                               inflation, options.threads);
+  if (options.bootstrap > 0)
+    result.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
+                                 options.bootstrap, options.seed, options.threads);
   warn(problem, error, result);
   if (model.starts_with("top")) {
     add_derived_top(problem, solution.u, error.covariance, scene, result);

@@ -36,6 +36,9 @@ Fit full_fit() {
   fit.time_origin_s = 0.5;
   fit.arcs = {{0, 1, 0.5, 2.5, 200}};
   fit.comparison = {{"top", 1.0, 2.0, 3.0, 0.5, 1.1, 6, true}};
+  fit.recommendation = "top suffices";
+  fit.profiles = {{"a_1_s2", "one-sided", 0.0, 2.5, {1.0, 2.0, 3.0}, {0.5, 0.0, 7.0}}};
+  fit.bootstrap = {200, 1, 0.25, {{"a_1_s2", 0.5, 1.5, 2.5}}};
   fit.warnings = {"scale not given"};
   fit.inputs = {{"top.track.csv", std::string(64, 'b')}};
   fit.versions = {{"trochoid", "0.1.0"}};

@@ -53,6 +53,12 @@ void print(const data::Fit& fit) {
              fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
   fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
              fit.covariance_names.size(), fit.integration_error_sigma);
+  for (const data::Profile& p : fit.profiles)
+    fmt::print("  profile of {:<22} {:<9} 95 % {:.6g} .. {:.6g}\n", p.parameter, p.verdict,
+               p.lower_95, p.upper_95);
+  for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
+    fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
+               b.lower_95, b.upper_95);
   for (const data::ModelScore& m : fit.comparison)
     fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {:8.2f} sigma  {} parameters\n",
                m.recommended ? "*" : " ", m.model, m.aicc, m.bic, m.held_back_rms_sigma,
@@ -113,6 +119,13 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
   fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
   fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
+  fit->add_flag("--profile", command->options.profile,
+                "Profile likelihood of the body's and the table's parameters");
+  fit->add_option("--bootstrap", command->options.bootstrap,
+                  "Fits to resampled residuals, for error bars without assumptions; 0: none")
+      ->check(CLI::Range(0, 100000));
+  fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
+      ->check(CLI::NonNegativeNumber);
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
   fit->callback([command] { run(*command); });
 }

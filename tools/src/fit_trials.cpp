@@ -7,13 +7,12 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <numbers>
 #include <span>
-#include <thread>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "trochoid/fitting/parallel.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::tools {
@@ -31,32 +30,6 @@ double thread_time_ms() {
 std::mt19937_64 generator_of(std::uint64_t seed, int scene) {
   std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(scene)};
   return std::mt19937_64(sequence);
-}
-
-void in_parallel(int count, int threads, const std::function<void(int)>& work,
-                 const std::function<void(int)>& progress) {
-  std::atomic<int> next{0}, done{0};
-  std::exception_ptr failure;
-  std::mutex mutex;
-  const auto worker = [&] {
-    for (int i = next++; i < count; i = next++) {
-      try {
-        work(i);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        failure = std::current_exception();
-        next = count;
-      }
-      ++done;
-      if (progress) progress(done);
-    }
-  };
-  const int used = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
-  std::vector<std::thread> team;
-  for (int i = 1; i < std::min(used, count); ++i) team.emplace_back(worker);
-  worker();
-  for (std::thread& member : team) member.join();
-  if (failure) std::rethrow_exception(failure);
 }
 
 // What a person writes who sees only the picture: l a little above the reach of the path, the axis
@@ -237,12 +210,11 @@ std::vector<FitTrial> fit_trials(const MadeTrackOptions& tracks,
                                  std::uint64_t seed, int threads,
                                  const std::function<void(int)>& progress) {
   std::vector<std::vector<FitTrial>> scenes(static_cast<std::size_t>(count));
-  in_parallel(
-      count, threads,
-      [&](int i) {
-        scenes[static_cast<std::size_t>(i)] = trials_of_scene(tracks, strategies, seed, i);
-      },
-      progress);
+  std::atomic<int> done{0};
+  fitting::in_parallel(count, threads, [&](int i) {
+    scenes[static_cast<std::size_t>(i)] = trials_of_scene(tracks, strategies, seed, i);
+    if (progress) progress(++done);
+  });
   std::vector<FitTrial> trials;
   for (std::vector<FitTrial>& scene : scenes)
     for (FitTrial& trial : scene) trials.push_back(std::move(trial));
@@ -252,9 +224,11 @@ std::vector<FitTrial> fit_trials(const MadeTrackOptions& tracks,
 Coverage fit_coverage(const MadeTrackOptions& tracks, int draws, std::uint64_t seed, int threads,
                       const std::function<void(int)>& progress) {
   std::vector<Draw> all(static_cast<std::size_t>(draws));
-  in_parallel(
-      draws, threads, [&](int i) { all[static_cast<std::size_t>(i)] = draw(tracks, seed, i); },
-      progress);
+  std::atomic<int> done{0};
+  fitting::in_parallel(draws, threads, [&](int i) {
+    all[static_cast<std::size_t>(i)] = draw(tracks, seed, i);
+    if (progress) progress(++done);
+  });
   Coverage coverage;
   coverage.draws = draws;
   for (const Draw& one : all) {

@@ -40,10 +40,34 @@ struct NullVector {
 struct ModelScore {
   std::string model;
   double chi2 = 0.0, aicc = 0.0, bic = 0.0;
-  double whiteness_p = 0.0;       ///< p-value of the residuals being white
+  double whiteness_p = 0.0;          ///< p-value of the residuals being white
   double held_back_rms_sigma = 0.0;  ///< prediction of the held-back last third, in sigmas
   int parameters = 0;
   bool recommended = false;
+};
+
+/// How well the best fit of everything else holds at fixed values of one parameter.
+struct Profile {
+  std::string parameter;
+  std::string verdict;  ///< bounded; one-sided; flat: the data bound it on no side
+  /// Where chi-square has risen by the 95 % quantile; the end of the parameter's range (0,
+  /// -+infinity) on a side without a bound.
+  double lower_95 = 0.0, upper_95 = 0.0;
+  std::vector<double> values;      ///< ascending
+  std::vector<double> delta_chi2;  ///< rise of chi-square there, correlated residuals allowed for
+};
+
+/// Spread of one parameter over fits to resampled residuals.
+struct BootstrapSpread {
+  std::string parameter;
+  double sigma = 0.0;
+  double lower_95 = 0.0, upper_95 = 0.0;  ///< 2.5 % and 97.5 % quantiles
+};
+struct Bootstrap {
+  int draws = 0;       ///< 0: not asked for
+  int failed = 0;      ///< draws without a fit
+  double block_s = 0;  ///< residuals were resampled in blocks of this length
+  std::vector<BootstrapSpread> parameters;
 };
 
 /// Result of a fit; survives a trip through its JSON file. Names of initial-state parameters of arc
@@ -51,9 +75,10 @@ struct ModelScore {
 struct Fit {
   std::string model;
   bool converged = false;
-  std::string outcome;   ///< one word: converged, no_convergence, not_identifiable, too_short
-  std::string reason;    ///< one sentence
-  std::string start_path;  ///< which start won: integral_matching, windows, shooting, multistart, given
+  std::string outcome;  ///< one word: converged, no_convergence, not_identifiable, too_short
+  std::string reason;   ///< one sentence
+  std::string
+      start_path;  ///< which start won: integral_matching, windows, shooting, multistart, given
   std::vector<FitParameter> parameters;
   std::vector<std::string> covariance_names;  ///< free parameters, in the order of the rows
   Eigen::MatrixXd covariance;
@@ -70,6 +95,9 @@ struct Fit {
   double time_origin_s = 0.0;            ///< t_s the initial state refers to (first arc)
   std::vector<FitArc> arcs;
   std::vector<ModelScore> comparison;
+  std::string recommendation;  ///< one sentence about the comparison
+  std::vector<Profile> profiles;
+  Bootstrap bootstrap;
   std::vector<std::string> warnings;
   std::map<std::string, std::string> inputs;    ///< file name -> sha256
   std::map<std::string, std::string> versions;  ///< program and libraries
