@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <utility>
 
 #include "image_sequence.hpp"
@@ -63,6 +64,15 @@ void turn(cv::Mat& image, int quarters) {
   cv::Mat turned;
   cv::rotate(image, turned, code[quarters]);
   image = turned;
+}
+
+/// Rate at which a phone says it filmed; slow motion is stored at a lower one.
+std::optional<double> capture_rate_hz(const AVFormatContext& container) {
+  const AVDictionaryEntry* entry =
+      av_dict_get(container.metadata, "com.android.capture.fps", nullptr, 0);
+  if (entry == nullptr) return std::nullopt;
+  const double rate = std::strtod(entry->value, nullptr);
+  return rate > 0.0 ? std::optional(rate) : std::nullopt;
 }
 
 /// A file or an image sequence through libavformat and libavcodec.
@@ -154,6 +164,7 @@ class LibavSource final : public FrameSource {
       info_.frame_rate_hz = *options_.frame_rate_hz;
       info_.variable_rate = false;
     }
+    info_.capture_rate_hz = capture_rate_hz(*container_);
     info_.frames = stream_->nb_frames;
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }

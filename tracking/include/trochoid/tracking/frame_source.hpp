@@ -11,8 +11,8 @@ namespace trochoid::tracking {
 /// One decoded picture: upright (rotation metadata applied), 8-bit luma in full range, its index as
 /// decoded and its presentation time since the first frame.
 struct Frame {
-  cv::Mat luma;    ///< CV_8UC1
-  cv::Mat bgr;     ///< CV_8UC3, empty unless asked for
+  cv::Mat luma;  ///< CV_8UC1
+  cv::Mat bgr;   ///< CV_8UC3, empty unless asked for
   std::int64_t index = 0;
   double t_s = 0.0;
   bool damaged = false;  ///< the decoder reported an error in it
@@ -24,13 +24,15 @@ struct VideoInfo {
   std::int64_t frames = 0;          ///< as the container says, 0 if it does not
   std::string codec;
   bool variable_rate = false;
+  std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
 };
 
 struct SourceOptions {
   bool colour = false;
-  std::optional<double> frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences
-  std::string from{}, to{};             ///< "1.5" seconds or "f120" frames, inclusive; empty = all
-  int decoder_threads = 0;              ///< 0 = the decoder's choice
+  std::optional<double>
+      frame_rate_hz{};       ///< overrides the time stamps: slow motion, image sequences
+  std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
+  int decoder_threads = 0;   ///< 0 = the decoder's choice
   /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
   bool key_frames_only = false;
 };

@@ -22,23 +22,23 @@ struct EdgePoint {
 
 /// What one frame says about the pose of the body, with the covariance of what was estimated.
 struct PoseMeasurement {
-  data::Pose<> pose;                   ///< psi only if a mark was read
-  Eigen::Vector2d centre_px;           ///< projection of the CoM
-  Eigen::Matrix2d covariance_m2;       ///< of pose.centre_m x, y
-  Eigen::Matrix2d covariance_px2;      ///< of centre_px
-  double sigma_theta_rad = 0.0;        ///< infinite when the image does not tell
+  data::Pose<> pose;               ///< psi only if a mark was read
+  Eigen::Vector2d centre_px;       ///< projection of the CoM
+  Eigen::Matrix2d covariance_m2;   ///< of pose.centre_m x, y
+  Eigen::Matrix2d covariance_px2;  ///< of centre_px
+  double sigma_theta_rad = 0.0;    ///< infinite when the image does not tell
   double sigma_phi_rad = 0.0;
   std::optional<double> sigma_psi_rad;
-  double rms_px = 0.0;                 ///< of the accepted edge points about the outline
-  double accepted = 0.0;               ///< fraction of the predicted outline with an accepted edge
+  double rms_px = 0.0;    ///< of the accepted edge points about the outline
+  double accepted = 0.0;  ///< fraction of the predicted outline with an accepted edge
   std::vector<EdgePoint> edges;
 };
 
 /// Picture evidence for one measurement. `background` may be empty.
 struct OutlineEvidence {
-  const cv::Mat& luma;                       ///< CV_8UC1
-  const cv::Mat& background;                 ///< CV_8UC1 of the same size, or empty
-  std::optional<Detection> detection;        ///< used for a start when there is no prediction
+  const cv::Mat& luma;                 ///< CV_8UC1
+  const cv::Mat& background;           ///< CV_8UC1 of the same size, or empty
+  std::optional<Detection> detection;  ///< used for a start when there is no prediction
   std::optional<data::Pose<>> predicted;
   /// Image motion of the CoM during the exposure [px]; inflates along-motion sigma.
   Eigen::Vector2d smear_px = Eigen::Vector2d::Zero();

@@ -28,7 +28,8 @@ struct TrackResult {
   TrackSummary summary;
 };
 
-/// Video -> CoM per frame. The scene may be empty: then pixels only. `camera` overrides the scene's.
+/// Video -> CoM per frame. The scene may be empty: then pixels only. `camera` overrides the
+/// scene's.
 /// @throws InputError for an unreadable video or camera; a body never seen is an InputError too.
 [[nodiscard]] TrackResult track_video(const std::filesystem::path& video, const data::Scene& scene,
                                       const std::optional<data::Camera>& camera,

@@ -1,0 +1,98 @@
+#include "trochoid/tracking/inspect.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "body_search.hpp"
+#include "recording.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+double quantile(std::vector<double> values, double share) {
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+/// Share of the band between two multiples of the rim that looks like the floor.
+double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim, double noise,
+                   double from, double to) {
+  constexpr int kRays = 24, kRings = 4;
+  int inside = 0, floor = 0;
+  for (int ring = 0; ring < kRings; ++ring)
+    for (int ray = 0; ray < kRays; ++ray) {
+      const double angle = 2.0 * CV_PI * ray / kRays, r = from + (to - from) * ring / (kRings - 1);
+      const Eigen::Vector2d p =
+          rim.centre_px + rim.shape_px * Eigen::Vector2d(r * std::cos(angle), r * std::sin(angle));
+      const cv::Point at(static_cast<int>(std::lround(p.x())),
+                         static_cast<int>(std::lround(p.y())));
+      if (!cv::Rect({}, luma.size()).contains(at)) continue;
+      ++inside;
+      const int difference = std::abs(luma.at<std::uint8_t>(at) - plate.at<std::uint8_t>(at));
+      floor += difference < 6.0 + 3.0 * noise;
+    }
+  return inside > 0 ? static_cast<double>(floor) / inside : 0.0;
+}
+
+/// The rims seen in the held frames, from the seed both ways.
+struct Watch {
+  std::vector<double> radii, ratios, bore;
+  cv::Rect2d box;
+  cv::Mat plate;
+
+  void add(const Frame& frame, const Background& background, const Ellipse& rim) {
+    radii.push_back(rim.semi_major_px());
+    ratios.push_back(rim.semi_minor_px() / rim.semi_major_px());
+    const cv::Rect2d point(rim.centre_px.x(), rim.centre_px.y(), 1e-9, 1e-9);
+    box = radii.size() == 1 ? point : (box | point);
+    background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+    const double noise = background.noise_levels();
+    // Less what looks like the floor where the body certainly is: it may have its colour.
+    bore.push_back(floor_share(frame.luma, plate, rim, noise, 0.1, 0.4) -
+                   floor_share(frame.luma, plate, rim, noise, 0.88, 0.96));
+  }
+};
+
+Inspection::Body watch(const std::vector<Frame>& held, const Background& background,
+                       const BodyFinder& finder, const Seed& seed) {
+  Watch seen;
+  seen.add(held[seed.held_index], background, seed.seen.rim);
+  for (const int step : {1, -1}) {
+    Follower follower(finder, background, nullptr);
+    follower.start(held[seed.held_index], seed.seen);
+    for (auto i = static_cast<std::ptrdiff_t>(seed.held_index) + step;
+         i >= 0 && i < static_cast<std::ptrdiff_t>(held.size()); i += step) {
+      const Frame& frame = held[static_cast<std::size_t>(i)];
+      if (const auto next = follower.follow(frame)) seen.add(frame, background, next->rim);
+    }
+  }
+  // The floor seen through a tilted ring is hidden by its wall: the flattest third decides.
+  constexpr double kRobust = 0.05, kBore = 0.5;
+  return {.radius_px = quantile(seen.radii, 1.0 - kRobust),
+          .least_axis_ratio = quantile(seen.ratios, kRobust),
+          .usual_axis_ratio = quantile(seen.ratios, 0.5),
+          .travel_px = std::hypot(seen.box.width, seen.box.height),
+          .bore_shows = quantile(seen.bore, 2.0 / 3.0) > kBore,
+          .frames = static_cast<int>(seen.radii.size())};
+}
+
+}  // namespace
+
+Inspection inspect_video(const std::filesystem::path& path) {
+  const Recording recording(path, {});
+  const auto& held = recording.held();
+  const Background background = Background::from_samples(recording.samples());
+  Inspection result;
+  result.video = recording.info();
+  result.watched_s = held.back().t_s - held.front().t_s;
+  result.restless = background.restless();
+  const auto finder = make_rim_finder(false);
+  const std::vector<Follower::Others> nothing(held.size());
+  if (const auto seed = find_seed(held, background, *finder, nothing))
+    result.body = watch(held, background, *finder, *seed);
+  return result;
+}
+
+}  // namespace trochoid::tracking
