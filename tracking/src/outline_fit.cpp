@@ -171,7 +171,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
   auto best =
       evidence.predicted ? fit_from(scenery, starts.front()) : fit_best(scenery, starts, mirrors);
-  if (best && evidence.predicted && mirrors && best->score < kDoubtful) {
+  if (best && evidence.predicted && mirrors && !evidence.attitude_known && best->score < kDoubtful) {
     const auto other = fit_from(scenery, mirrored(camera_, motion, best->refined.pose));
     if (other) best = better(*best, *other);
   }

@@ -40,6 +40,8 @@ struct OutlineEvidence {
   const cv::Mat& background;           ///< CV_8UC1 of the same size, or empty
   std::optional<Detection> detection;  ///< used for a start when there is no prediction
   std::optional<data::Pose<>> predicted;
+  /// The predicted attitude is nearly right: its mirror image is not considered.
+  bool attitude_known = false;
   /// Image motion of the CoM during the exposure [px]; inflates along-motion sigma.
   Eigen::Vector2d smear_px = Eigen::Vector2d::Zero();
 };
