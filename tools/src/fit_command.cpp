@@ -19,7 +19,6 @@ struct FitCommand {
   std::vector<std::string> tracks;
   std::string scene, output;
   std::optional<int> object;
-  bool verbose = false;
   fitting::FitOptions options;
 };
 
@@ -91,10 +90,7 @@ void run(const FitCommand& command) {
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
-  fitting::FitOptions options = command.options;
-  if (command.verbose)
-    options.log = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
-  data::Fit fit = fitting::fit(tracks, scene, options);
+  data::Fit fit = fitting::fit(tracks, scene, command.options);
   fit.inputs = provenance.inputs;
   fit.versions["trochoid"] = TROCHOID_VERSION;
   if (!command.options.model.empty()) scene.model.name = fit.model;
@@ -130,7 +126,6 @@ void add_fit_command(CLI::App& app) {
       ->check(CLI::Range(0, 100000));
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
       ->check(CLI::NonNegativeNumber);
-  fit->add_flag("--verbose,-v", command->verbose, "Every minimisation as a line on stderr");
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
   fit->callback([command] { run(*command); });
 }

@@ -38,7 +38,6 @@ int run(int argc, char** argv) {
   add_run_command(app);
   add_init_command(app);
 #endif
-  add_manual_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

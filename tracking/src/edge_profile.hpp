@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
+#include <utility>
 
 namespace trochoid::tracking {
 
@@ -13,6 +14,9 @@ class LightWindow {
   LightWindow() = default;
   /// Copies `window` (clipped to the picture) of an 8-bit luma picture.
   LightWindow(const cv::Mat& luma, const cv::Rect& window);
+  /// Any values that mix linearly across an edge, pixel (0, 0) of them at `origin`.
+  LightWindow(cv::Mat values, const cv::Point& origin)
+      : light_(std::move(values)), window_(origin, light_.size()) {}
   /// The same window blurred by a Gaussian.
   [[nodiscard]] LightWindow blurred(double sigma_px) const;
   [[nodiscard]] bool empty() const { return light_.empty(); }

@@ -221,7 +221,9 @@ class LibavSource final : public FrameSource {
         (picture_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture_->decode_error_flags != 0;
     frame.luma = luma_of(*picture_, scaler_);
     if (options_.colour) frame.bgr = bgr_of(*picture_, colour_scaler_);
+    if (options_.chroma) frame.chroma = chroma_of(*picture_);
     turn(frame.luma, quarters_);
+    turn(frame.chroma, quarters_);
     turn(frame.bgr, quarters_);
   }
 

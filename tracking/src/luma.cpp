@@ -82,6 +82,18 @@ cv::Mat luma_of(const AVFrame& picture, Scaler& scaler) {
   return luma;
 }
 
+cv::Mat chroma_of(const AVFrame& picture) {
+  if (picture.format != AV_PIX_FMT_YUV420P && picture.format != AV_PIX_FMT_YUVJ420P) return {};
+  cv::Mat chroma((picture.height + 1) / 2, (picture.width + 1) / 2, CV_8UC2);
+  for (int y = 0; y < chroma.rows; ++y) {
+    const std::uint8_t* cb = picture.data[1] + static_cast<std::ptrdiff_t>(y) * picture.linesize[1];
+    const std::uint8_t* cr = picture.data[2] + static_cast<std::ptrdiff_t>(y) * picture.linesize[2];
+    std::uint8_t* out = chroma.ptr(y);
+    for (int x = 0; x < chroma.cols; ++x) out[2 * x] = cb[x], out[2 * x + 1] = cr[x];
+  }
+  return chroma;
+}
+
 cv::Mat bgr_of(const AVFrame& picture, Scaler& scaler) {
   return scaled_to(picture, AV_PIX_FMT_BGR24, CV_8UC3, scaler);
 }

@@ -10,6 +10,10 @@ namespace trochoid::tracking {
 /// context is kept in `scaler`.
 [[nodiscard]] cv::Mat luma_of(const AVFrame& picture, Scaler& scaler);
 
+/// Colour differences at half the size as coded, CV_8UC2 (Cb, Cr); empty for anything but 8-bit
+/// 4:2:0.
+[[nodiscard]] cv::Mat chroma_of(const AVFrame& picture);
+
 /// The same picture in colour, CV_8UC3 in OpenCV's order.
 [[nodiscard]] cv::Mat bgr_of(const AVFrame& picture, Scaler& scaler);
 

@@ -8,8 +8,10 @@
 #include <limits>
 #include <numbers>
 
+#include "colour_window.hpp"
 #include "outline_refine.hpp"
 #include "pose_start.hpp"
+#include "spin_mark.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {
@@ -43,8 +45,9 @@ struct Fitted {
   double evidence = 0.0;  ///< evidence_of the fit
 };
 
-std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
-  auto refined = refine(scenery.blurred(kNearBlurPx), start, kNear);
+// The last stage, from a pose that is right to about the blur of the picture.
+std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& start) {
+  auto refined = refine(scenery, start, exact(kUsualBlurPx));
   if (!refined) return std::nullopt;
   Fitted out;
   out.blur_px = estimate_blur_px(scenery, *refined);
@@ -56,8 +59,22 @@ std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start
   return out;
 }
 
-const Fitted& better(const Fitted& a, const Fitted& b) {
-  return a.evidence >= b.evidence ? a : b;
+std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
+  if (!a || !b) return a ? a : b;
+  return a->evidence >= b->evidence ? a : b;
+}
+
+std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
+  const auto refined = refine(scenery.blurred(kNearBlurPx), start, kNear);
+  return refined ? fit_exactly(scenery, refined->pose) : std::nullopt;
+}
+
+// A prediction is often right to the blur already; the wider look is easily misled by shadows.
+std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted) {
+  constexpr double kSure = 0.6;
+  auto fitted = fit_exactly(scenery, predicted);
+  if (fitted && fitted->score >= kSure) return fitted;
+  return better(std::move(fitted), fit_from(scenery, predicted));
 }
 
 // From afar: each start is drawn towards edges, those that then lie on edges are fitted.
@@ -76,8 +93,7 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
             [](const auto& a, const auto& b) { return a.first > b.first; });
   std::optional<Fitted> best;
   const auto consider = [&](const data::Pose<>& pose) {
-    const auto fitted = fit_from(scenery, pose);
-    if (fitted) best = best ? better(*best, *fitted) : *fitted;
+    best = better(std::move(best), fit_from(scenery, pose));
   };
   for (size_t i = 0; i < std::min(kFitted, drawn.size()); ++i) {
     consider(drawn[i].second);
@@ -86,6 +102,8 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
   return best;
 }
 
+// How much more must speak for the attitude the prediction does not expect.
+constexpr double kClearlyBetter = 1.2;
 // Below kDoubtful the mirrored attitude may fit better; below kLeastScore the body is not there.
 constexpr double kDoubtful = 0.7, kLeastScore = 0.25;
 
@@ -134,6 +152,19 @@ void fold(data::Pose<>& pose) {
   pose.phi_rad = std::remainder(pose.phi_rad + std::numbers::pi, 2.0 * std::numbers::pi);
 }
 
+// Spin is counted from the node line: what phi is wrong by, psi takes back. An axis that is off
+// turns a mark at this distance from it.
+double spin_sigma_rad(const PoseMeasurement& m, const MarkReading& marks) {
+  const double of_phi =
+      std::isfinite(m.sigma_phi_rad) ? std::cos(m.pose.theta_rad) * m.sigma_phi_rad : 0.0;
+  const double of_centre =
+      std::sqrt(0.5 * m.covariance_px2.trace()) / std::max(marks.radius_px, 1.0);
+  constexpr double kShadingPx = 0.15;  // uneven light shifts a mark on its face
+  const double of_light = kShadingPx / std::max(marks.radius_px, 1.0);
+  return std::sqrt(marks.sigma_rad * marks.sigma_rad + of_phi * of_phi + of_centre * of_centre +
+                   of_light * of_light);
+}
+
 }  // namespace
 
 OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camera camera)
@@ -165,19 +196,28 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       motion,
       LightWindow(evidence.luma, window),
       evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
-      evidence.smear_px};
+      colour_window(evidence.chroma, window, body_, camera_, starts.front()),
+      evidence.predicted && evidence.previous
+          ? PoseMotion::Step(evidence.exposure_fraction *
+                             motion.step_between(*evidence.previous, starts.front()))
+          : PoseMotion::Step()};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
-  auto best =
-      evidence.predicted ? fit_from(scenery, starts.front()) : fit_best(scenery, starts, mirrors);
-  if (best && evidence.predicted && mirrors && !evidence.attitude_known && best->score < kDoubtful) {
-    const auto other = fit_from(scenery, mirrored(camera_, motion, best->refined.pose));
-    if (other) best = better(*best, *other);
+  auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front())
+                                 : fit_best(scenery, starts, mirrors);
+  if (best && evidence.predicted && mirrors && best->score < kDoubtful) {
+    const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);
+    auto turned = fit_from(scenery, other);
+    if (turned && turned->evidence > kClearlyBetter * best->evidence) best = std::move(turned);
   }
   if (!best || !believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
   if (alike) fold(m.pose);
+  if (const auto marks = read_marks(evidence.luma, body_, camera_, m.pose)) {
+    m.pose.psi_rad = marks->psi_rad;
+    m.sigma_psi_rad = spin_sigma_rad(m, *marks);
+  }
   return m;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "colour_window.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
@@ -13,8 +15,8 @@ using Edge = data::OutlinePoint::Edge;
 constexpr double kLeastInsidePx = 1.5;  // less does not show the level beside the edge
 
 // Blur of an edge with this normal: the picture's own and the path of the body during the exposure.
-double blur_along(const Scenery& scenery, const Eigen::Vector2d& normal, double blur_px) {
-  const double smear = normal.dot(scenery.smear_px);
+double blur_along(const Scenery& scenery, const OutlineSample& sample, double blur_px) {
+  const double smear = scenery.smear.size() > 0 ? sample.motion.dot(scenery.smear) : 0.0;
   return std::sqrt(blur_px * blur_px + smear * smear / 12.0);
 }
 
@@ -26,6 +28,7 @@ double clear_of_next(double next_px, double extent_px, double blur_px) {
 
 // The edge near a point of the outline, with what a second fit needs.
 struct Look {
+  bool colour = false;
   Profile profile;
   EdgeModel model;
   ProfileEdge edge;
@@ -36,14 +39,17 @@ struct Look {
 
 bool look_for_edge(const Scenery& scenery, const OutlineSample& sample, const Search& search,
                    Look& look) {
-  const double blur = blur_along(scenery, sample.normal_px, search.blur_px);
+  const double own_blur =
+      look.colour ? std::hypot(search.blur_px, std::sqrt(kColourBlur2Px2)) : search.blur_px;
+  const double blur = blur_along(scenery, sample, own_blur);
   const double widen = blur - search.blur_px;
-  const double inside = clear_of_next(sample.inside_px, search.extent_px + widen, blur);
-  const double outside = clear_of_next(sample.outside_px, search.extent_px + widen, blur);
+  const double inside = clear_of_next(sample.inside_px, search.extent_px + 2.0 * widen, blur);
+  const double outside = clear_of_next(sample.outside_px, search.extent_px + 2.0 * widen, blur);
   if (inside < kLeastInsidePx || outside < kLeastInsidePx) return false;
   static const LightWindow kNoPlate;
-  const LightWindow& plate = sample.silhouette ? scenery.plate : kNoPlate;
-  if (!sample_profile(scenery.picture, plate, sample.image_px, sample.normal_px, inside, outside,
+  const LightWindow& picture = look.colour ? scenery.colour : scenery.picture;
+  const LightWindow& plate = sample.silhouette && !look.colour ? scenery.plate : kNoPlate;
+  if (!sample_profile(picture, plate, sample.image_px, sample.normal_px, inside, outside,
                       look.profile))
     return false;
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
@@ -127,34 +133,32 @@ EdgeEquation equation_of(const OutlineSample& sample, const Look& look) {
   e.swell = bore ? -1.0 : 1.0;
   e.polarity = look.edge.contrast < 0.0 ? -1.0 : 1.0;
   e.model_px = model_sd_px(look, sample.silhouette);
-  e.group = sample.silhouette ? (bore ? 1 : 0) : 2;
+  e.group = look.colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
+  e.colour = look.colour;
   e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   e.offset_px = look.edge.offset_px;
-  e.variance_px2 = look.edge.noise_variance_px2 + look.edge.shading_variance_px2;
+  // Colour planes of half the size hold fewer independent values, along the profile and across.
+  const double shared = look.colour ? 1.5 : 1.0;
+  e.variance_px2 = shared * (look.edge.noise_variance_px2 + look.edge.shading_variance_px2);
   e.arc_px = sample.arc_px;
-  e.curve = static_cast<int>(sample.edge);
+  e.curve = static_cast<int>(sample.edge) + (look.colour ? 8 : 0);
   return e;
 }
 
-bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, Refined& out,
-             double& outline_px) {
-  const auto all =
-      outline_samples(scenery.body, pose, scenery.camera, scenery.motion, search.step_px);
+// Edges of one picture, luma or colour, along the samples of an outline.
+void collect_in(const Scenery& scenery, const std::vector<OutlineSample>& all, const Search& search,
+                bool colour, Refined& out) {
   std::vector<OutlineSample> samples;
   std::vector<Look> looks;
-  outline_px = 0.0;
   for (const OutlineSample& sample : all) {
-    if (!sample.silhouette && !search.own_edges) continue;
-    if (sample.silhouette) outline_px += sample.arc_px;
+    if (!sample.silhouette && (colour || !search.own_edges)) continue;
     looks.emplace_back();
+    looks.back().colour = colour;
     if (look_for_edge(scenery, sample, search, looks.back()))
       samples.push_back(sample);
     else
       looks.pop_back();
   }
-  out.samples.clear();
-  out.edges.clear();
-  out.equations.clear();
   if (search.shading) fit_with_noise_of_neighbours(search, samples, looks);
   find_steepness(samples, looks);
   for (size_t i = 0; i < looks.size(); ++i) {
@@ -163,6 +167,20 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
     out.edges.push_back(looks[i].edge);
     out.equations.push_back(equation_of(samples[i], looks[i]));
   }
+}
+
+bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, Refined& out,
+             double& outline_px) {
+  const auto all =
+      outline_samples(scenery.body, pose, scenery.camera, scenery.motion, search.step_px);
+  outline_px = 0.0;
+  for (const OutlineSample& sample : all)
+    if (sample.silhouette) outline_px += sample.arc_px;
+  out.samples.clear();
+  out.edges.clear();
+  out.equations.clear();
+  collect_in(scenery, all, search, false, out);
+  if (!scenery.colour.empty()) collect_in(scenery, all, search, true, out);
   return !all.empty();
 }
 
@@ -198,7 +216,8 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   for (size_t i = 0; i < out.equations.size(); ++i)
     if (out.samples[i].silhouette && out.equations[i].weight > 0.5)
       accepted_px += out.samples[i].arc_px;
-  out.covered = outline_px > 0.0 ? accepted_px / outline_px : 0.0;
+  const double channels = scenery.colour.empty() ? 1.0 : 2.0;
+  out.covered = outline_px > 0.0 ? accepted_px / (channels * outline_px) : 0.0;
   return out;
 }
 
@@ -213,8 +232,8 @@ double estimate_blur_px(const Scenery& scenery, const Refined& refined) {
     const auto& edge = refined.edges[i];
     const double noise2 =
         (edge.inner_square + edge.outer_square) / (edge.inner_freedom + edge.outer_freedom);
-    if (refined.equations[i].weight < 0.5 || !sample.silhouette || sample.inside_px < 4.0 ||
-        edge.contrast * edge.contrast < 25.0 * noise2)
+    if (refined.equations[i].weight < 0.5 || refined.equations[i].colour || !sample.silhouette ||
+        sample.inside_px < 4.0 || edge.contrast * edge.contrast < 25.0 * noise2)
       continue;
     if (!sample_profile(scenery.picture, scenery.plate, sample.image_px, sample.normal_px, 3.0, 3.0,
                         profile))
@@ -223,7 +242,7 @@ double estimate_blur_px(const Scenery& scenery, const Refined& refined) {
     double least = std::numeric_limits<double>::infinity(), blur = 0.0;
     for (const double tried : kTried) {
       ProfileEdge fit;
-      const EdgeModel model{.blur_px = blur_along(scenery, sample.normal_px, tried),
+      const EdgeModel model{.blur_px = blur_along(scenery, sample, tried),
                             .plate = plate_explains(profile, 1.5 * tried),
                             .shading = true};
       if (!fit_edge(profile, model, refined.equations[i].offset_px, 2.0, 4, fit)) continue;
@@ -246,14 +265,18 @@ double outline_score(const Scenery& scenery, const data::Pose<>& pose, double bl
   for (const OutlineSample& sample :
        outline_samples(scenery.body, pose, scenery.camera, scenery.motion, search.step_px)) {
     if (!sample.silhouette) continue;
-    Look look;
     arc += sample.arc_px;
-    if (!look_for_edge(scenery, sample, search, look)) continue;
-    const ProfileEdge& edge = look.edge;
-    const double off2 = edge.offset_px * edge.offset_px;
-    const double gain =
-        edge.gain - 0.5 * off2 / (edge.noise_variance_px2 + kTolerancePx * kTolerancePx);
-    score += sample.arc_px * std::clamp(gain / kCertain, 0.0, 1.0);
+    double gain = 0.0;
+    for (const bool colour : {false, true}) {
+      if (colour && scenery.colour.empty()) continue;
+      Look look;
+      look.colour = colour;
+      if (!look_for_edge(scenery, sample, search, look)) continue;
+      const double off2 = look.edge.offset_px * look.edge.offset_px;
+      const double tolerance2 = look.edge.noise_variance_px2 + kTolerancePx * kTolerancePx;
+      gain = std::max(gain, look.edge.gain - 0.5 * off2 / tolerance2);
+    }
+    score += sample.arc_px * std::min(gain / kCertain, 1.0);
   }
   return arc > 0.0 ? score / arc : 0.0;
 }

@@ -17,11 +17,18 @@ struct Scenery {
   const data::Camera& camera;
   const PoseMotion& motion;
   LightWindow picture, plate;
-  Eigen::Vector2d smear_px = Eigen::Vector2d::Zero();
+  LightWindow colour;        ///< colour_window, or empty
+  PoseMotion::Step smear{};  ///< the body's motion during the exposure; empty: not known
 
   /// The same with both windows blurred.
   [[nodiscard]] Scenery blurred(double sigma_px) const {
-    return {body, camera, motion, picture.blurred(sigma_px), plate.blurred(sigma_px), smear_px};
+    return {body,
+            camera,
+            motion,
+            picture.blurred(sigma_px),
+            plate.blurred(sigma_px),
+            colour.blurred(sigma_px),
+            smear};
   }
 };
 

@@ -99,6 +99,24 @@ data::Pose<> PoseMotion::moved(const data::Pose<>& pose, const Step& step) const
   return settled(next);
 }
 
+PoseMotion::Step PoseMotion::step_between(const data::Pose<>& from, const data::Pose<>& to) const {
+  Step step = Step::Zero(count_);
+  const Eigen::Vector3d axis = data::symmetry_axis(to.theta_rad, to.phi_rad);
+  if (rotation_ >= 0) {
+    const Eigen::Vector3d turned = axis - data::symmetry_axis(from.theta_rad, from.phi_rad);
+    step[rotation_] = -turned.dot(ascent(to));
+    step[rotation_ + 1] = turned.dot(node_line(to));
+  }
+  const Eigen::Vector3d moved = to.centre_m - from.centre_m;
+  if (support_.kind == data::SupportKind::pivot) {
+    step[2] = (to.centre_m - *support_.pivot_m).norm() - (from.centre_m - *support_.pivot_m).norm();
+  } else {
+    step.head<2>() = moved.head<2>();
+    if (depth_free_) step[2] = moved.z();
+  }
+  return step;
+}
+
 data::Pose<> PoseMotion::settled(data::Pose<> pose) const {
   switch (support_.kind) {
     case data::SupportKind::flat:

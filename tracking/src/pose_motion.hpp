@@ -29,6 +29,8 @@ class PoseMotion {
   [[nodiscard]] double scale(int parameter) const;
   [[nodiscard]] Velocities velocities(const data::Pose<>& pose) const;
   [[nodiscard]] data::Pose<> moved(const data::Pose<>& pose, const Step& step) const;
+  /// The small motion that leads from one pose to another, to first order.
+  [[nodiscard]] Step step_between(const data::Pose<>& from, const data::Pose<>& to) const;
   /// Puts a pose where the support wants it: height on the floor, flat, axis through the pivot.
   [[nodiscard]] data::Pose<> settled(data::Pose<> pose) const;
 

@@ -13,7 +13,7 @@ Recording::Recording(const std::filesystem::path& path, const SourceOptions& opt
     : path_(path), options_(options), source_(decode_ahead(open_video(path, options))) {
   std::size_t bytes = 0;
   while (auto frame = source_->next()) {
-    const std::size_t size = frame->luma.total();
+    const std::size_t size = frame->luma.total() + 2 * frame->chroma.total();
     if (bytes + size > kHeldBytes && held_.size() >= 2 * Background::kSamples) {
       first_after_ = std::move(frame);
       more_ = true;

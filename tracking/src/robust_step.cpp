@@ -11,7 +11,7 @@ namespace {
 
 // Unknowns: the pose, the two nuisances common to the outline, and per group the error of the edge
 // model as a function of direction, given at kKnots directions and blended between them.
-constexpr int kCommon = 2, kKnots = 8;
+constexpr int kCommon = 5, kKnots = 8;
 constexpr int kMost = PoseMotion::kMost + kCommon + kGroups * kKnots;
 constexpr int kRow = PoseMotion::kMost + kCommon + 2;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
@@ -19,8 +19,11 @@ using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
 
 // The rim may be a little larger or smaller than the caliper says, edges a little towards the
 // bright side of where the transfer curve puts them.
-constexpr double kSwellSdPx = 0.05;
+constexpr double kSwellSdPx = 0.3;
 constexpr double kPolaritySdPx = 0.2;
+// The colour planes: towards the brighter side, and as a whole beyond half a pixel of the other
+// common place of the samples.
+constexpr double kColourPolaritySdPx = 0.3, kColourShiftSdPx = 0.08;
 
 // The few unknowns an equation depends on.
 struct Row {
@@ -32,7 +35,13 @@ struct Row {
     const int n = static_cast<int>(e.motion.size());
     for (int i = 0; i < n; ++i) add(i, e.motion[i]);
     add(n, e.swell);
-    add(n + 1, e.polarity);
+    if (e.colour) {
+      add(n + 2, e.polarity);
+      add(n + 3, std::cos(e.direction_rad));
+      add(n + 4, std::sin(e.direction_rad));
+    } else {
+      add(n + 1, e.polarity);
+    }
     // Cosine and sine keep the variance the same between the knots.
     const double place = (e.direction_rad / (2.0 * std::numbers::pi) + 1.0) * kKnots;
     const int knot = static_cast<int>(place);
@@ -78,6 +87,9 @@ Matrix prior_information(const PoseMotion::Step& prior_sd) {
   for (int i = 0; i < n; ++i) information(i, i) = 1.0 / (prior_sd[i] * prior_sd[i]);
   information(n, n) = 1.0 / (kSwellSdPx * kSwellSdPx);
   information(n + 1, n + 1) = 1.0 / (kPolaritySdPx * kPolaritySdPx);
+  information(n + 2, n + 2) = 1.0 / (kColourPolaritySdPx * kColourPolaritySdPx);
+  information(n + 3, n + 3) = information(n + 4, n + 4) =
+      1.0 / (kColourShiftSdPx * kColourShiftSdPx);
   return information;
 }
 
@@ -172,6 +184,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   out.step = x.head(n);
   out.swell_px = x[n];
   out.polarity_px = x[n + 1];
+  out.colour_shift_px = {x[n + 3], x[n + 4]};
   out.rms_px = std::sqrt(square / weight);
   out.accepted = accepted / arc;
   out.correlation = correlation_factor(equations, scale2, fitted);

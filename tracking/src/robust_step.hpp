@@ -6,7 +6,7 @@
 
 namespace trochoid::tracking {
 
-inline constexpr int kGroups = 3;  ///< outer silhouette, bore, the body's own edges
+inline constexpr int kGroups = 4;  ///< outer silhouette, bore, the body's own edges, colour
 
 /// One measured edge for the linear fit: observed offset along the normal and how it depends on the
 /// pose. Two nuisances are common to the whole outline: `swell` multiplies an error of the size (+1
@@ -19,6 +19,8 @@ struct EdgeEquation {
   double model_px = 0.0;
   int group = 0;               ///< 0 .. kGroups - 1
   double direction_rad = 0.0;  ///< of the normal
+  /// Seen in the colour planes: with a shift of these planes and one along the normal as nuisances.
+  bool colour = false;
   double offset_px = 0.0;
   double variance_px2 = 1.0;
   double arc_px = 1.0;
@@ -31,6 +33,7 @@ struct RobustSolution {
   PoseMotion::Step step;
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
   double swell_px = 0.0, polarity_px = 0.0;
+  Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
   double rms_px = 0.0;
   double accepted = 0.0;     ///< share of the arc with weight above one half
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors

@@ -9,7 +9,6 @@
 
 #include "body_search.hpp"
 #include "recording.hpp"
-#include "seed_trial.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -75,6 +74,7 @@ class Tracking {
  private:
   static SourceOptions source_options(const data::Scene& scene, const TrackOptions& options) {
     SourceOptions source;
+    source.chroma = has_shape(scene);  // the rim finder works on luma alone
     source.frame_rate_hz = scene.camera.frame_rate_hz;
     source.from = options.from.empty() ? scene.tracking.from : options.from;
     source.to = options.to.empty() ? scene.tracking.to : options.to;
@@ -108,7 +108,6 @@ class Tracking {
       seed = find_seed(held, background_, *finder_, explained_);
     }
     if (!seed) return false;
-    seed = better_reading(held, background_, *finder_, std::move(*seed));
     BodyPath path;
     if (!seed->seen.pose) path.marks = marks_of(held[seed->held_index], seed->seen);
     if (path.marks) seed->seen.turned_rad = 0.0, seed->seen.turned_sigma_rad = 0.01;

@@ -16,6 +16,8 @@ struct Frame {
   std::int64_t index = 0;
   double t_s = 0.0;
   bool damaged = false;  ///< the decoder reported an error in it
+  /// CV_8UC2 (Cb, Cr) at half the size, as coded; empty unless asked for and coded as 8-bit 4:2:0.
+  cv::Mat chroma{};
 };
 
 struct VideoInfo {
@@ -35,6 +37,7 @@ struct SourceOptions {
   int decoder_threads = 0;   ///< 0 = the decoder's choice
   /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
   bool key_frames_only = false;
+  bool chroma = false;  ///< fill Frame::chroma where the coding has it
 };
 
 /// Frames in order from a video file or an image sequence: printf-style ("img/%04d.png"), a pattern

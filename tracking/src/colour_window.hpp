@@ -1,0 +1,21 @@
+#pragma once
+#include "edge_profile.hpp"
+#include "trochoid/data/body.hpp"
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/pose.hpp"
+
+namespace trochoid::tracking {
+
+/// Blur that half-size colour planes, brought back to full size, have beyond that of the luma
+/// [px^2]: pixels twice as wide, and the triangle between them.
+inline constexpr double kColourBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0 + 4.0 / 6.0;
+
+/// The colour difference in which the body at `pose` stands out of its surroundings most, of full
+/// size. Shadows hardly change it, so it shows rims that the luma loses. Empty where the colours
+/// are too much alike, or without chroma. Taken to lie in the middle of the four pixels it belongs
+/// to; other codings shift it by half a pixel.
+[[nodiscard]] LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window,
+                                        const data::Body& body, const data::Camera& camera,
+                                        const data::Pose<>& pose);
+
+}  // namespace trochoid::tracking
