@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -45,6 +46,11 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
     throw InputError(
         fmt::format("no sample of object {} lies between '{}' and '{}'", track.object, from, to));
   return {first, last};
+}
+
+int kept_samples(int first, int last, double hold_back) {
+  const double kept = (1.0 - hold_back) * static_cast<double>(last - first);
+  return std::max(first + 1, first + static_cast<int>(std::lround(kept)));
 }
 
 }  // namespace trochoid::fitting

@@ -15,4 +15,7 @@ using SampleRange = std::pair<int, int>;
 [[nodiscard]] SampleRange chosen_range(const data::Track& track, const std::string& from,
                                        const std::string& to);
 
+/// End of the samples that are fitted when a share at the end is held back: at least one stays.
+[[nodiscard]] int kept_samples(int first, int last, double hold_back);
+
 }  // namespace trochoid::fitting

@@ -33,7 +33,8 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
   std::vector<ArcData> arcs;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     data::check(tracks[i], fmt::format("track {}", i + 1));
-    const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
+    const auto [first, end] = chosen_range(tracks[i], options.from, options.to);
+    const int last = kept_samples(first, end, options.hold_back);
     ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
     arc.track = static_cast<int>(i);
     if (arc.readings.empty())

@@ -57,7 +57,8 @@ struct PivotPath {
 };
 
 template <class S>
-PivotPath<S> run_pivot(const S (&p)[kParameters], std::span<const double> t_s, double tolerance) {
+PivotPath<S> run_pivot(const S (&p)[kParameters], std::span<const double> t_s, double tolerance,
+                       int max_steps = 0) {
   using P = Pivot<S>;
   const double sense = value_of(p[kW3]) < 0.0 ? -1.0 : 1.0;
   PivotPath<S> path;
@@ -65,7 +66,9 @@ PivotPath<S> run_pivot(const S (&p)[kParameters], std::span<const double> t_s, d
     path.rows.push_back({p[kPsi] + sense * turned, sense * speed});
   };
   const P pivot{p[kDry], p[kViscous], p[kQuadratic]};
-  DormandPrince<P> stepper(pivot, uniform_control<2>(tolerance));
+  auto control = uniform_control<2>(tolerance);
+  if (max_steps > 0) control.max_steps = max_steps;
+  DormandPrince<P> stepper(pivot, control);
   State<S, 2> y{S(0.0), p[kW3] * sense};
   const double end_s = t_s.empty() ? 0.0 : t_s.back();
   if (value_of(y[P::speed]) > 0.0) {
@@ -171,7 +174,7 @@ Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& valu
     double p[kParameters] = {};
     for (std::size_t i = 0; i < kinds_.size(); ++i)
       p[kinds_[i]] = values[static_cast<Eigen::Index>(i)];
-    fill(run_pivot(p, t_s, request.tolerance), request, out);
+    fill(run_pivot(p, t_s, request.tolerance, request.max_steps), request, out);
     return out;
   }
   Dual8 p[kParameters];
@@ -179,7 +182,7 @@ Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& valu
     p[kinds_[i]] = Dual8(values[static_cast<Eigen::Index>(i)]);
   for (std::size_t c = 0; c < request.derivatives.size(); ++c)
     p[kinds_[static_cast<std::size_t>(request.derivatives[c])]].derivative[c] = 1.0;
-  fill(run_pivot(p, t_s, request.tolerance), request, out);
+  fill(run_pivot(p, t_s, request.tolerance, request.max_steps), request, out);
   return out;
 }
 

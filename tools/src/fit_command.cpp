@@ -9,6 +9,7 @@
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
@@ -19,6 +20,7 @@ struct FitCommand {
   std::vector<std::string> tracks;
   std::string scene, output;
   std::optional<int> object;
+  bool compare = false;
   fitting::FitOptions options;
 };
 
@@ -63,6 +65,7 @@ void print(const data::Fit& fit) {
     fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {:8.2f} sigma  {} parameters\n",
                m.recommended ? "*" : " ", m.model, m.aicc, m.bic, m.held_back_rms_sigma,
                m.parameters);
+  if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
   for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
 }
 
@@ -90,10 +93,17 @@ void run(const FitCommand& command) {
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
-  data::Fit fit = fitting::fit(tracks, scene, command.options);
+  data::Fit fit;
+  if (command.compare) {
+    fitting::Comparison comparison = fitting::compare(tracks, scene, command.options);
+    fit = std::move(comparison.fit);
+    scene = std::move(comparison.scene);
+  } else {
+    fit = fitting::fit(tracks, scene, command.options);
+  }
   fit.inputs = provenance.inputs;
   fit.versions["trochoid"] = TROCHOID_VERSION;
-  if (!command.options.model.empty()) scene.model.name = fit.model;
+  if (!command.options.model.empty() && !command.compare) scene.model.name = fit.model;
   if (scene.model.name == "auto") scene.model.name = fit.model;
   fit.scene_toml = data::to_toml(scene);
   if (!command.output.empty()) data::write_fit(fit, command.output);
@@ -119,6 +129,8 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
   fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
   fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
+  fit->add_flag("--compare", command->compare,
+                "Try the models that make sense for the scene; fit the simplest that suffices");
   fit->add_flag("--profile", command->options.profile,
                 "Profile likelihood of the body's and the table's parameters");
   fit->add_option("--bootstrap", command->options.bootstrap,

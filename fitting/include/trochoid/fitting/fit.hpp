@@ -13,13 +13,12 @@
 namespace trochoid::fitting {
 
 struct FitOptions {
-  std::string model;  ///< overrides the scene's; "auto" compares the rungs
+  std::string model;  ///< overrides the scene's
   bool free_pivot = false;
-  std::string from, to;  ///< seconds or "f" frames
-  double hold_back =
-      0.0;               ///< fraction at the end predicted, not fitted (model comparison uses 1/3)
-  bool profile = false;  ///< profile likelihood of the dynamics parameters
-  int bootstrap = 0;     ///< block bootstrap draws, 0 = off
+  std::string from, to;    ///< seconds or "f" frames
+  double hold_back = 0.0;  ///< share of each track's samples, at its end, that is not fitted
+  bool profile = false;    ///< profile likelihood of all but the initial angles and places
+  int bootstrap = 0;       ///< block bootstrap draws, 0 = off
   std::uint64_t seed = 1;
   int threads = 0;         ///< 0 = all cores; the result does not depend on it
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma

@@ -1,0 +1,29 @@
+#pragma once
+#include <span>
+
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// The simplest model that suffices, with all that were tried in `fit.comparison`.
+struct Comparison {
+  data::Fit fit;      ///< of the recommended model; `recommendation` says why in a sentence
+  data::Scene scene;  ///< the given one with that model's terms, so that the fit can be replayed
+};
+
+/// Fits the rungs of the ladder that make sense for the scene's support. Starts from the model
+/// without losses and adds, one at a time, the loss that lowers BIC most (floor: air couple,
+/// rolling, pivoting and contour friction, and sliding; pivot: drag; puck: air force; spin-down:
+/// dry, viscous and quadratic couple). Terms the scene names beforehand give starting values only.
+/// Every rung is judged by AICc and BIC (with the effective number of samples of the best one, so
+/// that they can be compared), whiteness of residuals and the prediction of the last third of the
+/// track from the first two. Recommended is the rung with the fewest parameters within 2 of the
+/// least BIC.
+/// @throws InputError as fit() does for the model without losses.
+[[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
+                                 const FitOptions& options = {});
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,107 @@
+#include "ladder.hpp"
+
+#include <cmath>
+
+#include "trochoid/model/inertia.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+using data::ModelSettings;
+using data::Scene;
+
+// A term that is one number of the scene; the scene's own value is the start when it has one.
+Term single(const std::string& name, std::optional<double> ModelSettings::*field,
+            const Scene& scene, double typical) {
+  const double start = (scene.model.*field).value_or(0.0);
+  return {name,
+          [field, value = start > 0.0 ? start : typical](Scene& s) { s.model.*field = value; },
+          {}};
+}
+
+Term air_couple(const std::string& name, std::optional<Eigen::Vector3d> ModelSettings::*field,
+                const Scene& scene, double typical) {
+  const Eigen::Vector3d own = (scene.model.*field).value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d start = own.minCoeff() > 0.0 ? own : Eigen::Vector3d::Constant(typical);
+  return {name, [field, start](Scene& s) { s.model.*field = start; }, {}};
+}
+
+ModelSettings without_losses(const ModelSettings& model, const std::string& law) {
+  ModelSettings plain;
+  plain.name = law;
+  plain.gravity_m_s2 = model.gravity_m_s2;
+  plain.couple_regularisation_rad_s = model.couple_regularisation_rad_s;
+  plain.slip_regularisation_m_s = model.slip_regularisation_m_s;
+  return plain;
+}
+
+void add_floor_terms(const Scene& scene, Ladder& ladder) {
+  const model::CentralInertia inertia = model::central_inertia(*scene.body);
+  const double R = scene.body->radius_m;
+  const double unit_N_m_s = inertia.mass_kg * std::sqrt(scene.model.gravity_m_s2 * R * R * R);
+  // Losses that end a spin within seconds: thousandths of the natural units.
+  constexpr double kTypical = 2e-3;
+  if (inertia.mass_known)
+    ladder.terms.push_back(
+        air_couple("air couple", &ModelSettings::air_linear_N_m_s, scene, kTypical * unit_N_m_s));
+  else
+    ladder.left_out.push_back("air couple (needs body.mass_kg)");
+  const auto friction = [&](const char* name, std::optional<double> ModelSettings::*field) {
+    ladder.terms.push_back(single(name, field, scene, kTypical * R));
+  };
+  friction("rolling friction", &ModelSettings::rolling_friction_m);
+  friction("pivoting friction", &ModelSettings::pivoting_friction_m);
+  friction("contour friction", &ModelSettings::contour_friction_m);
+  Term sliding = single("sliding", &ModelSettings::friction, scene, 0.3);
+  sliding.switch_on = [set = sliding.switch_on](Scene& s) {
+    set(s);
+    s.model.name = "sliding";
+  };
+  sliding.last_resort = true;
+  ladder.terms.push_back(std::move(sliding));
+}
+
+void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
+  ladder.terms = {
+      single("dry couple", &ModelSettings::spin_down_dry_rad_s2, scene, 0.1),
+      single("viscous couple", &ModelSettings::spin_down_viscous_1_s, scene, 0.1),
+      single("quadratic couple", &ModelSettings::spin_down_quadratic_1_rad, scene, 0.01)};
+}
+
+}  // namespace
+
+Ladder ladder_of(const Scene& scene) {
+  Ladder ladder;
+  Scene named = scene;
+  // Any friction will do to ask which law the scene's support stands for.
+  if (!named.model.friction) named.model.friction = 0.2;
+  if (scene.model.name == "auto" && scene.support.kind == data::SupportKind::floor)
+    named.model.friction.reset();
+  ladder.law = model::make_predictor(named)->model_name();
+  if (ladder.law == "sliding") ladder.law = "rolling";
+  ladder.plain = scene;
+  ladder.plain.model = without_losses(scene.model, ladder.law);
+  if (ladder.law == "rolling") {
+    add_floor_terms(scene, ladder);
+  } else if (ladder.law == "puck") {
+    ladder.plain.model.friction = scene.model.friction.value_or(0.2);
+    if (scene.body->mass_kg)
+      ladder.terms.push_back(
+          single("air force", &ModelSettings::air_force_N_s_m, scene, 0.05 * *scene.body->mass_kg));
+    else
+      ladder.left_out.push_back("air force (needs body.mass_kg)");
+  } else if (ladder.law == "pivot") {
+    add_spin_down_terms(scene, ladder);
+  } else if (ladder.law == "top") {
+    ladder.terms.push_back({"drag",
+                            [](Scene& s) {
+                              s.model.drag_transverse_N_m_s = 1e-6;
+                              s.model.drag_spin_N_m_s = 1e-6;
+                            },
+                            {{"gamma1_1_s", 0.05}, {"gamma3_1_s", 0.05}}});
+  }
+  return ladder;
+}
+
+}  // namespace trochoid::fitting

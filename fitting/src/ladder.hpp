@@ -1,0 +1,30 @@
+#pragma once
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "trochoid/data/scene.hpp"
+
+namespace trochoid::fitting {
+
+/// Something a model may contain or not.
+struct Term {
+  std::string name;  ///< as in a sentence: "pivoting friction"
+  std::function<void(data::Scene&)> switch_on;
+  std::map<std::string, double> start;  ///< starting values of its parameters
+  bool last_resort = false;  ///< costly: tried only where nothing else explains the track
+};
+
+/// A scene's possible models: the plainest one and the terms it may take on.
+struct Ladder {
+  std::string law;  ///< name of the plainest model
+  data::Scene plain;
+  std::vector<Term> terms;
+  std::vector<std::string> left_out;  ///< why a term that belongs here is not tried
+};
+
+/// @throws InputError if the scene lacks what its law needs.
+[[nodiscard]] Ladder ladder_of(const data::Scene& scene);
+
+}  // namespace trochoid::fitting

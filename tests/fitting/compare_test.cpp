@@ -1,0 +1,139 @@
+#include "trochoid/fitting/compare.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+using Values = std::map<std::string, double>;
+
+// Samples of the scene's model at the given values, with noise on positions [m] and spin angle
+// [rad].
+data::Track track_of(const data::Scene& scene, const Values& given, double duration_s, int samples,
+                     double sigma, std::uint64_t seed) {
+  const auto predictor = model::make_predictor(scene);
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const auto& info = predictor->parameters()[i];
+    const auto own = given.find(info.name);
+    values[i] = own != given.end() ? own->second : info.value;
+  }
+  std::vector<double> t_s;
+  for (int i = 0; i < samples; ++i) t_s.push_back(duration_s * i / (samples - 1));
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.observables.push_back(model::Observable::psi_rad);
+  request.tolerance = 1e-11;
+  const model::Prediction exact = predictor->predict(values, request);
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal(0.0, sigma);
+  data::Track track;
+  for (int i = 0; i < samples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = t_s[i];
+    sample.centre_m = exact.values.segment<2>(3 * i);
+    sample.centre_m.x() += normal(generator);
+    sample.centre_m.y() += normal(generator);
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
+    if (predictor->model_name() == "pivot")
+      sample.psi = data::MeasuredAngle{exact.values[3 * i + 2] + normal(generator), sigma};
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+Comparison compare_one(const data::Track& track, const data::Scene& scene) {
+  return compare(std::span(&track, 1), scene);
+}
+
+data::Scene spin_down() {
+  data::Scene scene;
+  scene.body.emplace().radius_m = 0.1;
+  scene.support.kind = data::SupportKind::pivot;
+  scene.model.name = "pivot";
+  return scene;
+}
+
+TEST(Compare, FindsTheLawsOfASpinDownAndLeavesTheOthersOut) {
+  const Values start{{"w3_rad_s", 20.0}};
+  data::Scene dry = spin_down(), both = spin_down();
+  dry.model.spin_down_dry_rad_s2 = both.model.spin_down_dry_rad_s2 = 0.8;
+  both.model.spin_down_quadratic_1_rad = 0.02;
+  const Comparison one = compare_one(track_of(dry, start, 15.0, 150, 0.01, 1), spin_down());
+  EXPECT_TRUE(one.scene.model.spin_down_dry_rad_s2);
+  EXPECT_FALSE(one.scene.model.spin_down_viscous_1_s);
+  EXPECT_FALSE(one.scene.model.spin_down_quadratic_1_rad);
+  const Comparison two = compare_one(track_of(both, start, 10.0, 150, 0.01, 2), spin_down());
+  EXPECT_TRUE(two.scene.model.spin_down_dry_rad_s2);
+  EXPECT_TRUE(two.scene.model.spin_down_quadratic_1_rad);
+  EXPECT_FALSE(two.scene.model.spin_down_viscous_1_s);
+  EXPECT_THAT(two.fit.recommendation, testing::HasSubstr("dry couple"));
+  EXPECT_NEAR(two.fit.find("spin_down_dry_rad_s2")->value, 0.8,
+              4.0 * two.fit.find("spin_down_dry_rad_s2")->sigma);
+  EXPECT_EQ(std::count_if(two.fit.comparison.begin(), two.fit.comparison.end(),
+                          [](const data::ModelScore& score) { return score.recommended; }),
+            1);
+}
+
+data::Scene top() {
+  data::Scene scene;
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m = Eigen::Vector3d::Zero();
+  scene.model.name = "top";
+  return scene;
+}
+
+TEST(Compare, SaysWhetherATopNeedsDrag) {
+  const data::Scene plain = top();
+  data::Scene drag = top();
+  drag.model.drag_transverse_N_m_s = drag.model.drag_spin_N_m_s = 1e-6;
+  const Values start{{"a_1_s2", 3.0},     {"b_1_s", 5.0},      {"l_m", 0.1},
+                     {"theta_rad", 0.8},  {"dphi_rad_s", 0.3}, {"gamma1_1_s", 0.03},
+                     {"gamma3_1_s", 0.02}};
+  EXPECT_EQ(compare_one(track_of(plain, start, 6.0, 200, 5e-4, 3), plain).fit.comparison.size(),
+            2U);
+  EXPECT_FALSE(compare_one(track_of(plain, start, 6.0, 200, 5e-4, 3), plain)
+                   .scene.model.drag_spin_N_m_s.has_value());
+  const Comparison found = compare_one(track_of(drag, start, 6.0, 200, 5e-4, 4), plain);
+  ASSERT_TRUE(found.scene.model.drag_spin_N_m_s.has_value()) << found.fit.recommendation;
+  EXPECT_LT(std::abs(found.fit.find("gamma1_1_s")->value - 0.03),
+            4.0 * found.fit.find("gamma1_1_s")->sigma);
+}
+
+data::Scene ring() {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::ring;
+  body.radius_m = 0.03;
+  body.inner_radius_m = 0.027;
+  body.thickness_m = 0.008;
+  body.mass_kg = 0.034;
+  scene.model.name = "rolling";
+  return scene;
+}
+
+TEST(Compare, TellsWhichFrictionSlowsARing) {
+  data::Scene truth = ring();
+  truth.model.pivoting_friction_m = 2e-4;
+  const Values start{{"theta_rad", 1.2}, {"w1_rad_s", 0.3}, {"w2_rad_s", 24.0}, {"w3_rad_s", 4.0}};
+  const Comparison found = compare_one(track_of(truth, start, 1.5, 150, 2e-4, 5), ring());
+  EXPECT_TRUE(found.scene.model.pivoting_friction_m) << found.fit.recommendation;
+  EXPECT_FALSE(found.scene.model.air_linear_N_m_s) << found.fit.recommendation;
+  const data::FitParameter* friction = found.fit.find("pivoting_friction_m");
+  ASSERT_NE(friction, nullptr);
+  EXPECT_LT(std::abs(friction->value - 2e-4), 4.0 * friction->sigma);
+  for (const data::ModelScore& score : found.fit.comparison)
+    if (score.recommended) {
+      EXPECT_LT(score.held_back_rms_sigma, 3.0);
+    }
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
