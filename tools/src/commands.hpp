@@ -27,6 +27,7 @@ void add_study_tracking(CLI::App& study);
 void add_init_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
+void add_render_command(CLI::App& app);
 #endif
 
 }  // namespace trochoid::tools

@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   add_track_command(app);
   add_overlay_command(app);
   add_run_command(app);
+  add_render_command(app);
   add_init_command(app);
 #endif
   try {

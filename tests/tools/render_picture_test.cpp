@@ -1,0 +1,141 @@
+#ifdef TROCHOID_HAS_TRACKING
+#include "render_picture.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/outline.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+data::Body flat_disc() {
+  data::Body body;
+  body.radius_m = 0.03;
+  body.thickness_m = 1e-6;
+  return body;
+}
+
+RenderStyle plain() {
+  RenderStyle style;
+  style.texture = style.gloss = style.noise_levels = style.blur_px = 0.0;
+  style.shadow = false;
+  return style;
+}
+
+// Share of the body in each pixel, from the light of a picture of two colours.
+double share(const cv::Mat& light, int y, int x, float floor, float body) {
+  return (floor - light.at<cv::Vec3f>(y, x)[1]) / (floor - body);
+}
+
+// A disc flat under a camera looking straight down appears as a circle about its projected centre.
+TEST(PictureRenderer, PutsTheCentroidOfAFlatDiscAtItsProjectedCentre) {
+  const data::Camera camera = data::Camera::overhead(200, 160, 1000.0, 1.0);
+  const PictureRenderer renderer(flat_disc(), camera, plain());
+  for (const double shift : {0.0, 0.00031, 0.00077}) {
+    data::Pose<> pose;
+    pose.centre_m = {0.004 + shift, -0.003 + 0.6 * shift, 5e-7};
+    const cv::Mat light = renderer.light({pose});
+    const float floor = light.at<cv::Vec3f>(0, 0)[1];
+    const Eigen::Vector2d centre = camera.image_from_table<double>(pose.centre_m);
+    const float body =
+        light.at<cv::Vec3f>(static_cast<int>(centre.y()), static_cast<int>(centre.x()))[1];
+    double area = 0.0;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    for (int y = 0; y < light.rows; ++y)
+      for (int x = 0; x < light.cols; ++x) {
+        const double s = share(light, y, x, floor, body);
+        area += s;
+        sum += s * Eigen::Vector2d(x, y);
+      }
+    // 190 edge pixels of 64 rays: each share is off by about 0.01, the centroid by 1e-4 px.
+    constexpr double kCentroid_px = 0.002, kArea = 3e-4;
+    EXPECT_NEAR(sum.x() / area, centre.x(), kCentroid_px);
+    EXPECT_NEAR(sum.y() / area, centre.y(), kCentroid_px);
+    EXPECT_NEAR(area / (std::numbers::pi * 30.0 * 30.0), 1.0, kArea);
+  }
+}
+
+// The tracker's outline and the renderer's rays know nothing of each other.
+TEST(PictureRenderer, HasItsEdgesWhereTheOutlineOfATiltedRingIsPredicted) {
+  data::Body body = flat_disc();
+  body.kind = data::BodyKind::ring;
+  body.inner_radius_m = 0.018;
+  body.thickness_m = 0.012;
+  data::Camera camera = data::Camera::overhead(240, 200, 1500.0, 0.6);
+  camera.distortion = {-0.2, 0.05, 0.0, 0.0, 0.0};
+  RenderStyle style = plain();
+  style.samples = 16;
+  style.ambient = 1.0;  // one colour all over
+  const PictureRenderer renderer(body, camera, style);
+  data::Pose<> pose;
+  pose.theta_rad = 0.9;
+  pose.phi_rad = 0.7;
+  pose.centre_m = {0.006, 0.004, data::height_on_floor_m(0.9, 0.03, 0.006)};
+  const cv::Mat light = renderer.light({pose});
+  const float floor = style.floor.y(), dark = style.body.y();
+  // A straight edge at distance d from a pixel's centre covers 1/2 - d of it, if along an axis.
+  constexpr double kOff_px = 0.02;
+  double sum = 0.0;
+  int count = 0;
+  for (const auto& point : data::visible_outline(body, pose, camera, 1.0)) {
+    if (!point.silhouette ||
+        std::max(std::abs(point.normal_px.x()), std::abs(point.normal_px.y())) < 0.999)
+      continue;
+    const int x = static_cast<int>(std::lround(point.image_px.x()));
+    const int y = static_cast<int>(std::lround(point.image_px.y()));
+    const double inside =
+        (point.image_px - Eigen::Vector2d(x, y)).dot(point.normal_px);  // of the edge, outwards
+    if (std::abs(inside) > 0.35) continue;
+    const double covered = share(light, y, x, floor, dark);
+    if (covered < 0.1 || covered > 0.9) continue;  // another edge is near
+    sum += covered - (0.5 + inside);
+    ++count;
+  }
+  ASSERT_GT(count, 5);
+  EXPECT_NEAR(sum / count, 0.0, kOff_px);
+}
+
+TEST(PictureRenderer, ShowsTheMarkWhereTheSpinSays) {
+  data::Body body = flat_disc();
+  body.marks.push_back({.distance_m = 0.02, .size_m = 0.004});
+  const data::Camera camera = data::Camera::overhead(200, 160, 1000.0, 1.0);
+  const PictureRenderer renderer(body, camera, plain());
+  data::Pose<> pose;
+  pose.phi_rad = 0.4;
+  pose.psi_rad = 0.8;
+  pose.centre_m.z() = 5e-7;
+  const cv::Mat light = renderer.light({pose});
+  const Eigen::Vector2d at = camera.image_from_table<double>(
+      Eigen::Vector3d(0.02 * std::cos(1.2), 0.02 * std::sin(1.2), 0.0));
+  const Eigen::Vector2d opposite = camera.image_from_table<double>(
+      Eigen::Vector3d(-0.02 * std::cos(1.2), -0.02 * std::sin(1.2), 0.0));
+  const auto green = [&](const Eigen::Vector2d& p) {
+    return light.at<cv::Vec3f>(static_cast<int>(p.y()), static_cast<int>(p.x()))[1];
+  };
+  EXPECT_GT(green(at), 5.0F * green(opposite));
+}
+
+TEST(PictureRenderer, RepeatsItselfForTheSameSeed) {
+  RenderStyle style = plain();
+  style.noise_levels = 2.0;
+  style.texture = 0.1;
+  const data::Camera camera = data::Camera::overhead(64, 48, 1000.0, 1.0);
+  const PictureRenderer one(flat_disc(), camera, style), two(flat_disc(), camera, style);
+  data::Pose<> pose;
+  const cv::Mat a = one.picture(one.light({pose}), 3), b = two.picture(two.light({pose}), 3);
+  EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(a, one.picture(one.light({pose}), 4), cv::NORM_INF), 0.0);
+}
+
+TEST(PictureRenderer, RefusesABodyWithoutAShape) {
+  EXPECT_THROW(PictureRenderer(data::Body{}, data::Camera::overhead(64, 48, 1000.0, 1.0), plain()),
+               InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::tools
+#endif
