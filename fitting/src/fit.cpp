@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "arcs.hpp"
 #include "bootstrap.hpp"
 #include "derived.hpp"
+#include "find.hpp"
 #include "problem.hpp"
 #include "profile.hpp"
 #include "smoothing.hpp"
@@ -117,105 +119,14 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
 }
 
-Problem single_arc(const Problem& problem, int arc) {
-  Problem part = problem;
-  part.arcs = {problem.arcs[arc]};
-  part.base = {problem.base[arc]};
-  part.row_weights = {Eigen::VectorXd()};
-  part.free.clear();
-  for (FreeParameter parameter : problem.free)
-    if (parameter.arc < 0 || parameter.arc == arc) {
-      parameter.arc = std::min(parameter.arc, 0);
-      part.free.push_back(parameter);
-    }
-  return part;
-}
-
-bool is_top_spin(const Problem& problem, int free_index) {
-  const std::string& name = problem.predictor->parameters()[problem.free[free_index].index].name;
-  return name == "psi_rad" || name == "omega_s_rad_s";
-}
-
-// Starts the spin angle once the path is known, and takes its readings in.
-Found with_spin(const Problem& problem, Found found) {
-  if (!found.solution.usable) return found;
-  Problem whole = problem;
-  for (int i = 0, j = 0; i < static_cast<int>(problem.free.size()); ++i)
-    if (!is_top_spin(problem, i))
-      whole.base[0][problem.free[i].index] = problem.free[i].transform.value(found.solution.u[j++]);
-  Eigen::VectorXd sign;
-  fold_tilt(*problem.predictor, whole.base[0], sign);
-  start_top_spin(whole, 0);
-  found.solution = solve(whole, whole.start());
-  return found;
-}
-
-Found find_arc(const Problem& problem, const Starter& starter, const FitOptions& options,
-               bool start_given) {
-  const bool top = problem.predictor->index_of("omega_s_rad_s") >= 0;
-  if (top && problem.arcs[0].observable_index(model::Observable::psi_rad) >= 0) {
-    Problem path = problem;
-    path.arcs[0] = problem.arcs[0].without(Channel::psi);
-    for (int i = static_cast<int>(path.free.size()) - 1; i >= 0; --i)
-      if (is_top_spin(path, i)) path.free.erase(path.free.begin() + i);
-    return with_spin(problem, find_arc(path, starter, options, start_given));
-  }
-  const Start given{"given", options.start};
-  const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  if (options.strategy == "single") return grow(problem, given, all);
-  if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
-  if (options.strategy == "integral") return from_best_start(problem, starter);
-  if (options.strategy != "auto")
-    throw InputError(fmt::format(
-        "strategy '{}' is unknown; it is auto, single, growing or integral", options.strategy));
-  Found best = search(problem, starter);
-  if (best.passed || !start_given) return best;
-  Found from_given = grow(problem, given, std::max(24, all / 8));
-  return from_given.solution.usable &&
-                 (!best.solution.usable || from_given.reduced_chi2 < best.reduced_chi2)
-             ? from_given
-             : best;
-}
-
-// Every arc alone, then all together from each arc's idea of the shared parameters.
-Found find(Problem& problem, const Starter& starter, const FitOptions& options, bool start_given) {
-  if (problem.arcs.size() == 1) return find_arc(problem, starter, options, start_given);
-  std::vector<Problem> alone;
-  Found best;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    alone.push_back(single_arc(problem, arc));
-    const Found found = find_arc(alone.back(), starter, options, start_given);
-    if (!found.solution.usable) return found;
-    alone.back().set_base(found.solution.u);
-    problem.base[arc] = alone.back().base[0];
-    if (best.path == "none" || best.path == found.path)
-      best.path = found.path;
-    else
-      best.path = "mixed";
-  }
-  const std::string path = best.path;
-  for (const Problem& leader : alone) {
-    Problem trial = problem;
-    for (const FreeParameter& parameter : problem.free)
-      if (parameter.arc < 0)
-        for (Eigen::VectorXd& base : trial.base)
-          base[parameter.index] = leader.base[0][parameter.index];
-    const Solution solution = solve(trial, trial.start());
-    if (!solution.usable || (best.solution.usable && solution.chi2 >= best.solution.chi2)) continue;
-    best.solution = solution;
-    problem.base = trial.base;
-  }
-  best.path = path;
-  return best;
-}
-
 // Robust weights and noise until they settle; the tolerance tightened until integration is silent.
 Solution polish(Problem& problem, Solution solution, double fixed_tolerance) {
+  // Weights within half a per cent and chi-square within a millionth: a hundredth of a sigma.
+  constexpr double kSettled = 5e-3;
   for (int round = 0; round < 6; ++round) {
     const double change = reweight(problem, solution.u, true);
-    if (round > 0 && change < 1e-3) break;
-    if (round == 0 && change < 1e-3 && fixed_tolerance <= 0.0) break;
-    const Solution next = solve(problem, solution.u);
+    if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
+    const Solution next = solve(problem, solution.u, {.function_tolerance = 1e-7});
     if (!next.usable) break;
     solution = next;
   }
@@ -336,13 +247,21 @@ void warn_unexplained(const Squares& sum, data::Fit& fit) {
 
 }  // namespace
 
-data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
-              const data::Scene& given_scene, const FitOptions& options) {
+namespace {
+
+data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& predictor,
+                   const std::vector<const model::Predictor*>& relatives,
+                   const data::Scene& given_scene, const FitOptions& options) {
   if (tracks.empty()) throw InputError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
   const std::string model = predictor.model_name();
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
+  problem.log = options.log;
+  for (int c = 0; c < kChannels; ++c)
+    for (const ArcData& arc : problem.arcs)
+      problem.noise_scale[c] =
+          std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
   suit_to_data(problem, scene);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
@@ -354,12 +273,12 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
   problem.tolerance =
       options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
 
-  const Starter starter = starter_for(predictor, scene);
   data::Fit result;
   result.model = model;
   result.seed = options.seed;
   const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
-  const Found found = find(problem, starter, options, start_given);
+  const Found found =
+      find(problem, {starter_for(predictor, scene), &options, start_given, relatives});
   Solution solution = found.solution;
   result.start_path = found.path;
   if (!solution.usable) {
@@ -428,12 +347,38 @@ data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predi
   return result;
 }
 
+// Easier relatives of a sliding body, see Quest: the exact Coulomb law, and a sharply regularised
+// one, make a rough cost and stiff equations.
+std::vector<std::unique_ptr<model::Predictor>> relatives_of(data::Scene scene) {
+  constexpr double kGentle_m_s = 1e-3;
+  std::vector<std::unique_ptr<model::Predictor>> relatives;
+  if (scene.model.name != "sliding") return relatives;
+  scene.model.name = "rolling";
+  relatives.push_back(model::make_predictor(scene));
+  if (scene.model.slip_regularisation_m_s.value_or(0.0) < 0.7 * kGentle_m_s) {
+    scene.model.name = "sliding";
+    scene.model.slip_regularisation_m_s = kGentle_m_s;
+    relatives.push_back(model::make_predictor(scene));
+  }
+  return relatives;
+}
+
+}  // namespace
+
+data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
+              const data::Scene& scene, const FitOptions& options) {
+  return fit_with(tracks, predictor, {}, scene, options);
+}
+
 data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scene,
               const FitOptions& options) {
   data::Scene scene = given_scene;
   if (!options.model.empty()) scene.model.name = options.model;
   const auto predictor = model::make_predictor(scene);
-  return fit(tracks, *predictor, scene, options);
+  const auto relatives = relatives_of(scene);
+  std::vector<const model::Predictor*> plain;
+  for (const auto& relative : relatives) plain.push_back(relative.get());
+  return fit_with(tracks, *predictor, plain, scene, options);
 }
 
 }  // namespace trochoid::fitting

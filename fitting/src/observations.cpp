@@ -140,6 +140,25 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
   return arc;
 }
 
+double excess_scatter(const ArcData& arc, Channel channel) {
+  std::vector<double> t_s, values, sigmas;
+  const bool planar = channel == Channel::position;
+  for (const Reading& reading : arc.readings) {
+    if (reading.channel != channel) continue;
+    double value = reading.value.x();
+    if (!planar && !values.empty()) value = values.back() + wrapped(value - values.back());
+    t_s.push_back(arc.t_s[reading.sample]);
+    values.push_back(value);
+    sigmas.push_back((planar ? std::sqrt(2.0) : 1.0) / reading.whitener.norm());
+    if (!planar) sigmas.back() = 1.0 / reading.whitener(0, 0);
+  }
+  if (values.size() < 9) return 1.0;
+  Eigen::MatrixXd curve =
+      Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
+  if (planar) curve = arc.positions_m();
+  return std::max(1.0, noise_about_smooth_curve(t_s, curve) / median(std::move(sigmas)));
+}
+
 void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,
             Eigen::VectorXd& out, Eigen::MatrixXd* out_jacobian) {
   const int width = static_cast<int>(arc.observables.size());
@@ -161,7 +180,8 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
     double weight = reading.whitener(0, 0);
     double sign = 1.0;
     if (arc.folded && column[static_cast<int>(Channel::theta)] >= 0) {
-      // Equal faces: (theta, phi) and (pi - theta, phi + pi) are the same picture.
+      // Equal faces: (theta, phi, psi) and (pi - theta, phi + pi, pi - psi) are the same
+      // picture.
       const double theta =
           values[reading.sample * width + column[static_cast<int>(Channel::theta)]];
       const bool other_face = theta > 0.5 * std::numbers::pi;
@@ -170,6 +190,10 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
         sign = -1.0;
       }
       if (other_face && reading.channel == Channel::phi) predicted += std::numbers::pi;
+      if (other_face && reading.channel == Channel::psi) {  // marks alike on both faces
+        predicted = std::numbers::pi - predicted;
+        sign = -1.0;
+      }
     }
     out[reading.row] = weight * wrapped(predicted - reading.value.x());
     if (out_jacobian != nullptr)

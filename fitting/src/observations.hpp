@@ -54,6 +54,10 @@ struct ChannelChoice {
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
                                const ChannelChoice& choice, bool folded);
 
+/// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their
+/// own sigmas say.
+[[nodiscard]] double excess_scatter(const ArcData& arc, Channel channel);
+
 /// Whitened differences prediction - measurement and their derivatives.
 /// @param values as Prediction::values for arc.t_s and arc.observables.
 /// @param jacobian as Prediction::jacobian, or empty; whitened rows are written to `out_jacobian`.

@@ -21,6 +21,8 @@ double Transform::value(double u) const {
       return lower + std::exp(u);
     case Kind::below:
       return upper - std::exp(u);
+    case Kind::limited:
+      return upper / (1.0 + std::exp(-u));
     case Kind::between:
       return lower + 0.5 * (upper - lower) * (1.0 + std::tanh(u));
     default:
@@ -35,6 +37,10 @@ double Transform::slope(double u) const {
       return std::exp(u);
     case Kind::below:
       return -std::exp(u);
+    case Kind::limited: {
+      const double share = 1.0 / (1.0 + std::exp(-u));
+      return upper * share * (1.0 - share);
+    }
     case Kind::between: {
       const double t = std::tanh(u);
       return 0.5 * (upper - lower) * (1.0 - t * t);
@@ -54,6 +60,10 @@ double Transform::inverse(double value) const {
       return std::log(std::max(value - lower, 1e-3 * std::abs(lower) + least));
     case Kind::below:
       return std::log(std::max(upper - value, 1e-3 * std::abs(upper) + least));
+    case Kind::limited: {
+      const double share = std::clamp(value / upper, least, 0.999);
+      return std::log(share / (1.0 - share));
+    }
     case Kind::between: {
       const double t = 2.0 * (value - lower) / (upper - lower) - 1.0;
       return std::atanh(std::clamp(t, -0.999, 0.999));
@@ -108,10 +118,11 @@ void Problem::set_base(const Eigen::VectorXd& u) {
 
 int Problem::max_steps() const {
   // Motion that a camera follows turns less than once per sample; a step covers a good part of a
-  // turn. Regularised friction is stiff and takes what it takes.
+  // turn. Sliding changes its direction fast wherever it is slow.
   std::size_t samples = 0;
   for (const ArcData& arc : arcs) samples = std::max(samples, arc.t_s.size());
-  return predictor->model_name() == "sliding" ? 0 : 2000 + 20 * static_cast<int>(samples);
+  const bool slides = predictor->model_name() == "sliding";
+  return (slides ? 20000 : 2000) + 20 * static_cast<int>(samples);
 }
 
 int Problem::rows() const {
@@ -149,7 +160,8 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
     if (!known(name)) complain("bounds", name);
 }
 
-Transform transform_of(const ParameterInfo& info, const data::FitSettings& settings) {
+Transform transform_of(const ParameterInfo& info, const std::string& model,
+                       const data::FitSettings& settings) {
   const auto bounds = settings.bounds.find(info.name);
   if (bounds != settings.bounds.end()) {
     const auto [lower, upper] = bounds->second;
@@ -158,6 +170,10 @@ Transform transform_of(const ParameterInfo& info, const data::FitSettings& setti
     if (low && !(info.logarithmic && lower <= 0.0)) return {Transform::Kind::above, lower, upper};
     if (high) return {Transform::Kind::below, lower, upper};
   }
+  // Beyond a coefficient of about 1.1 a disc on its rim has no consistent contact (Painleve).
+  constexpr double kMostFriction = 1.1;
+  if (info.name == "friction" && model == "sliding")
+    return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
 }
 
@@ -189,7 +205,9 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
   problem.row_weights.resize(problem.arcs.size());
   const auto add = [&](int index, int arc) {
     const ParameterInfo& info = parameters[index];
-    FreeParameter parameter{index, arc, transform_of(info, scene.fit), {}, {}};
+    FreeParameter parameter{
+        index, arc, transform_of(info, predictor.model_name(), scene.fit), {}, {}};
+    parameter.given = values[index];
     const auto prior = scene.fit.prior.find(info.name);
     if (prior != scene.fit.prior.end()) parameter.prior = prior->second;
     problem.free.push_back(parameter);

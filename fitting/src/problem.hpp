@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,11 +16,13 @@ namespace trochoid::fitting {
 ///   identity  value = u
 ///   log       value = exp(u): positive, over decades
 ///   above     value = lower + exp(u);   below: value = upper - exp(u)
+///   limited   value = upper/(1 + exp(-u)): positive, over decades, below a limit
 ///   between   value = lower + (upper - lower) (1 + tanh u)/2
 struct Transform {
-  enum class Kind { identity, log, above, below, between };
+  enum class Kind { identity, log, above, below, limited, between };
   Kind kind = Kind::identity;
   double lower = 0.0, upper = 0.0;
+  [[nodiscard]] bool is_over_decades() const { return kind == Kind::log || kind == Kind::limited; }
   [[nodiscard]] double value(double u) const;
   [[nodiscard]] double slope(double u) const;  ///< d value / d u
   [[nodiscard]] double inverse(double value) const;
@@ -31,6 +34,8 @@ struct FreeParameter {
   Transform transform;
   std::optional<data::Prior> prior;
   std::optional<data::Prior> leash;  ///< on u, while exploring: short windows see no friction
+  double given = 0.0;  ///< value before any fitting: the scene's, or the model's default
+  bool held = false;   ///< stays where it is for now
 };
 
 /// A predictor, the arcs it has to explain and what may vary. The vector u holds one entry per free
@@ -43,6 +48,7 @@ struct Problem {
   std::vector<Eigen::VectorXd> row_weights;  ///< per arc, sqrt of the robust weights; empty = 1
   std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
   double tolerance = 1e-8;
+  std::function<void(const std::string& line)> log;  ///< may be empty
 
   [[nodiscard]] int shared_count() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0

@@ -1,4 +1,5 @@
 #include <ceres/ceres.h>
+#include <fmt/core.h>
 #include <glog/logging.h>
 
 #include "problem.hpp"
@@ -87,6 +88,22 @@ struct Blocks {
   }
 };
 
+// Parameters held for now are left out of their block's steps.
+void hold(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
+          ceres::Problem& ceres_problem) {
+  for (int block = 0; block < static_cast<int>(blocks.size.size()); ++block) {
+    std::vector<int> held;
+    for (int i = 0; i < blocks.size[block]; ++i)
+      if (problem.free[blocks.first[block] + i].held) held.push_back(i);
+    double* const values = u.data() + blocks.first[block];
+    if (held.empty()) continue;
+    if (static_cast<int>(held.size()) == blocks.size[block])
+      ceres_problem.SetParameterBlockConstant(values);
+    else
+      ceres_problem.SetManifold(values, new ceres::SubsetManifold(blocks.size[block], held));
+  }
+}
+
 void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
                ceres::Problem& ceres_problem) {
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
@@ -118,7 +135,9 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   Solution solution;
   solution.u = u;
   ceres::Problem ceres_problem;
-  add_costs(problem, Blocks(problem), solution.u, ceres_problem);
+  const Blocks blocks(problem);
+  add_costs(problem, blocks, solution.u, ceres_problem);
+  hold(problem, blocks, solution.u, ceres_problem);
   ceres::Solver::Options ceres_options;
   ceres_options.linear_solver_type =
       problem.arcs.size() > 8 ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
@@ -137,6 +156,13 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   solution.converged = summary.termination_type == ceres::CONVERGENCE;
   solution.iterations = static_cast<int>(summary.iterations.size()) - 1;
   solution.message = summary.message;
+  if (problem.log)
+    problem.log(
+        fmt::format("{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} iterations, {} "
+                    "derivatives, {:.3g} s: {}",
+                    problem.rows(), problem.free.size(), 2.0 * summary.initial_cost, solution.chi2,
+                    solution.iterations, summary.num_jacobian_evaluations,
+                    summary.total_time_in_seconds, summary.message));
   return solution;
 }
 

@@ -42,19 +42,24 @@ std::pair<double, double> at(const AngleSeries& series, double t_s) {
 
 struct Motion {
   Eigen::Vector2d position_m, velocity_m_s;
-  double turning_rad_s = 0.0;  // median rate of the heading
+  double turning_rad_s = 0.0;      // median rate of the heading
+  double acceleration_m_s2 = 0.0;  // upper tenth
 };
 
 Motion motion_of(const ArcData& arc) {
   const SmoothCurve curve = smooth_auto(arc.t_s, arc.positions_m());
-  std::vector<double> turning;
+  std::vector<double> turning, acceleration;
   for (Eigen::Index i = 0; i < curve.value.rows(); ++i) {
     const Eigen::RowVector2d v = curve.first.row(i), a = curve.second.row(i);
     const double speed2 = v.squaredNorm();
+    acceleration.push_back(a.norm());
     if (speed2 > 0.0) turning.push_back((v.x() * a.y() - v.y() * a.x()) / speed2);
   }
+  const auto upper =
+      acceleration.begin() + static_cast<std::ptrdiff_t>(acceleration.size() * 9 / 10);
+  std::nth_element(acceleration.begin(), upper, acceleration.end());
   return {curve.value.row(0).transpose(), curve.first.row(0).transpose(),
-          median(std::move(turning))};
+          median(std::move(turning)), *upper};
 }
 
 // State that rolls without slip with the given attitude, rates and the measured velocity.
@@ -126,6 +131,14 @@ std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
   const Motion motion = motion_of(window);
   std::vector<Start> starts = from_angles(window, shape, motion);
   if (starts.empty()) starts = from_positions(shape, motion);
+  // Friction is what accelerates the centre, so it is at least that strong; the scene's own value
+  // is the other guess.
+  const std::size_t plain = starts.size();
+  for (std::size_t i = 0; i < plain; ++i) {
+    starts.push_back(starts[i]);
+    starts.back().values["friction"] =
+        std::clamp(1.1 * motion.acceleration_m_s2 / shape.g, 0.05, 0.9);
+  }
   return starts;
 }
 

@@ -17,17 +17,18 @@ int free_rows(const Problem& problem) {
   return std::max(1, problem.rows() - static_cast<int>(problem.free.size()));
 }
 
+bool is_loss(const Problem& problem, const FreeParameter& parameter) {
+  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+  return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
+         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction";
+}
+
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
-// are stiff. Their logarithm stays within a factor of about five of the start.
+// are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
 void leash(Problem& problem) {
-  const Eigen::VectorXd u = problem.start();
-  for (std::size_t i = 0; i < problem.free.size(); ++i) {
-    const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[i].index];
-    const bool loss = info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
-                      info.name != "l_m";
-    if (loss && problem.free[i].transform.kind == Transform::Kind::log)
-      problem.free[i].leash = data::Prior{u[static_cast<int>(i)], 1.5};
-  }
+  for (FreeParameter& parameter : problem.free)
+    if (parameter.transform.is_over_decades() && is_loss(problem, parameter))
+      parameter.leash = data::Prior{parameter.transform.inverse(parameter.given), 1.0};
 }
 
 // The problem on the first `samples` samples, thinned to about kThinned of them.
@@ -39,18 +40,6 @@ Problem windowed(const Problem& problem, int samples) {
   return part;
 }
 
-Found judged(const Problem& problem, Solution solution, const std::string& path) {
-  Found found{std::move(solution), path, std::numeric_limits<double>::infinity(), false};
-  if (!found.solution.usable) return found;
-  found.reduced_chi2 = found.solution.chi2 / free_rows(problem);
-  found.passed = found.reduced_chi2 < chi2_gate(problem.rows());
-  return found;
-}
-
-bool better(const Found& a, const Found& b) {
-  return a.solution.usable && (!b.solution.usable || a.reduced_chi2 < b.reduced_chi2);
-}
-
 double chi2_at(const Problem& problem) {
   Eigen::VectorXd residuals;
   if (!evaluate(problem, 0, problem.start(), residuals, nullptr))
@@ -58,14 +47,20 @@ double chi2_at(const Problem& problem) {
   return residuals.squaredNorm();
 }
 
-// Starts of one window in the order of their chi-square there; those without a prediction drop out.
+// Starts of one window in the order of their chi-square there; those without a prediction drop out,
+// and so do those that are no better than knowing nothing although the angles were seen: the window
+// is too long for a start from its first samples.
 std::vector<Start> screened(const Problem& window, const Starter& starter) {
+  constexpr double kTellsSomething = 0.3;
+  const bool seen = window.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const double most =
+      seen ? kTellsSomething * null_chi2(window.arcs[0]) : std::numeric_limits<double>::max();
   std::vector<std::pair<double, Start>> scored;
   for (Start& start : starter(window.arcs[0])) {
     Problem trial = window;
     apply(start, trial);
     const double chi2 = chi2_at(trial);
-    if (std::isfinite(chi2)) scored.emplace_back(chi2, std::move(start));
+    if (chi2 < most) scored.emplace_back(chi2, std::move(start));
   }
   std::stable_sort(scored.begin(), scored.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -75,6 +70,43 @@ std::vector<Start> screened(const Problem& window, const Starter& starter) {
 }
 
 }  // namespace
+
+Found judged(const Problem& problem, Solution solution, const std::string& path) {
+  Found found;
+  found.solution = std::move(solution);
+  found.path = path;
+  found.reduced_chi2 = std::numeric_limits<double>::infinity();
+  if (!found.solution.usable) return found;
+  found.reduced_chi2 = found.solution.chi2 / free_rows(problem);
+  found.unexplained = found.solution.chi2 / std::max(null_chi2(problem.arcs[0]), 1e-300);
+  found.passed = found.reduced_chi2 < chi2_gate(problem.rows());
+  return found;
+}
+
+bool better(const Found& a, const Found& b) {
+  return a.solution.usable && (!b.solution.usable || a.reduced_chi2 < b.reduced_chi2);
+}
+
+Problem for_predictor(const Problem& problem, const model::Predictor& predictor) {
+  Problem other = problem;
+  other.predictor = &predictor;
+  other.free.clear();
+  const auto& names = predictor.parameters();
+  for (const FreeParameter& parameter : problem.free) {
+    FreeParameter same = parameter;
+    same.index = predictor.index_of(problem.predictor->parameters()[parameter.index].name);
+    if (same.index >= 0) other.free.push_back(same);
+  }
+  for (Eigen::VectorXd& base : other.base) {
+    const Eigen::VectorXd before = base;
+    base.resize(static_cast<int>(names.size()));
+    for (int i = 0; i < base.size(); ++i) {
+      const int from = problem.predictor->index_of(names[i].name);
+      base[i] = from >= 0 ? before[from] : names[i].value;
+    }
+  }
+  return other;
+}
 
 void apply(const Start& start, Problem& problem) {
   for (const auto& [name, value] : start.values) {
@@ -90,6 +122,27 @@ void apply(const Start& start, Problem& problem) {
         base[parameter.index] = problem.base[0][parameter.index];
 }
 
+double null_chi2(const ArcData& arc) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  double chi2 = 0.0;
+  Eigen::RowVector2d mean = Eigen::RowVector2d::Zero();
+  double tilt = 0.0;
+  int tilts = 0;
+  if (arc.observable_index(model::Observable::x_m) >= 0) mean = arc.positions_m().colwise().mean();
+  for (const Reading& reading : arc.readings)
+    if (reading.channel == Channel::theta) tilt += reading.value.x(), ++tilts;
+  for (const Reading& reading : arc.readings) {
+    const double weight = reading.whitener(0, 0) * reading.whitener(0, 0);
+    if (reading.channel == Channel::position)
+      chi2 += (reading.whitener.transpose() * (reading.value - mean.transpose())).squaredNorm();
+    else if (reading.channel == Channel::theta)
+      chi2 += weight * std::pow(reading.value.x() - tilt / tilts, 2);
+    else
+      chi2 += weight * kTurn * kTurn / 12.0;
+  }
+  return chi2;
+}
+
 double chi2_gate(int rows) {
   return 1.1 + 4.0 * std::sqrt(2.0 / std::max(1, rows));
 }
@@ -98,12 +151,13 @@ Found grow(const Problem& problem, const Start& start, int first_window) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
-  for (int window = std::min(first_window, all);; window = std::min(2 * window, all)) {
+  for (int window = std::min(first_window, all);; window = std::min(window + window / 2 + 8, all)) {
     Problem part = windowed(current, window);
-    const Solution solution =
-        solve(part, part.start(), {.iterations = 40, .function_tolerance = 1e-5});
+    constexpr SolveOptions kRough{.iterations = 25, .function_tolerance = 1e-5};
+    const Solution solution = solve(part, part.start(), kRough);
     if (!solution.usable) return {};
-    current.set_base(solution.u);
+    part.set_base(solution.u);
+    current.base = part.base;
     // A window that is far from explained will not lead anywhere.
     if (window < all && solution.chi2 / free_rows(part) > 30.0 * chi2_gate(part.rows())) return {};
     if (window == all) break;
@@ -111,17 +165,32 @@ Found grow(const Problem& problem, const Start& start, int first_window) {
   return judged(problem, solve(current, current.start()), start.path);
 }
 
-Found search(const Problem& problem, const Starter& starter) {
+namespace {
+
+// Where starts come from integrals over the window, long windows serve best; where they are the
+// state at its first sample (bodies on their rim), it has to be grown from a short one.
+std::vector<int> window_sizes(const Problem& problem) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  std::vector<int> sizes;
+  for (int window = all; window >= std::min(kShortestWindow, all); window /= 2)
+    sizes.push_back(window);
+  if (problem.predictor->index_of("w1_rad_s") >= 0) std::reverse(sizes.begin(), sizes.end());
+  return sizes;
+}
+
+}  // namespace
+
+Found search(const Problem& problem, const Starter& starter) {
+  constexpr std::size_t kTried = 3;
   Found best;
-  for (int window = all; window >= std::min(kShortestWindow, all); window /= 2) {
-    const Problem part = windowed(problem, window);
-    const std::vector<Start> starts = screened(part, starter);
-    for (std::size_t i = 0; i < std::min<std::size_t>(3, starts.size()); ++i) {
+  for (const int window : window_sizes(problem)) {
+    const std::vector<Start> starts = screened(windowed(problem, window), starter);
+    for (std::size_t i = 0; i < std::min(kTried, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window);
       if (better(found, best)) best = std::move(found);
       if (best.passed) return best;
     }
+    if (best.unexplained < kExplained) return best;
   }
   return best;
 }
@@ -132,40 +201,73 @@ Found from_best_start(const Problem& problem, const Starter& starter) {
   return starts.empty() ? Found{} : grow(problem, starts.front(), all);
 }
 
-void start_top_spin(Problem& problem, int arc) {
-  const int psi = problem.predictor->index_of("psi_rad");
-  const int omega = problem.predictor->index_of("omega_s_rad_s");
+namespace {
+
+// Measured minus predicted spin angle for psi_0 = omega_s = 0, with the times since the start.
+struct SpinDifference {
+  std::vector<double> t_s, angle_rad;
+};
+
+SpinDifference spin_difference(const Problem& problem, int arc, int psi, int omega) {
   const ArcData& data = problem.arcs[arc];
-  if (psi < 0 || omega < 0 || data.observable_index(model::Observable::psi_rad) < 0) return;
   Eigen::VectorXd values = problem.base[arc];
-  values[psi] = values[omega] = 0.0;
+  values[psi] = 0.0;
+  if (omega >= 0) values[omega] = 0.0;
   model::PredictRequest request;
   request.t_s = data.t_s;
   request.start_s = data.start_s;
-  request.observables = {model::Observable::psi_rad};
+  request.observables = {model::Observable::theta_rad, model::Observable::psi_rad};
   const model::Prediction prediction = problem.predictor->predict(values, request);
-  std::vector<double> t_s, difference, rates;
+  SpinDifference difference;
   for (const Reading& reading : data.readings) {
     if (reading.channel != Channel::psi) continue;
-    double d = reading.value.x() - prediction.values[reading.sample];
-    // The next value lies where the latest rate takes it, not merely within half a turn.
-    if (!difference.empty()) {
-      const double step_s = data.t_s[reading.sample] - t_s.back();
-      const double expected = difference.back() + (rates.empty() ? 0.0 : median(rates) * step_s);
-      d = expected + std::remainder(d - expected, 2.0 * std::numbers::pi);
-      rates.push_back((d - difference.back()) / step_s);
-    }
-    difference.push_back(d);
-    t_s.push_back(data.t_s[reading.sample] - data.start_s);
+    double measured = reading.value.x();
+    if (data.folded && prediction.values[2 * reading.sample] > 0.5 * std::numbers::pi)
+      measured = std::numbers::pi - measured;
+    difference.angle_rad.push_back(measured - prediction.values[2 * reading.sample + 1]);
+    difference.t_s.push_back(data.t_s[reading.sample] - data.start_s);
   }
-  const int n = static_cast<int>(t_s.size());
-  if (n < 3) return;
-  const Eigen::Map<const Eigen::VectorXd> t(t_s.data(), n), d(difference.data(), n);
-  const double mean_t = t.mean();
-  const double slope =
-      (t.array() - mean_t).matrix().dot(d) / (t.array() - mean_t).matrix().squaredNorm();
-  problem.base[arc][omega] = slope;
-  problem.base[arc][psi] = d.mean() - slope * mean_t;
+  return difference;
+}
+
+// Continues the angles along their own rate: the next value lies where the latest rate takes it,
+// not merely within half a turn. Returns slope and value at t = 0 of the line through them.
+std::pair<double, double> line_through(const SpinDifference& raw) {
+  std::vector<double> angle, rates;
+  for (std::size_t i = 0; i < raw.t_s.size(); ++i) {
+    double d = raw.angle_rad[i];
+    if (i > 0) {
+      const double step_s = raw.t_s[i] - raw.t_s[i - 1];
+      const double expected = angle.back() + (rates.empty() ? 0.0 : median(rates) * step_s);
+      d = expected + std::remainder(d - expected, 2.0 * std::numbers::pi);
+      rates.push_back((d - angle.back()) / step_s);
+    }
+    angle.push_back(d);
+  }
+  const int n = static_cast<int>(angle.size());
+  const Eigen::Map<const Eigen::VectorXd> t(raw.t_s.data(), n), d(angle.data(), n);
+  const Eigen::VectorXd centred = t.array() - t.mean();
+  const double slope = centred.dot(d) / centred.squaredNorm();
+  return {slope, d.mean() - slope * t.mean()};
+}
+
+}  // namespace
+
+void start_spin(Problem& problem, int arc) {
+  const int psi = problem.predictor->index_of("psi_rad");
+  const int omega = problem.predictor->index_of("omega_s_rad_s");
+  if (psi < 0 || problem.arcs[arc].observable_index(model::Observable::psi_rad) < 0) return;
+  const SpinDifference difference = spin_difference(problem, arc, psi, omega);
+  if (difference.t_s.size() < 3) return;
+  if (omega >= 0) {
+    const auto [slope, offset] = line_through(difference);
+    problem.base[arc][omega] = slope;
+    problem.base[arc][psi] = offset;
+    return;
+  }
+  double s = 0.0, c = 0.0;
+  for (const double angle : difference.angle_rad) s += std::sin(angle), c += std::cos(angle);
+  problem.base[arc][psi] = std::atan2(s, c);
 }
 
 }  // namespace trochoid::fitting

@@ -15,8 +15,12 @@ struct Found {
   Solution solution;
   std::string path = "none";  ///< which start won
   double reduced_chi2 = 0.0;  ///< on the full arc, before robust weights
+  double unexplained = 1.0;   ///< chi-square over that of knowing nothing (null_chi2)
   bool passed = false;        ///< the chi-square gate
 };
+
+/// The same arcs and values for another predictor; parameters are matched by name.
+[[nodiscard]] Problem for_predictor(const Problem& problem, const model::Predictor& predictor);
 
 /// Writes a start's values into every arc of a problem (names the model lacks are skipped).
 void apply(const Start& start, Problem& problem);
@@ -25,21 +29,36 @@ void apply(const Start& start, Problem& problem);
 /// deviations of the chi-square distribution above 1 and a tenth for imperfect sigmas.
 [[nodiscard]] double chi2_gate(int rows);
 
-/// Levenberg-Marquardt on a thinned window, then on windows twice as long each, then on all
-/// samples.
+/// Chi-square of knowing nothing: positions about their mean, turning angles anywhere in a turn.
+[[nodiscard]] double null_chi2(const ArcData& arc);
+
+/// Levenberg-Marquardt on a thinned window, then on windows half as long again each, then on
+/// all samples.
 /// @param first_window samples of the first window.
 [[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window);
 
 /// The search for a single arc without a guess: windows of 1, 1/2, 1/4, ... of the arc, starts from
-/// each, grown; stops at the first solution that passes the gate, else returns the best one.
+/// each that already say something about it, grown; stops at the first solution that passes the
+/// gate, or after the window in which the path got explained but for a per cent (a track's sigmas
+/// may be too small, or the model not the whole truth); else returns the best one.
 [[nodiscard]] Found search(const Problem& problem, const Starter& starter);
 
 /// The best start of the whole arc, taken to its minimum and no further: what search() improves on.
 [[nodiscard]] Found from_best_start(const Problem& problem, const Starter& starter);
 
-/// Spin angle and spin of a top from the measured spin angle, once its path is known: both enter
-/// the prediction as psi_0 + omega_s t, so the difference to a prediction without them is a line.
-void start_top_spin(Problem& problem, int arc);
+/// Spin angle (and spin of a top) from the measured spin angle, once the path is known: they enter
+/// the prediction as psi_0 + omega_s t, so the difference to a prediction without them is a line;
+/// for other bodies it is a constant.
+void start_spin(Problem& problem, int arc);
+
+/// What a solution of a single-arc problem is worth.
+[[nodiscard]] Found judged(const Problem& problem, Solution solution, const std::string& path);
+
+/// Whether a is usable and explains more than b.
+[[nodiscard]] bool better(const Found& a, const Found& b);
+
+/// `unexplained` of a path that is explained but for a per cent of its amplitude.
+inline constexpr double kExplained = 1e-4;
 
 /// Fills in the state of a model at an instant from the data (and the parameters in `values`).
 using NodeStarter = std::function<void(double t_s, Eigen::VectorXd& values)>;

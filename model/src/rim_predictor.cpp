@@ -281,6 +281,10 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   call.options.max_steps =
       request.max_steps > 0 ? std::min(request.max_steps, kMostSteps) : kMostSteps;
   call.options.components = components_of(request);
+  // Sliding that starts from rest turns the faster the slower it is: a threshold of sticking far
+  // below what the tolerance resolves would cost ten times the steps.
+  constexpr double kFinest = 1e-7;
+  call.options.stick_factor = std::max(1.0, request.tolerance / kFinest);
 
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());

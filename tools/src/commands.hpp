@@ -11,6 +11,7 @@ struct NotGood : std::runtime_error {
 };
 
 void add_simulate_command(CLI::App& app);
+void add_manual_command(CLI::App& app);
 void add_fit_command(CLI::App& app);
 void add_study_command(CLI::App& app);
 void add_study_fits(CLI::App& study);

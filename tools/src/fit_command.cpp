@@ -20,7 +20,7 @@ struct FitCommand {
   std::vector<std::string> tracks;
   std::string scene, output;
   std::optional<int> object;
-  bool compare = false;
+  bool compare = false, verbose = false;
   fitting::FitOptions options;
 };
 
@@ -93,13 +93,16 @@ void run(const FitCommand& command) {
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
+  fitting::FitOptions options = command.options;
+  if (command.verbose)
+    options.log = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
   data::Fit fit;
   if (command.compare) {
-    fitting::Comparison comparison = fitting::compare(tracks, scene, command.options);
+    fitting::Comparison comparison = fitting::compare(tracks, scene, options);
     fit = std::move(comparison.fit);
     scene = std::move(comparison.scene);
   } else {
-    fit = fitting::fit(tracks, scene, command.options);
+    fit = fitting::fit(tracks, scene, options);
   }
   fit.inputs = provenance.inputs;
   fit.versions["trochoid"] = TROCHOID_VERSION;
@@ -138,6 +141,7 @@ void add_fit_command(CLI::App& app) {
       ->check(CLI::Range(0, 100000));
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
       ->check(CLI::NonNegativeNumber);
+  fit->add_flag("--verbose,-v", command->verbose, "Every minimisation as a line on stderr");
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
   fit->callback([command] { run(*command); });
 }

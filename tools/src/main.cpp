@@ -39,6 +39,7 @@ int run(int argc, char** argv) {
   add_render_command(app);
   add_init_command(app);
 #endif
+  add_manual_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -28,6 +28,7 @@ struct FitOptions {
   std::string strategy = "auto";
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   std::function<void(const std::string& stage, double fraction)> progress;
+  std::function<void(const std::string& line)> log;  ///< one line per minimisation, when wanted
 };
 
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).

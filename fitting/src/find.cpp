@@ -1,0 +1,149 @@
+#include "find.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+Problem single_arc(const Problem& problem, int arc) {
+  Problem part = problem;
+  part.arcs = {problem.arcs[arc]};
+  part.base = {problem.base[arc]};
+  part.row_weights = {Eigen::VectorXd()};
+  part.free.clear();
+  for (FreeParameter parameter : problem.free)
+    if (parameter.arc < 0 || parameter.arc == arc) {
+      parameter.arc = std::min(parameter.arc, 0);
+      part.free.push_back(parameter);
+    }
+  return part;
+}
+
+bool is_spin(const Problem& problem, int free_index) {
+  const std::string& name = problem.predictor->parameters()[problem.free[free_index].index].name;
+  return name == "psi_rad" || name == "omega_s_rad_s";
+}
+
+// Starts the spin angle once the path is known, and takes its readings in.
+Found with_spin(const Problem& problem, Found found) {
+  if (!found.solution.usable) return found;
+  Problem whole = problem;
+  for (int i = 0, j = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (!is_spin(problem, i))
+      whole.base[0][problem.free[i].index] = problem.free[i].transform.value(found.solution.u[j++]);
+  Eigen::VectorXd sign;
+  fold_tilt(*problem.predictor, whole.base[0], sign);
+  start_spin(whole, 0);
+  found.solution = solve(whole, whole.start());
+  return found;
+}
+
+// Values of an arc's solution by name; the velocity from the path where the state has none.
+Start start_from(const Problem& solved, const std::string& path) {
+  Start start{path, {}};
+  const auto& parameters = solved.predictor->parameters();
+  for (int i = 0; i < static_cast<int>(parameters.size()); ++i)
+    start.values[parameters[i].name] = solved.base[0][i];
+  if (solved.predictor->index_of("vx_m_s") >= 0) return start;
+  constexpr double kShort_s = 1e-4;
+  const double start_s = solved.arcs[0].start_s;
+  const std::vector<double> t_s{start_s, start_s + kShort_s};
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = start_s;
+  const Eigen::VectorXd xy = solved.predictor->predict(solved.base[0], request).values;
+  start.values["vx_m_s"] = (xy[2] - xy[0]) / kShort_s;
+  start.values["vy_m_s"] = (xy[3] - xy[1]) / kShort_s;
+  return start;
+}
+
+// The search proper, on a problem whose spin angle is out of the way.
+Found search_path(const Problem& problem, const Quest& quest) {
+  constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
+  Found best;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  for (const model::Predictor* relative : quest.relatives) {
+    Problem easier = for_predictor(problem, *relative);
+    const Found rough = search(easier, quest.starter);
+    if (!rough.solution.usable || rough.unexplained > kRoughly) continue;
+    easier.set_base(rough.solution.u);
+    const Start start = start_from(easier, rough.path);
+    for (const int window : {all, std::max(24, all / 4)}) {
+      Found found = grow(problem, start, window);
+      if (better(found, best)) best = std::move(found);
+      if (best.passed || best.unexplained < kExplained) return best;
+    }
+  }
+  Found found = search(problem, quest.starter);
+  return better(found, best) ? found : best;
+}
+
+Found find_arc(const Problem& problem, const Quest& quest) {
+  const bool spins = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
+    return problem.predictor->parameters()[p.index].name == "psi_rad";
+  });
+  if (spins && problem.arcs[0].observable_index(model::Observable::x_m) >= 0 &&
+      problem.predictor->model_name() != "puck") {
+    Problem path = problem;
+    path.arcs[0] = problem.arcs[0].without(Channel::psi);
+    for (int i = static_cast<int>(path.free.size()) - 1; i >= 0; --i)
+      if (is_spin(path, i)) path.free.erase(path.free.begin() + i);
+    return with_spin(problem, find_arc(path, quest));
+  }
+  const FitOptions& options = *quest.options;
+  const Start given{"given", options.start};
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  if (options.strategy == "single") return grow(problem, given, all);
+  if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
+  if (options.strategy == "integral") return from_best_start(problem, quest.starter);
+  if (options.strategy != "auto")
+    throw InputError(fmt::format(
+        "strategy '{}' is unknown; it is auto, single, growing or integral", options.strategy));
+  Found best = search_path(problem, quest);
+  if (best.passed || !quest.start_given) return best;
+  Found from_given = grow(problem, given, std::max(24, all / 8));
+  return from_given.solution.usable &&
+                 (!best.solution.usable || from_given.reduced_chi2 < best.reduced_chi2)
+             ? from_given
+             : best;
+}
+
+}  // namespace
+
+// Every arc alone, then all together from each arc's idea of the shared parameters.
+Found find(Problem& problem, const Quest& quest) {
+  if (problem.arcs.size() == 1) return find_arc(problem, quest);
+  std::vector<Problem> alone;
+  Found best;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    alone.push_back(single_arc(problem, arc));
+    const Found found = find_arc(alone.back(), quest);
+    if (!found.solution.usable) return found;
+    alone.back().set_base(found.solution.u);
+    problem.base[arc] = alone.back().base[0];
+    if (best.path == "none" || best.path == found.path)
+      best.path = found.path;
+    else
+      best.path = "mixed";
+  }
+  const std::string path = best.path;
+  for (const Problem& leader : alone) {
+    Problem trial = problem;
+    for (const FreeParameter& parameter : problem.free)
+      if (parameter.arc < 0)
+        for (Eigen::VectorXd& base : trial.base)
+          base[parameter.index] = leader.base[0][parameter.index];
+    const Solution solution = solve(trial, trial.start());
+    if (!solution.usable || (best.solution.usable && solution.chi2 >= best.solution.chi2)) continue;
+    best.solution = solution;
+    problem.base = trial.base;
+  }
+  best.path = path;
+  return best;
+}
+
+}  // namespace trochoid::fitting

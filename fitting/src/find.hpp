@@ -1,0 +1,22 @@
+#pragma once
+#include "strategy.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// How to look for a solution.
+struct Quest {
+  Starter starter;
+  const FitOptions* options = nullptr;
+  bool start_given = false;
+  /// Easier relatives of the model, tried first: a sliding body may nearly roll, and a softened
+  /// friction law has a smooth cost. Their parameters are found by name.
+  std::vector<const model::Predictor*> relatives;
+};
+
+/// Every arc alone, without a guess or from the given start; then all arcs together from each arc's
+/// idea of the shared parameters. Writes the arcs' values into problem.base.
+/// @throws InputError if the strategy is unknown.
+[[nodiscard]] Found find(Problem& problem, const Quest& quest);
+
+}  // namespace trochoid::fitting
