@@ -151,6 +151,9 @@ void report_parameters(const Problem& problem, const Uncertainty& error, data::F
     parameter.unit = infos[free.index].unit;
     parameter.identifiable = error.identifiable[i];
     parameter.note = infos[free.index].meaning;
+    if (free.held)
+      parameter.note +=
+          fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
     if (free.prior && parameter.sigma > 0.9 * free.prior->sigma)
       parameter.status = data::ParameterStatus::prior;
     if (!std::isfinite(parameter.sigma)) parameter.identifiable = false;
@@ -277,8 +280,12 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   result.model = model;
   result.seed = options.seed;
   const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
+  // The search leaves aside what stands out; the polish weighs every sample by its residual.
+  Problem search = problem;
+  for (ArcData& arc : search.arcs) arc = arc.keep(consistent_samples(arc));
   const Found found =
-      find(problem, {starter_for(predictor, scene), &options, start_given, relatives});
+      find(search, {starter_for(predictor, scene), &options, start_given, relatives});
+  problem.base = search.base;
   Solution solution = found.solution;
   result.start_path = found.path;
   if (!solution.usable) {
@@ -287,6 +294,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     report_arcs(problem, result);
     return result;
   }
+  if (hold_vanished(problem, solution.u)) solution = solve(problem, problem.start());
   solution = polish(problem, solution, options.tolerance);
   result.integration_error_sigma = integration_error_sigma(problem, solution.u);
   while (options.tolerance <= 0.0 && result.integration_error_sigma > 0.01 &&

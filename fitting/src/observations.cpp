@@ -80,12 +80,12 @@ Eigen::MatrixX2d ArcData::positions_m() const {
   return positions;
 }
 
-ArcData ArcData::slice(int first, int last, int step) const {
+ArcData ArcData::keep(const std::vector<int>& samples) const {
   ArcData part = *this;
   part.t_s.clear();
   part.readings.clear();
   std::vector<int> renumbered(t_s.size(), -1);
-  for (int i = first; i < last; i += step) {
+  for (const int i : samples) {
     renumbered[i] = static_cast<int>(part.t_s.size());
     part.t_s.push_back(t_s[i]);
   }
@@ -95,6 +95,12 @@ ArcData ArcData::slice(int first, int last, int step) const {
   }
   number_rows(part);
   return part;
+}
+
+ArcData ArcData::slice(int first, int last, int step) const {
+  std::vector<int> samples;
+  for (int i = first; i < last; i += step) samples.push_back(i);
+  return keep(samples);
 }
 
 ArcData ArcData::without(Channel channel) const {
@@ -138,6 +144,55 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
   if (!arc.t_s.empty()) arc.start_s = arc.t_s.front();
   if (any_covariance_missing && arc.t_s.size() >= 3) guess_position_noise(arc);
   return arc;
+}
+
+namespace {
+
+// Distance of each reading of a channel from the middle of its neighbours, the median over the
+// pairs m samples before and after; what curvature adds is common to all and enters the scale.
+std::vector<double> neighbour_distance(const std::vector<const Reading*>& readings) {
+  constexpr int kPairs = 4;
+  const int n = static_cast<int>(readings.size());
+  std::vector<double> distance(n, 0.0);
+  for (int i = 0; i < n; ++i) {
+    std::vector<double> off;
+    for (int m = 1; m <= kPairs; ++m) {
+      const int before = i - m, after = i + m;
+      if (before < 0 || after >= n) continue;
+      const Eigen::Vector2d p = readings[before]->value, q = readings[after]->value;
+      if (readings[i]->channel == Channel::position)
+        off.push_back((readings[i]->value - 0.5 * (p + q)).norm());
+      else
+        off.push_back(
+            std::abs(wrapped(readings[i]->value.x() - p.x() - 0.5 * wrapped(q.x() - p.x()))));
+    }
+    if (!off.empty()) distance[i] = median(std::move(off));
+  }
+  return distance;
+}
+
+}  // namespace
+
+std::vector<int> consistent_samples(const ArcData& arc) {
+  constexpr double kFar = 10.0;  // times the typical distance: curvature varies by a few
+  const int n = static_cast<int>(arc.t_s.size());
+  std::vector<bool> doubtful(n, false);
+  for (const Channel channel : {Channel::position, Channel::theta, Channel::phi}) {
+    std::vector<const Reading*> readings;
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == channel) readings.push_back(&reading);
+    if (readings.size() < 24) continue;
+    const std::vector<double> distance = neighbour_distance(readings);
+    const double limit = kFar * median(distance);
+    for (std::size_t i = 0; i < readings.size(); ++i)
+      if (distance[i] > limit) doubtful[readings[i]->sample] = true;
+  }
+  std::vector<int> kept, all;
+  for (int i = 0; i < n; ++i) {
+    all.push_back(i);
+    if (!doubtful[i]) kept.push_back(i);
+  }
+  return 5 * kept.size() > 4 * all.size() ? kept : all;
 }
 
 double excess_scatter(const ArcData& arc, Channel channel) {

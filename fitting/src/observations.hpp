@@ -40,6 +40,8 @@ struct ArcData {
   [[nodiscard]] Eigen::MatrixX2d positions_m() const;
   /// The same arc with the samples first, first + step, ... below last only.
   [[nodiscard]] ArcData slice(int first, int last, int step = 1) const;
+  /// The same arc with these samples (ascending) only.
+  [[nodiscard]] ArcData keep(const std::vector<int>& samples) const;
   /// The same arc without the readings of one channel.
   [[nodiscard]] ArcData without(Channel channel) const;
 };
@@ -53,6 +55,11 @@ struct ChannelChoice {
 /// wanted. Unknown covariances are replaced by a guess from the scatter about a smooth curve.
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
                                const ChannelChoice& choice, bool folded);
+
+/// The samples that lie where their neighbours on both sides let expect them, in every channel: a
+/// tilt taken for its mirror image, or another body's outline, stands out by far. All of them if a
+/// fifth or more would go.
+[[nodiscard]] std::vector<int> consistent_samples(const ArcData& arc);
 
 /// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their
 /// own sigmas say.

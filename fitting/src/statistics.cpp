@@ -59,7 +59,9 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   const ArcData& arc = problem.arcs[std::max(0, parameter.arc)];
   const double duration = std::max(arc.duration_s(), 1e-9);
   if (info.unit == "rad") return 1.0;
-  if (parameter.transform.kind == Transform::Kind::log) return std::max(value, 1e-300);
+  // A loss that came out as nothing is known if its error is small against the given value's.
+  if (parameter.transform.is_over_decades())
+    return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
   if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);
   double extent = 1.0;
   if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1) {

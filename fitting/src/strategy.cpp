@@ -71,6 +71,52 @@ std::vector<Start> screened(const Problem& window, const Starter& starter) {
 
 }  // namespace
 
+bool hold_vanished(Problem& problem, const Eigen::VectorXd& u) {
+  constexpr double kUnseen = 0.05;  // change of all residuals together, in sigma, if it doubled
+  problem.set_base(u);
+  const int count = static_cast<int>(problem.free.size());
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd residuals;
+    Eigen::MatrixXd jacobian;
+    if (!evaluate(problem, arc, problem.start(), residuals, &jacobian)) return false;
+    const std::vector<int> columns = problem.columns_of(arc);
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      squares[columns[c]] += jacobian.col(static_cast<int>(c)).squaredNorm();
+  }
+  bool any = false;
+  for (int i = 0; i < count; ++i) {
+    FreeParameter& parameter = problem.free[i];
+    if (!parameter.transform.is_over_decades() || parameter.held) continue;
+    const double value = problem.base[std::max(0, parameter.arc)][parameter.index];
+    const bool vanished = value < 1e-2 * parameter.given && std::sqrt(squares[i]) < kUnseen;
+    const bool at_limit = parameter.transform.kind == Transform::Kind::limited &&
+                          value > 0.99 * parameter.transform.upper;
+    if (!vanished && !at_limit) continue;
+    parameter.held = any = true;
+    for (Eigen::VectorXd& base : problem.base)
+      base[parameter.index] = at_limit ? 0.99 * parameter.transform.upper : 1e-6 * parameter.given;
+  }
+  return any;
+}
+
+namespace {
+
+// To the minimum; what vanishes on the way is held, else it would take all the iterations.
+Solution solve_to_the_end(Problem& problem) {
+  const bool losses = std::any_of(problem.free.begin(), problem.free.end(),
+                                  [&](const FreeParameter& p) { return is_loss(problem, p); });
+  if (!losses) return solve(problem, problem.start());
+  for (int round = 0; round < 6; ++round) {
+    const Solution solution = solve(problem, problem.start(), {.iterations = 15});
+    if (!solution.usable || solution.converged) return solution;
+    hold_vanished(problem, solution.u);
+  }
+  return solve(problem, problem.start());
+}
+
+}  // namespace
+
 Found judged(const Problem& problem, Solution solution, const std::string& path) {
   Found found;
   found.solution = std::move(solution);
@@ -162,7 +208,7 @@ Found grow(const Problem& problem, const Start& start, int first_window) {
     if (window < all && solution.chi2 / free_rows(part) > 30.0 * chi2_gate(part.rows())) return {};
     if (window == all) break;
   }
-  return judged(problem, solve(current, current.start()), start.path);
+  return judged(problem, solve_to_the_end(current), start.path);
 }
 
 namespace {

@@ -51,6 +51,11 @@ void apply(const Start& start, Problem& problem);
 /// for other bodies it is a constant.
 void start_spin(Problem& problem, int arc);
 
+/// Losses that a minimiser sends to zero creep on for ever on a logarithmic scale: holds those
+/// which at their present value no longer change a residual, at a millionth of the given value;
+/// likewise a friction at its limit. Writes u into `base`. Returns whether anything new is held.
+bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
+
 /// What a solution of a single-arc problem is worth.
 [[nodiscard]] Found judged(const Problem& problem, Solution solution, const std::string& path);
 
