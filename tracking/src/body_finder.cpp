@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "pose_start.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
 
@@ -85,6 +86,8 @@ class CylinderFinder final : public BodyFinder {
         camera_(camera),
         exposure_fraction_(exposure_fraction),
         alike_(body.faces_look_alike() && support.kind != data::SupportKind::pivot),
+        pivoted_(support.kind == data::SupportKind::pivot),
+        motion_(body, support, camera),
         fitter_(body, support, camera) {}
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
@@ -94,6 +97,7 @@ class CylinderFinder final : public BodyFinder {
                                    .predicted = look.predicted != nullptr && look.predicted->pose
                                                     ? std::optional(look.predicted->pose->pose)
                                                     : std::nullopt,
+                                   .attitude_known = true,
                                    .previous = look.last != nullptr && look.last->pose
                                                    ? std::optional(look.last->pose->pose)
                                                    : std::nullopt,
@@ -120,6 +124,16 @@ class CylinderFinder final : public BodyFinder {
     guess.rim = rim_of(guess.pose->pose);
     guess.centre_px = guess.pose->centre_px = guess.rim.centre_px;
   }
+  [[nodiscard]] std::optional<Sighting> mirrored(const Look& look,
+                                                 const Sighting& seen) const override {
+    if (!seen.pose || motion_.rotation() < 0 || pivoted_) return std::nullopt;
+    Sighting guess = seen;
+    guess.pose->pose = tracking::mirrored(camera_, motion_, seen.pose->pose);
+    Look there = look;
+    there.predicted = &guess;
+    return find(there);
+  }
+
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
     try {
       const Eigen::Vector3d at = camera_.table_from_image(at_px, body_.half_thickness_m());
@@ -176,7 +190,8 @@ class CylinderFinder final : public BodyFinder {
   data::Body body_;
   data::Camera camera_;
   double exposure_fraction_;
-  bool alike_;
+  bool alike_, pivoted_;
+  PoseMotion motion_;
   OutlineFitter fitter_;
 };
 

@@ -44,6 +44,12 @@ class BodyFinder {
   [[nodiscard]] virtual std::optional<Sighting> find(const Look& look) const = 0;
   /// Puts centre and rim of a guessed sighting where its pose, if it has one, would be seen.
   virtual void place(Sighting& guess) const = 0;
+  /// Measures the other tilt with nearly the same silhouette, mirrored at the line of sight; nothing
+  /// where there is none.
+  [[nodiscard]] virtual std::optional<Sighting> mirrored(const Look& /*look*/,
+                                                         const Sighting& /*seen*/) const {
+    return std::nullopt;
+  }
   /// Semi-major axis of the rim of the body lying there [px]; 0 if its size is not known.
   [[nodiscard]] virtual double expected_major_px(const Eigen::Vector2d& /*at_px*/) const {
     return 0.0;

@@ -65,9 +65,10 @@ bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double
   const double ratio = seen.rim.semi_major_px() / usual_major_px_;
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
-  const double whole = wholeness(seen);
-  if (whole >= kWhole) return true;
-  const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * forecast_.surprise_px() + 0.3 * lost_;
+  const double whole = wholeness(seen), surprise = forecast_.surprise_px();
+  const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
+  if (whole >= kWhole) return lost_ > 3 || apart_px(seen, predicted) < far;
+  const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * lost_;
   return whole >= kLeast && apart_px(seen, predicted) < near;
 }
 

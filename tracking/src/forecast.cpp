@@ -85,6 +85,21 @@ Pose turning_on(const Three<Pose>& past, double t) {
   return next;
 }
 
+/// Axis and centre on parabolas: a body rocking over its face, where precession leaps.
+Pose swinging_on(const Three<Pose>& past, double t) {
+  const auto of = [&](const auto& quantity) {
+    return Three<Eigen::Vector3d>{past.t0,           past.t1,           past.t2,
+                                  quantity(past.v0), quantity(past.v1), quantity(past.v2)};
+  };
+  Pose next = past.v2;
+  set_axis(of(axis_of).quadratic(t).normalized(), next);
+  next.phi_rad = nearest(next.phi_rad, past.v2.phi_rad, kTurn);
+  next.centre_m = of([](const Pose& p) { return p.centre_m; }).quadratic(t);
+  next.psi_rad = past.v2.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
+                                       std::remainder(past.v2.psi_rad - past.v1.psi_rad, kTurn);
+  return next;
+}
+
 }  // namespace
 
 double apart_px(const Sighting& a, const Sighting& b) {
@@ -108,10 +123,11 @@ Pose nearer_face(const Pose& pose, const Pose& reference, double mark_rad) {
 void Forecast::start(double t_s, const Sighting& seen) {
   past_.clear();
   past_.push_back({t_s, seen});
-  missed_px_.fill(std::max(kFirstSurprise_px, 0.15 * seen.rim.semi_minor_px()));
+  missed_px_.fill(std::max(kFirstSurprise_px, 0.25 * seen.rim.semi_minor_px()));
   // Until it is seen to stand still or to turn, going on is the better guess.
   missed_px_[kStill] *= 1.5;
   missed_px_[kTurning] *= 2.0;
+  missed_px_[kSwinging] *= 2.0;
   frame_s_ = 0.0;
 }
 
@@ -123,7 +139,8 @@ Forecast::Manner Forecast::trusted() const {
   if (past_.size() < 2) return kStill;
   // Where going on is no worse than standing still, it is right more often in the next frame.
   Manner best = kStraight;
-  if (past_.size() >= 3 && missed_px_[kTurning] < 0.9 * missed_px_[best]) best = kTurning;
+  for (const Manner bent : {kTurning, kSwinging})
+    if (past_.size() >= 3 && missed_px_[bent] < 0.9 * missed_px_[best]) best = bent;
   if (missed_px_[kStill] < 0.7 * missed_px_[best]) best = kStill;
   return best;
 }
@@ -139,15 +156,15 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
   const double since = frames_since(t_s);
   const double t = last.t_s + (t_s - last.t_s) * std::min(1.0, kFadeAfter / std::max(since, 1.0));
   const double ahead = (t - last.t_s) / (last.t_s - before.t_s);
-  const bool turning = manner == kTurning && past_.size() >= 3;
+  const bool bent = manner != kStraight && past_.size() >= 3;
   const Moment& first = past_.front();
   const auto three = [&](const auto& of) {
     return Three<std::decay_t<decltype(of(first))>>{first.t_s, before.t_s, last.t_s,
                                                     of(first), of(before), of(last)};
   };
-  p.centre_px = turning ? three([](const Moment& m) { return m.seen.centre_px; }).quadratic(t)
-                        : Eigen::Vector2d(last.seen.centre_px +
-                                          ahead * (last.seen.centre_px - before.seen.centre_px));
+  p.centre_px = bent ? three([](const Moment& m) { return m.seen.centre_px; }).quadratic(t)
+                     : Eigen::Vector2d(last.seen.centre_px +
+                                       ahead * (last.seen.centre_px - before.seen.centre_px));
   p.rim.centre_px = p.centre_px + (last.seen.rim.centre_px - last.seen.centre_px);
   if (since < 3.0) {
     const Eigen::Matrix2d shape =
@@ -155,11 +172,16 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
     if (shape.determinant() > 0.3 * p.rim.shape_px.determinant()) p.rim.shape_px = shape;
   }
   if (p.pose && before.seen.pose) {
-    const bool can_turn = turning && first.seen.pose && !steep(before.seen.pose->pose) &&
-                          !steep(last.seen.pose->pose) && !steep(first.seen.pose->pose);
-    p.pose->pose = can_turn
-                       ? turning_on(three([](const Moment& m) { return m.seen.pose->pose; }), t)
-                       : straight_on(before.seen.pose->pose, last.seen.pose->pose, ahead);
+    const bool poses = bent && first.seen.pose;
+    const bool level = steep(before.seen.pose->pose) || steep(last.seen.pose->pose) ||
+                       (poses && steep(first.seen.pose->pose));
+    const auto pose_of = [](const Moment& m) { return m.seen.pose->pose; };
+    if (poses && manner == kTurning && !level)
+      p.pose->pose = turning_on(three(pose_of), t);
+    else if (poses && manner == kSwinging)
+      p.pose->pose = swinging_on(three(pose_of), t);
+    else
+      p.pose->pose = straight_on(before.seen.pose->pose, last.seen.pose->pose, ahead);
     finder_.place(p);
   }
   if (p.turned_rad && before.seen.turned_rad)
@@ -175,7 +197,7 @@ std::vector<Sighting> Forecast::alternatives(double t_s) const {
   std::vector<Sighting> guesses;
   if (past_.size() < 2) return guesses;
   const Manner first = trusted();
-  std::array<Manner, 3> order{kStraight, kTurning, kStill};
+  std::array<Manner, kManners> order{kStraight, kTurning, kSwinging, kStill};
   std::sort(order.begin(), order.end(),
             [&](Manner a, Manner b) { return missed_px_[a] < missed_px_[b]; });
   std::vector<Sighting> known{guess(first, t_s)};
@@ -199,8 +221,8 @@ void Forecast::add(double t_s, const Sighting& seen, bool lasting) {
   const double since = frames_since(t_s);
   if (since < 1.5) frame_s_ = 0.9 * frame_s_ + 0.1 * step_s;
   if (past_.size() >= 2 && since < 3.0)
-    for (const Manner manner : {kStraight, kTurning, kStill}) {
-      if (manner == kTurning && past_.size() < 3) continue;
+    for (const Manner manner : {kStraight, kTurning, kSwinging, kStill}) {
+      if ((manner == kTurning || manner == kSwinging) && past_.size() < 3) continue;
       const double missed = apart_px(guess(manner, t_s), seen);
       missed_px_[manner] = std::max(0.7 * missed_px_[manner] + 0.3 * missed, 0.5 * missed);
     }

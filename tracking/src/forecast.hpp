@@ -8,7 +8,8 @@
 namespace trochoid::tracking {
 
 /// Where a body will be next, from where it was. Bodies on a table move in different manners - a
-/// puck straight on, a coin round and round with its precession, after an impact neither - so
+/// puck straight on, a coin round and round with its precession or rocking over its face, after an
+/// impact none of these - so
 /// several guesses run side by side, and the one that has missed least of late is believed. Works
 /// in either direction of time.
 class Forecast {
@@ -32,7 +33,7 @@ class Forecast {
   [[nodiscard]] double frames_since(double t_s) const;
 
  private:
-  enum Manner { kStraight, kTurning, kStill, kManners };
+  enum Manner { kStraight, kTurning, kSwinging, kStill, kManners };
   struct Moment {
     double t_s;
     Sighting seen;

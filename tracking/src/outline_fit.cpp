@@ -206,7 +206,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
   auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front())
                                  : fit_best(scenery, starts, mirrors);
-  if (best && evidence.predicted && mirrors && best->score < kDoubtful) {
+  if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
+      best->score < kDoubtful) {
     const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);
     auto turned = fit_from(scenery, other);
     if (turned && turned->evidence > kClearlyBetter * best->evidence) best = std::move(turned);

@@ -9,6 +9,7 @@
 
 #include "body_search.hpp"
 #include "recording.hpp"
+#include "seed_trial.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -108,6 +109,7 @@ class Tracking {
       seed = find_seed(held, background_, *finder_, explained_);
     }
     if (!seed) return false;
+    seed = better_reading(held, background_, *finder_, std::move(*seed));
     BodyPath path;
     if (!seed->seen.pose) path.marks = marks_of(held[seed->held_index], seed->seen);
     if (path.marks) seed->seen.turned_rad = 0.0, seed->seen.turned_sigma_rad = 0.01;
