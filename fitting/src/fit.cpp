@@ -13,6 +13,7 @@
 #include "find.hpp"
 #include "problem.hpp"
 #include "profile.hpp"
+#include "segments.hpp"
 #include "smoothing.hpp"
 #include "statistics.hpp"
 #include "strategy.hpp"
@@ -28,6 +29,16 @@ ChannelChoice channels_of(const std::string& model) {
   return {.position = true, .theta = true, .phi = true, .psi = true};
 }
 
+// A puck's track falls apart at impacts and rest; other bodies are followed throughout.
+std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& model,
+                                   const FitOptions& options) {
+  const SampleRange chosen = chosen_range(track, options.from, options.to);
+  const SampleRange kept{chosen.first,
+                         kept_samples(chosen.first, chosen.second, options.hold_back)};
+  if (model == "puck") return sliding_ranges(track, kept);
+  return {kept};
+}
+
 std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
                              const data::Scene& scene, const FitOptions& options) {
   const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
@@ -35,16 +46,20 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
   std::vector<ArcData> arcs;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     data::check(tracks[i], fmt::format("track {}", i + 1));
-    const auto [first, end] = chosen_range(tracks[i], options.from, options.to);
-    const int last = kept_samples(first, end, options.hold_back);
-    ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
-    arc.track = static_cast<int>(i);
-    if (arc.readings.empty())
-      throw InputError(fmt::format(
-          "track {}: no sample has positions in metres; track with a scale or a camera file",
-          i + 1));
-    arcs.push_back(std::move(arc));
+    for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
+      ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
+      arc.track = static_cast<int>(i);
+      if (arc.readings.empty())
+        throw InputError(fmt::format(
+            "track {}: no sample has positions in metres; track with a scale or a camera file",
+            i + 1));
+      arcs.push_back(std::move(arc));
+    }
   }
+  if (arcs.empty())
+    throw InputError(
+        "no track has a stretch in which the puck slides freely, slowing down; are the positions "
+        "in metres, and does it move?");
   return arcs;
 }
 
@@ -80,9 +95,12 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
 Starter rim_starter(const data::Scene& scene) {
   data::Body body = *scene.body;
   const model::CentralInertia inertia = model::central_inertia(body);
-  const RimShape shape{body.radius_m, body.half_thickness_m(),
+  const RimShape shape{body.radius_m,
+                       body.half_thickness_m(),
                        inertia.transverse_kg_m2 / inertia.mass_kg,
-                       inertia.axial_kg_m2 / inertia.mass_kg, scene.model.gravity_m_s2};
+                       inertia.axial_kg_m2 / inertia.mass_kg,
+                       scene.model.gravity_m_s2,
+                       scene.model.name == "sliding"};
   return [shape](const ArcData& window) { return rim_starts(window, shape); };
 }
 

@@ -133,6 +133,7 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
     if (choice.theta) add_angle(arc, index, Channel::theta, sample.theta);
     if (choice.phi) add_angle(arc, index, Channel::phi, sample.phi);
     if (choice.psi) add_angle(arc, index, Channel::psi, sample.psi);
+    arc.filmed |= sample.centre_px.allFinite();
     arc.t_s.push_back(sample.t_s);
   }
   for (const Channel channel : {Channel::theta, Channel::phi, Channel::psi}) {

@@ -131,6 +131,7 @@ std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
   const Motion motion = motion_of(window);
   std::vector<Start> starts = from_angles(window, shape, motion);
   if (starts.empty()) starts = from_positions(shape, motion);
+  if (!shape.slides) return starts;
   // Friction is what accelerates the centre, so it is at least that strong; the scene's own value
   // is the other guess.
   const std::size_t plain = starts.size();

@@ -31,6 +31,7 @@ struct Start {
 /// A disc or ring on its rim, for starts: lengths [m], moments per mass [m^2].
 struct RimShape {
   double R = 0.0, h = 0.0, A = 0.0, C = 0.0, g = 9.81;
+  bool slides = false;  ///< friction is a parameter
 };
 
 /// Starts for a body that rolls (or slides) on its rim, state at the window's first sample.

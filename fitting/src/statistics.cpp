@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "smoothing.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -136,6 +137,28 @@ Whiteness channel_whiteness(const Problem& problem, const Linearised& all, Chann
   return worst;
 }
 
+// What a constant offset of half a sample's sigma in one coordinate of a channel does to the
+// residuals of all arcs: a tracker whose errors hang together may also be off altogether (light,
+// shadow, camera), and no number of samples averages that away.
+Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Channel channel,
+                              int axis) {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(all.jacobian.rows());
+  std::vector<double> sizes;
+  int first = 0;
+  for (const ArcData& arc : problem.arcs) {
+    for (const Reading& reading : arc.readings) {
+      if (reading.channel != channel || !arc.filmed) continue;
+      const Eigen::Vector2d row = reading.whitener.transpose().col(axis);
+      const int width = channel == Channel::position ? 2 : 1;
+      rows.segment(first + reading.row, width) = row.head(width);
+      sizes.push_back(row.head(width).norm());
+    }
+    first += arc.rows;
+  }
+  const double typical = median(std::move(sizes));
+  return typical > 0.0 ? Eigen::VectorXd(0.5 / typical * rows) : rows;
+}
+
 data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
   data::NullVector vector;
   std::string list;
@@ -189,9 +212,13 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
 
   Eigen::VectorXd row_scale = Eigen::VectorXd::Ones(all.jacobian.rows());
   bool correlated = false;
+  std::vector<Eigen::VectorXd> offsets;
   for (int c = 0; c < kChannels; ++c) {
     const Whiteness one = channel_whiteness(problem, all, static_cast<Channel>(c));
     correlated |= one.inflation > 1.0;
+    if (one.inflation > 1.0)
+      for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
+        offsets.push_back(common_offset(problem, all, static_cast<Channel>(c), axis));
     for (std::size_t row = 0; row < all.arc.size(); ++row)
       if (all.arc[row] >= 0 && all.channel[row] == static_cast<Channel>(c))
         row_scale[row] = std::sqrt(one.inflation);
@@ -205,6 +232,10 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   if (correlated) {
     const Eigen::MatrixXd filling = row_scale.asDiagonal() * scaled * bread;
     covariance = filling.transpose() * filling;
+    for (const Eigen::VectorXd& offset : offsets) {
+      const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
+      covariance += shift * shift.transpose();
+    }
   }
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   result.identifiable.resize(count);

@@ -32,7 +32,8 @@ struct Uncertainty {
 };
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank;
 /// correlated residuals widen the covariance by their effective sample size, channel by channel
-/// (a sandwich of the channels' information matrices).
+/// (a sandwich of the channels' information matrices), and a constant offset of half a sample's
+/// sigma is allowed for in every filmed channel whose residuals hang together.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer.

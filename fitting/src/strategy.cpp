@@ -199,8 +199,10 @@ Found grow(const Problem& problem, const Start& start, int first_window) {
   apply(start, current);
   for (int window = std::min(first_window, all);; window = std::min(window + window / 2 + 8, all)) {
     Problem part = windowed(current, window);
-    constexpr SolveOptions kRough{.iterations = 25, .function_tolerance = 1e-5};
-    const Solution solution = solve(part, part.start(), kRough);
+    // The first window settles which valley it is; the next ones only follow it.
+    const int iterations = window <= first_window ? 60 : 25;
+    const Solution solution =
+        solve(part, part.start(), {.iterations = iterations, .function_tolerance = 1e-5});
     if (!solution.usable) return {};
     part.set_base(solution.u);
     current.base = part.base;
@@ -227,7 +229,7 @@ std::vector<int> window_sizes(const Problem& problem) {
 }  // namespace
 
 Found search(const Problem& problem, const Starter& starter) {
-  constexpr std::size_t kTried = 3;
+  constexpr std::size_t kTried = 5;
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);

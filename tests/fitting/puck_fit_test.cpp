@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+// A flat puck that is thrown, hits something and comes to rest. Without spin Coulomb's law is a
+// constant deceleration, so the truth here needs no integrator.
+namespace trochoid::fitting {
+namespace {
+
+constexpr double kFriction = 0.2, kGravity_m_s2 = 9.81, kSigma_m = 5e-5, kStep_s = 1.0 / 240;
+
+data::Scene puck_scene() {
+  data::Scene scene;
+  scene.body = data::Body{};
+  scene.body->kind = data::BodyKind::disc;
+  scene.body->radius_m = 0.0155;
+  scene.body->thickness_m = 0.009;
+  scene.support.kind = data::SupportKind::flat;
+  scene.model.name = "puck";
+  scene.model.friction = 0.1;
+  return scene;
+}
+
+class Throw {
+ public:
+  explicit Throw(std::uint64_t seed) : generator_(seed) {}
+  // Slides for that long from where it is, with this velocity; stops when friction has used it up.
+  Throw& slide(const Eigen::Vector2d& velocity_m_s, double duration_s) {
+    const double deceleration = kFriction * kGravity_m_s2, speed = velocity_m_s.norm();
+    const Eigen::Vector2d from = at_;
+    for (int i = 1; i <= std::lround(duration_s / kStep_s); ++i) {
+      const double t = kStep_s * i;
+      const double moving = std::min(t, speed > 0.0 ? speed / deceleration : 0.0);
+      if (speed > 0.0)
+        at_ = from + velocity_m_s / speed * (speed * moving - 0.5 * deceleration * moving * moving);
+      add();
+    }
+    return *this;
+  }
+  // A hand speeds it up.
+  Throw& push(const Eigen::Vector2d& acceleration_m_s2, double duration_s) {
+    const Eigen::Vector2d from = at_;
+    for (int i = 1; i <= std::lround(duration_s / kStep_s); ++i) {
+      const double t = kStep_s * i;
+      at_ = from + 0.5 * acceleration_m_s2 * t * t;
+      add();
+    }
+    return *this;
+  }
+  [[nodiscard]] const data::Track& track() const { return track_; }
+
+ private:
+  void add() {
+    data::TrackSample sample;
+    sample.t_s = kStep_s * static_cast<double>(track_.samples.size());
+    sample.centre_m = at_ + Eigen::Vector2d(normal_(generator_), normal_(generator_));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    track_.samples.push_back(sample);
+  }
+  std::mt19937_64 generator_;
+  std::normal_distribution<double> normal_{0.0, kSigma_m};
+  Eigen::Vector2d at_ = Eigen::Vector2d::Zero();
+  data::Track track_;
+};
+
+TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
+  Throw thrown(1);
+  thrown.slide({0.0, 0.0}, 0.2).slide({1.0, 0.3}, 0.3).slide({-0.2, 0.5}, 0.6);
+  const data::Fit fit = fitting::fit(std::span(&thrown.track(), 1), puck_scene());
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  ASSERT_EQ(fit.arcs.size(), 2u);
+  // The cut itself may lie a frame or two early, and a sample on either side of it is left out.
+  constexpr double kFewFrames_s = 4.0 * kStep_s;
+  EXPECT_NEAR(fit.arcs[0].from_s, 0.2, kFewFrames_s);
+  EXPECT_NEAR(fit.arcs[0].to_s, 0.5, kFewFrames_s);
+  EXPECT_NEAR(fit.arcs[1].from_s, 0.5, kFewFrames_s);
+  const data::FitParameter* friction = fit.find("friction");
+  EXPECT_LT(std::abs(friction->value - kFriction), 4.0 * friction->sigma);
+  EXPECT_LT(friction->sigma, 0.01 * kFriction);
+}
+
+TEST(PuckFit, LeavesOutWhatAHandDoes) {
+  Throw thrown(2);
+  thrown.push({6.0, 0.0}, 0.15).slide({0.9, 0.0}, 0.3);
+  const data::Fit fit = fitting::fit(std::span(&thrown.track(), 1), puck_scene());
+  ASSERT_EQ(fit.arcs.size(), 1u);
+  EXPECT_GT(fit.arcs[0].from_s, 0.14);
+  EXPECT_LT(std::abs(fit.find("friction")->value - kFriction), 4.0 * fit.find("friction")->sigma);
+}
+
+TEST(PuckFit, RefusesABodyAtRest) {
+  Throw thrown(3);
+  thrown.slide({0.0, 0.0}, 1.0);
+  EXPECT_THROW((void)fitting::fit(std::span(&thrown.track(), 1), puck_scene()), InputError);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting

@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <random>
+#include <sstream>
+
+#include "trochoid/data/reference_case.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+// Bodies on their rim, from reference trajectories of an independent integrator with noise added.
+namespace trochoid::fitting {
+namespace {
+
+// The bundled copies are thinned to 30 Hz, too few for bodies that turn four times a second.
+std::string reference_folder() {
+  return std::string(TROCHOID_SHARED_DIR) + "/reference/";
+}
+
+class RimFit : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(reference_folder() + "s06_roll_disc.csv"))
+      GTEST_SKIP() << "no reference trajectories at full rate";
+  }
+};
+
+struct Case {
+  data::Scene scene;
+  data::Track track;
+};
+
+// Columns by name of a reference CSV.
+std::map<std::string, std::vector<double>> columns_of(const std::string& path) {
+  std::ifstream file(path);
+  std::string line, cell;
+  std::getline(file, line);
+  std::vector<std::string> names;
+  for (std::istringstream header(line); std::getline(header, cell, ',');) names.push_back(cell);
+  std::map<std::string, std::vector<double>> columns;
+  while (std::getline(file, line)) {
+    std::istringstream row(line);
+    for (const std::string& name : names) {
+      std::getline(row, cell, ',');
+      columns[name].push_back(std::stod(cell));
+    }
+  }
+  return columns;
+}
+
+// `until_s` keeps the test short; the start and the losses the scene knows are not the truth.
+Case noisy(const std::string& name, double until_s, double sigma_m) {
+  const std::string folder = reference_folder();
+  Case made{data::read_reference_case(folder + name + ".json").scene, {}};
+  made.scene.start = {};
+  const auto columns = columns_of(folder + name + ".csv");
+  std::mt19937_64 generator(7);
+  std::normal_distribution<double> normal(0.0, sigma_m);
+  for (std::size_t i = 0; i < columns.at("t").size() && columns.at("t")[i] <= until_s; ++i) {
+    data::TrackSample sample;
+    sample.t_s = columns.at("t")[i];
+    sample.centre_m = {columns.at("x")[i] + normal(generator),
+                       columns.at("y")[i] + normal(generator)};
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma_m * sigma_m;
+    made.track.samples.push_back(sample);
+  }
+  return made;
+}
+
+double pull(const data::Fit& fit, const std::string& name, double truth) {
+  const data::FitParameter* parameter = fit.find(name);
+  if (parameter == nullptr) return INFINITY;
+  return std::abs(parameter->value - truth) / parameter->sigma;
+}
+
+// 4 sigma of a few numbers: once in some thousand seeds.
+constexpr double kFar = 4.0;
+
+TEST_F(RimFit, FindsARollingDiscFromItsPathAlone) {
+  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar);
+  EXPECT_LT(pull(fit, "w3_rad_s", 3.0), kFar);
+  EXPECT_LT(fit.find("theta_rad")->sigma, 0.02);
+}
+
+TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
+  Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  c.scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-5, 1e-5, 4e-6);  // off by factors of four
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "air_linear_N_m_s[1]", 2.5e-6), kFar);
+  EXPECT_LT(pull(fit, "air_linear_N_m_s[3]", 1.5e-5), kFar);
+  EXPECT_LT(fit.find("air_linear_N_m_s[1]")->sigma, 0.02 * 2.5e-6);
+}
+
+TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
+  Case c = noisy("s08_slide_disc", 0.6, 1e-4);
+  c.scene.model.friction = 0.18;  // 0.3 in truth
+  c.scene.fit.fixed = {{"air_linear_N_m_s[1]", 1e-6},
+                       {"air_linear_N_m_s[3]", 2e-7},
+                       {"rolling_friction_m", 5e-5},
+                       {"pivoting_friction_m", 3e-4}};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "friction", 0.3), kFar);
+  EXPECT_LT(fit.find("friction")->sigma, 0.02);
+}
+
+TEST_F(RimFit, BoundsALossThatIsNotThere) {
+  Case c = noisy("s06_roll_disc", 1.5, 2e-4);
+  c.scene.model.pivoting_friction_m = 1e-4;
+  c.scene.model.couple_regularisation_rad_s = 0.01;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  const data::FitParameter* loss = fit.find("pivoting_friction_m");
+  ASSERT_NE(loss, nullptr);
+  EXPECT_LT(loss->value, kFar * loss->sigma);
+  EXPECT_LT(loss->sigma, 1e-4);
+}
+
+TEST_F(RimFit, LeavesMirroredFramesAside) {
+  Case c = noisy("s06_roll_disc", 1.5, 1e-4);
+  const auto columns = columns_of(reference_folder() + "s06_roll_disc.csv");
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  for (std::size_t i = 0; i < c.track.samples.size(); ++i) {
+    const bool mirrored = i % 23 == 5;
+    const double theta = columns.at("theta")[i], phi = columns.at("phi")[i];
+    data::TrackSample& sample = c.track.samples[i];
+    sample.theta = {theta + (mirrored ? 0.1 : 0.0) + normal(generator), 0.01};
+    sample.phi = {phi + (mirrored ? M_PI : 0.0) + normal(generator), 0.01};
+    if (mirrored) sample.centre_m.x() += 2e-3;
+  }
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar);
+  EXPECT_LT(pull(fit, "w3_rad_s", 3.0), kFar);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
