@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -83,6 +84,9 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
 }
 
 void run(const FitCommand& command) {
+  std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
+  inputs.emplace_back(command.scene);
+  check_output(command.output, inputs);
   data::Fit provenance;
   const std::vector<data::Track> tracks = read_tracks(command, provenance);
   data::Scene scene;

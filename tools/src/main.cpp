@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "commands.hpp"
 #include "progress.hpp"
@@ -56,6 +57,9 @@ int main(int argc, char** argv) try {
 } catch (const trochoid::tools::NotGood& answer) {
   fmt::print(stderr, "trochoid: {}\n", answer.what());
   return kNotGood;
+} catch (const std::filesystem::filesystem_error& error) {
+  fmt::print(stderr, "trochoid: {}: {}\n", error.path1().string(), error.code().message());
+  return kError;
 } catch (const std::exception& error) {
   fmt::print(stderr, "trochoid: {}\n", error.what());
   return kError;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "overlay.hpp"
 #include "progress.hpp"
 #include "run_folder.hpp"
@@ -39,6 +40,9 @@ OverlayInput read_inputs(const Options& options) {
 }
 
 void run(const Options& options) {
+  for (const std::string& output : {options.output, options.still})
+    check_output(output,
+                 {options.video, options.track, options.fit, options.scene, options.camera});
   if (options.output.empty() && options.still.empty())
     throw InputError("overlay: nothing to write; give -o overlay.mp4, --still path.png or both");
   const OverlayInput input = read_inputs(options);

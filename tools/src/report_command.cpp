@@ -5,6 +5,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "report.hpp"
 #include "run_folder.hpp"
@@ -36,6 +37,8 @@ ReportInput inputs(const Options& options) {
 }
 
 void run(const Options& options) {
+  for (const std::string& output : {options.output, options.path_svg})
+    check_output(output, {options.track, options.fit});
   const ReportInput input = inputs(options);
   const std::string html = make_report(input);
   data::write_text(html, options.output);

@@ -188,10 +188,19 @@ void show(Run& run, const Options& options, const fs::path& folder) {
   run.overlay = write_overlay(input, how, folder / "overlay.mp4");
 }
 
+// As a shell would take it: a name with anything but plain characters goes into quotes.
+std::string quoted(const std::string& word) {
+  const bool plain = word.find_first_of(" \t\n\"'\\$`!*?[](){}<>|&;#~") == std::string::npos;
+  if (plain) return word;
+  std::string result = "'";
+  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
 std::string command_line(const Options& options) {
-  std::string line = "trochoid run " + options.video;
+  std::string line = "trochoid run " + quoted(options.video);
   const auto add = [&](const char* name, const std::string& value) {
-    if (!value.empty()) line += fmt::format(" {} {}", name, value);
+    if (!value.empty()) line += fmt::format(" {} {}", name, quoted(value));
   };
   add("--scene", options.scene);
   add("--camera", options.camera);
@@ -202,6 +211,7 @@ std::string command_line(const Options& options) {
   if (options.rate_hz > 0.0) add("--rate", fmt::format("{:g}", options.rate_hz));
   if (options.effort != "normal") add("--effort", options.effort);
   if (options.free_pivot) line += " --free-pivot";
+  if (options.slow > 0.0) add("--slow", fmt::format("{:g}", options.slow));
   if (options.seed != 1) add("--seed", std::to_string(options.seed));
   return line;
 }

@@ -9,6 +9,7 @@
 
 #include "animation.hpp"
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
 #include "thesis_quantities.hpp"
@@ -88,16 +89,17 @@ void print_steady(const data::Scene& scene) {
 }
 
 void simulate_scene(const Options& options) {
+  const fs::path named(options.scene);
+  const std::string stem = named.extension() == ".toml" ? named.stem().string() : options.scene;
+  const fs::path output =
+      options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
+  for (const fs::path& file : {output, options.animation}) check_output(file, {named});
   data::Scene scene = load_scene(options.scene);
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene);
   const model::Trajectory run = model::simulate(scene);
   data::Table table = as_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
-  const fs::path named(options.scene);
-  const std::string stem = named.extension() == ".toml" ? named.stem().string() : options.scene;
-  const fs::path output =
-      options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
   data::write_table(table, output);
   fmt::print("{}: {} rows, {}\n", output.string(), table.values.rows(),
              model::sentence(run.outcome));

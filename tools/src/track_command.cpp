@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -53,6 +54,8 @@ void write_timing(const fs::path& track, double seconds, const tracking::TrackSu
 
 void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
+  check_output(options.output, {options.video, options.scene, options.camera});
+  check_output(options.edges, {options.video, options.scene, options.camera, options.output});
   const data::Scene scene = scene_of(options);
   std::optional<data::Camera> camera;
   if (!options.camera.empty()) camera = data::read_camera(options.camera);
