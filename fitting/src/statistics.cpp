@@ -196,15 +196,22 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const double largest = std::max(singular.maxCoeff(), 1e-300);
   // 1e-9: below that the derivatives themselves (integrated at ~1e-8) are rounding.
   const double floor = 1e-9 * largest;
-  Eigen::VectorXd inverse(count);
+  // Standard deviation of what the data do not see at all, in natural sizes: no derivative says how
+  // large, and with small residuals 1 / floor would read as a sharp measurement.
+  const double unseen = std::max(1.0 / floor, 1e3);
+  Eigen::VectorXd inverse = Eigen::VectorXd::Zero(count);
+  Eigen::MatrixXd blind = Eigen::MatrixXd::Zero(count, count);
   for (int i = 0; i < count; ++i) {
-    inverse[i] = 1.0 / std::max(singular[i], floor);
-    if (singular[i] > std::max(1.0, floor)) {
+    const Eigen::VectorXd direction = svd.matrixV().col(i);
+    const bool seen = singular[i] > floor;
+    if (seen)
+      inverse[i] = 1.0 / singular[i];
+    else
+      blind += unseen * unseen * direction * direction.transpose();
+    if (seen && singular[i] > 1.0)
       ++result.rank;
-    } else {
-      result.null_vectors.push_back(
-          null_vector(problem, svd.matrixV().col(i), singular[i] > floor ? inverse[i] : INFINITY));
-    }
+    else
+      result.null_vectors.push_back(null_vector(problem, direction, seen ? inverse[i] : INFINITY));
   }
   result.condition = largest / std::max(singular.minCoeff(), 1e-300);
   const Eigen::MatrixXd bread =
@@ -237,6 +244,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
       covariance += shift * shift.transpose();
     }
   }
+  covariance += blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
