@@ -66,7 +66,8 @@ class Tracking {
       if (!follow_next_body(object)) break;
     if (paths_.empty())
       throw InputError(
-          fmt::format("{}: no moving body found; point at it in the first frame with --at x,y",
+          fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
+                      "[tracking] in the scene",
                       video_.string()));
     follow_the_rest();
     return result();
