@@ -130,10 +130,23 @@ class Tracking {
         path.frames[held[i].index] = {held[i].t_s, trimmed(std::move(*seen))};
     backward.get();
     path.frames.merge(before);
+    if (seed->seen.pose) mend(path, *seed, follower);
     explain(path);
     paths_.push_back(std::move(path));
     followers_.push_back(std::move(follower));
     return true;
+  }
+
+  void mend(BodyPath& path, const Seed& seed, std::unique_ptr<Follower>& ahead) const {
+    const auto& held = recording_.held();
+    HeldPath seen;
+    for (std::size_t i = 0; i < held.size(); ++i)
+      if (const auto at = path.frames.find(held[i].index); at != path.frames.end())
+        seen[i] = std::move(at->second.seen);
+    mend_mirrored(held, background_, *finder_, seed.held_index, seen, ahead);
+    path.frames.clear();
+    for (auto& [i, sighting] : seen)
+      path.frames[held[i].index] = {held[i].t_s, trimmed(std::move(sighting))};
   }
 
   [[nodiscard]] std::shared_ptr<const SpinProfile> marks_of(const Frame& frame,
