@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,7 @@
 #include "bootstrap.hpp"
 #include "derived.hpp"
 #include "find.hpp"
+#include "observed.hpp"
 #include "problem.hpp"
 #include "profile.hpp"
 #include "segments.hpp"
@@ -155,9 +157,24 @@ std::string outcome_word(const data::Fit& fit) {
   return fit.converged ? "converged" : "no_convergence";
 }
 
+// Standard deviations if scale and frame rate were exact: what two clips of one camera share falls
+// out of their comparison. Empty if neither is in doubt.
+Eigen::VectorXd sigma_of_one_camera(const Problem& problem, const Eigen::MatrixXd& covariance) {
+  std::vector<int> shared;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (const std::string name = problem.name(i); name == kScale || name == kTimeFactor)
+      shared.push_back(i);
+  if (shared.empty()) return {};
+  const Eigen::MatrixXd across = covariance(Eigen::all, shared);
+  const Eigen::MatrixXd reduced =
+      covariance - across * covariance(shared, shared).ldlt().solve(across.transpose());
+  return reduced.diagonal().cwiseMax(0.0).cwiseSqrt();
+}
+
 void report_parameters(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   const auto& infos = problem.predictor->parameters();
   fit.covariance = error.covariance;
+  const Eigen::VectorXd one_camera = sigma_of_one_camera(problem, error.covariance);
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     fit.covariance_names.push_back(problem.name(i));
     const FreeParameter& free = problem.free[i];
@@ -169,6 +186,9 @@ void report_parameters(const Problem& problem, const Uncertainty& error, data::F
     parameter.unit = infos[free.index].unit;
     parameter.identifiable = error.identifiable[i];
     parameter.note = infos[free.index].meaning;
+    if (one_camera.size() > 0 && infos[free.index].role == model::ParameterInfo::Role::dynamics)
+      parameter.note +=
+          fmt::format("; +- {:.2g} between clips of this scale and frame rate", one_camera[i]);
     if (free.held)
       parameter.note +=
           fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
@@ -270,12 +290,14 @@ void warn_unexplained(const Squares& sum, data::Fit& fit) {
 
 namespace {
 
-data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& predictor,
+data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
                    const std::vector<const model::Predictor*>& relatives,
                    const data::Scene& given_scene, const FitOptions& options) {
   if (tracks.empty()) throw InputError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
+  const auto wrapped = observed(plain, scene);
+  const model::Predictor& predictor = wrapped ? *wrapped : plain;
   const std::string model = predictor.model_name();
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
   problem.log = options.log;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "observed.hpp"
 #include "smoothing.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -179,6 +180,7 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
 
 bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   if (settings.fixed.contains(info.name)) return false;
+  if (info.name == kScale || info.name == kTimeFactor) return true;  // there only when asked for
   if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
     return settings.free_pivot || listed(settings.free, info.name);
   if (settings.free.empty() || info.role == ParameterInfo::Role::initial)

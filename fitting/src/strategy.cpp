@@ -107,9 +107,13 @@ Solution solve_to_the_end(Problem& problem) {
   const bool losses = std::any_of(problem.free.begin(), problem.free.end(),
                                   [&](const FreeParameter& p) { return is_loss(problem, p); });
   if (!losses) return solve(problem, problem.start());
+  constexpr double kNothing = 0.1;  // of chi-square: far below one sigma of anything
+  double before = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 6; ++round) {
     const Solution solution = solve(problem, problem.start(), {.iterations = 15});
-    if (!solution.usable || solution.converged) return solution;
+    const bool stands_still = before - solution.chi2 < kNothing;
+    if (!solution.usable || solution.converged || stands_still) return solution;
+    before = solution.chi2;
     hold_vanished(problem, solution.u);
   }
   return solve(problem, problem.start());
@@ -229,14 +233,16 @@ std::vector<int> window_sizes(const Problem& problem) {
 }  // namespace
 
 Found search(const Problem& problem, const Starter& starter) {
-  constexpr std::size_t kTried = 5;
+  // Where the angles were seen, starts differ little and a good one is known by its result.
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const std::size_t tried = seen ? 2 : 5;
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
-    for (std::size_t i = 0; i < std::min(kTried, starts.size()); ++i) {
+    for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window);
       if (better(found, best)) best = std::move(found);
-      if (best.passed) return best;
+      if (best.passed || (seen && best.unexplained < kExplained)) return best;
     }
     if (best.unexplained < kExplained) return best;
   }

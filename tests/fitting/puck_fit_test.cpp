@@ -92,6 +92,24 @@ TEST(PuckFit, LeavesOutWhatAHandDoes) {
   EXPECT_LT(std::abs(fit.find("friction")->value - kFriction), 4.0 * fit.find("friction")->sigma);
 }
 
+// mu = deceleration / g grows with the scale and with the square of the frame rate.
+TEST(PuckFit, CarriesScaleAndFrameRateIntoTheFriction) {
+  Throw thrown(4);
+  thrown.slide({1.0, 0.3}, 0.4);
+  data::Scene scene = puck_scene();
+  const data::Fit alone = fitting::fit(std::span(&thrown.track(), 1), scene);
+  scene.fit.prior["radius_m"] = {0.0155, 0.02 * 0.0155};
+  scene.fit.prior["frame_rate_hz"] = {240.0, 0.01 * 240.0};
+  scene.camera.frame_rate_hz = 240.0;
+  const data::Fit fit = fitting::fit(std::span(&thrown.track(), 1), scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  const double inner = alone.find("friction")->sigma;
+  const double expected = std::hypot(inner, 0.02 * kFriction, 2.0 * 0.01 * kFriction);
+  EXPECT_NEAR(fit.find("friction")->sigma, expected, 0.1 * expected);
+  EXPECT_NEAR(fit.find("friction")->value, kFriction, 4.0 * inner);
+  EXPECT_NE(fit.find("friction")->note.find("between clips"), std::string::npos);
+}
+
 TEST(PuckFit, RefusesABodyAtRest) {
   Throw thrown(3);
   thrown.slide({0.0, 0.0}, 1.0);

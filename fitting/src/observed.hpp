@@ -1,0 +1,22 @@
+#pragma once
+#include <memory>
+
+#include "trochoid/data/scene.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+inline constexpr const char* kScale = "scale";                   ///< measured over true length
+inline constexpr const char* kTimeFactor = "frame_rate_factor";  ///< true over measured duration
+
+/// What the way of measuring adds to a model, as further parameters (role observation):
+///   scale               x_measured = scale * x; with [fit] free_scale, a prior on "scale", or a
+///                       prior on radius_m when the known radius gave the metres;
+///   frame_rate_factor   t_true - t_start = factor * (t_measured - t_start); with a prior on
+///                       frame_rate_hz (a clip whose container lies).
+/// Writes their priors into scene.fit.prior.
+/// @returns null if the scene asks for neither.
+[[nodiscard]] std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor,
+                                                         data::Scene& scene);
+
+}  // namespace trochoid::fitting
