@@ -97,8 +97,30 @@ class Tracking {
     return camera_ && camera_->exposure_fraction ? *camera_->exposure_fraction : 0.0;
   }
 
+  /// Whether what was followed ever moved, or turned: a reflection or a clamp that trembles with
+  /// its stand does not.
+  static bool moves(const BodyPath& path) {
+    constexpr double kTrembles_px = 0.7, kOfItsSize = 0.12, kTurns_rad = 0.3;
+    std::vector<double> x, y, turned;
+    for (const auto& [index, at] : path.frames) {
+      x.push_back(at.seen.centre_px.x());
+      y.push_back(at.seen.centre_px.y());
+      if (at.seen.turned_rad) turned.push_back(*at.seen.turned_rad);
+    }
+    // From the fifth to the ninety-fifth of a hundred: single slips do not count.
+    const auto spread = [](std::vector<double>& values) {
+      if (values.empty()) return 0.0;
+      std::sort(values.begin(), values.end());
+      return values[values.size() * 95 / 100] - values[values.size() * 5 / 100];
+    };
+    const double still_px = std::max(kTrembles_px, kOfItsSize * usual_radius_px(path));
+    return std::hypot(spread(x), spread(y)) > still_px || spread(turned) > kTurns_rad ||
+           path.frames.begin()->second.seen.pose;
+  }
+
   /// Finds one more body in the held frames and follows it both ways. False if there is none.
-  bool follow_next_body(int object) {
+  /// @param attempts how many more times to look when what was found does not move.
+  bool follow_next_body(int object, int attempts = 4) {
     const auto& held = recording_.held();
     std::optional<Seed> seed;
     if (object == 0 && scene_.tracking.at_px) {
@@ -132,6 +154,7 @@ class Tracking {
     path.frames.merge(before);
     if (seed->seen.pose) mend(path, *seed, follower);
     explain(path);
+    if (!moves(path)) return attempts > 0 && follow_next_body(object, attempts - 1);
     paths_.push_back(std::move(path));
     followers_.push_back(std::move(follower));
     return true;
