@@ -25,10 +25,12 @@ void add_study_thesis(CLI::App& study);
 #ifdef TROCHOID_HAS_TRACKING
 void add_track_command(CLI::App& app);
 void add_study_tracking(CLI::App& study);
+void add_study_tracking_sweep(CLI::App& study);
 void add_init_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
 void add_render_command(CLI::App& app);
+void add_calibrate_command(CLI::App& app);
 #endif
 
 }  // namespace trochoid::tools

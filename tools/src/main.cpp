@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_overlay_command(app);
   add_run_command(app);
   add_render_command(app);
+  add_calibrate_command(app);
   add_init_command(app);
 #endif
   add_manual_command(app);

@@ -315,23 +315,24 @@ cv::Mat PictureRenderer::light(const std::vector<data::Pose<>>& during_exposure)
   return sum;
 }
 
+cv::Mat PictureRenderer::levels(const cv::Mat& light, double brightness) const {
+  cv::Mat out = light.clone();
+  if (style_.blur_px > 0.0)
+    cv::GaussianBlur(light, out, {}, style_.blur_px, style_.blur_px, cv::BORDER_REPLICATE);
+  for (int y = 0; y < out.rows; ++y) {
+    auto* row = out.ptr<float>(y);
+    for (int i = 0; i < 3 * out.cols; ++i)
+      row[i] = 255.0F * to_srgb(std::clamp(row[i] * static_cast<float>(brightness), 0.0F, 1.0F));
+  }
+  return out;
+}
+
 cv::Mat PictureRenderer::picture(const cv::Mat& light, std::int64_t index,
                                  double brightness) const {
-  cv::Mat blurred = light;
-  if (style_.blur_px > 0.0)
-    cv::GaussianBlur(light, blurred, {}, style_.blur_px, style_.blur_px, cv::BORDER_REPLICATE);
-  cv::Mat noise(light.size(), CV_32FC3);
+  cv::Mat noise(light.size(), CV_32FC3), out;
   cv::RNG random(style_.seed * 0x9E3779B97F4A7C15ULL + static_cast<std::uint64_t>(index) + 1);
   random.fill(noise, cv::RNG::NORMAL, 0.0, style_.noise_levels);
-  cv::Mat out(light.size(), CV_8UC3);
-  for (int y = 0; y < out.rows; ++y) {
-    const auto *in = blurred.ptr<float>(y), *added = noise.ptr<float>(y);
-    auto* to = out.ptr<std::uint8_t>(y);
-    for (int i = 0; i < 3 * out.cols; ++i) {
-      const float value = std::clamp(in[i] * static_cast<float>(brightness), 0.0F, 1.0F);
-      to[i] = cv::saturate_cast<std::uint8_t>(255.0F * to_srgb(value) + added[i]);
-    }
-  }
+  cv::Mat(levels(light, brightness) + noise).convertTo(out, CV_8UC3);
   return out;
 }
 

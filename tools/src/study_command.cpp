@@ -16,6 +16,7 @@ void add_study_command(CLI::App& app) {
   add_study_thesis(*study);
 #ifdef TROCHOID_HAS_TRACKING
   add_study_tracking(*study);
+  add_study_tracking_sweep(*study);
 #endif
 }
 

@@ -1,0 +1,186 @@
+#include "trochoid/tracking/calibration.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kSquare_m = 0.02;
+constexpr int kColumns = 9, kRows = 6;
+
+data::Camera lens() {
+  data::Camera camera;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  camera.fx = camera.fy = 900.0;
+  camera.cx = 327.0;
+  camera.cy = 233.5;
+  camera.distortion = {-0.2, 0.06, 0.0, 0.0, 0.0};
+  return camera;
+}
+
+// The lens looking at the middle of the board from a distance, tilted about x and y [rad].
+data::Camera looking(double distance_m, double about_x, double about_y) {
+  data::Camera camera = lens();
+  const Eigen::Matrix3d down = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  camera.camera_from_table = Eigen::AngleAxisd(about_x, Eigen::Vector3d::UnitX()) *
+                             Eigen::AngleAxisd(about_y, Eigen::Vector3d::UnitY()) * down;
+  camera.camera_from_table_m = {0.0, 0.0, distance_m};
+  return camera;
+}
+
+const std::vector<std::array<double, 3>> kLooks{{0.5, 0.0, 0.0},  {0.45, 0.5, 0.0},
+                                                {0.5, -0.5, 0.1}, {0.45, 0.0, 0.5},
+                                                {0.5, 0.1, -0.5}, {0.4, 0.3, 0.3}};
+
+// Blurred step: where `u` squares from the edge of the board lie in black or white, as -1 or +1.
+double stripes(double u, double px_per_square) {
+  constexpr double kBlur_px = 0.8;
+  const double edge = std::round(u);
+  const double side = static_cast<int>(edge) % 2 == 0 ? 1.0 : -1.0;
+  return side * std::tanh((u - edge) * px_per_square / kBlur_px);
+}
+
+// A chessboard lying on the table plane as the camera sees it; its corners are exact.
+cv::Mat draw_chessboard(const data::Camera& camera) {
+  const double px_per_square =
+      kSquare_m * camera.jacobian_px_per_m(Eigen::Vector3d::Zero()).col(0).norm();
+  cv::Mat picture(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(230));
+  for (int y = 0; y < picture.rows; ++y)
+    for (int x = 0; x < picture.cols; ++x) {
+      const Eigen::Vector3d p =
+          camera.table_from_image({static_cast<double>(x), static_cast<double>(y)});
+      const double u = p.x() / kSquare_m + 0.5 * (kColumns + 1);
+      const double v = p.y() / kSquare_m + 0.5 * (kRows + 1);
+      if (u < 0.0 || v < 0.0 || u > kColumns + 1 || v > kRows + 1) continue;
+      const double value = 130.0 - 100.0 * stripes(u, px_per_square) * stripes(v, px_per_square);
+      picture.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(value);
+    }
+  return picture;
+}
+
+TEST(Calibration, FindsTheCameraThatDrewTheBoards) {
+  std::vector<BoardView> views;
+  for (const auto& [distance, about_x, about_y] : kLooks) {
+    const auto view = find_board(draw_chessboard(looking(distance, about_x, about_y)),
+                                 {kColumns, kRows, kSquare_m, {}, {}}, "drawn");
+    ASSERT_TRUE(view);
+    views.push_back(*view);
+  }
+  Calibration result = calibrate(views, {640, 480});
+  // Corners are found to a few hundredths of a pixel; six views of 54 corners.
+  constexpr double kCorner_px = 0.05, kFocal_px = 1.5, kCentre_px = 1.5, kK1 = 0.01;
+  EXPECT_LT(result.rms_px, kCorner_px);
+  EXPECT_NEAR(result.camera.fx, 900.0, kFocal_px);
+  EXPECT_NEAR(result.camera.fy, 900.0, kFocal_px);
+  EXPECT_NEAR(result.camera.cx, 327.0, kCentre_px);
+  EXPECT_NEAR(result.camera.cy, 233.5, kCentre_px);
+  EXPECT_NEAR(result.camera.distortion[0], -0.2, kK1);
+  // Five sigma hold the truth.
+  EXPECT_LT(std::abs(result.camera.fx - 900.0), 5.0 * result.sigma_focal_px + 0.1);
+  // The first board lies on the floor, 3 mm thick.
+  constexpr double kThick_m = 0.003, kHeight_m = 0.001;
+  const double rms = set_floor(result.camera, {views[0].board_m, views[0].image_px}, kThick_m);
+  EXPECT_LT(rms, kCorner_px);
+  EXPECT_NEAR(result.camera.position_m().z(), 0.5 + kThick_m, kHeight_m);
+  EXPECT_NEAR(result.camera.position_m().head<2>().norm(), 0.0, kHeight_m);
+}
+
+TEST(Calibration, PlacesTheFloorByFourPoints) {
+  const data::Camera truth = looking(0.6, 0.3, -0.2);
+  FloorPoints points;
+  for (const auto& p : {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(0.1, 0.0),
+                        Eigen::Vector2d(0.1, 0.08), Eigen::Vector2d(0.0, 0.08)}) {
+    points.table_m.push_back(p);
+    points.image_px.push_back(truth.image_from_table<double>({p.x(), p.y(), 0.0}));
+  }
+  data::Camera camera = lens();
+  EXPECT_LT(set_floor(camera, points, 0.0), 1e-6);
+  EXPECT_LT((camera.position_m() - truth.position_m()).norm(), 1e-6);
+  EXPECT_LT((camera.camera_from_table - truth.camera_from_table).norm(), 1e-6);
+  points.table_m.pop_back();
+  points.image_px.pop_back();
+  EXPECT_THROW((void)set_floor(camera, points, 0.0), InputError);
+}
+
+TEST(Calibration, PlacesTheFloorByACircle) {
+  const data::Camera truth = looking(0.6, 0.35, -0.1);
+  constexpr double kRadius_m = 0.04, kHeight_m = 0.008;
+  std::vector<Eigen::Vector2d> rim;
+  for (int i = 0; i < 24; ++i) {
+    const double a = 2.0 * std::numbers::pi * i / 24;
+    rim.push_back(truth.image_from_table<double>(
+        {kRadius_m * std::cos(a) + 0.01, kRadius_m * std::sin(a), kHeight_m}));
+  }
+  data::Camera camera = lens();
+  EXPECT_LT(set_floor_from_circle(camera, rim, kRadius_m, kHeight_m), 1e-6);
+  EXPECT_NEAR(camera.position_m().z(), truth.position_m().z(), 1e-6);
+  const Eigen::Vector3d up = camera.camera_from_table.col(2);
+  EXPECT_LT((up - truth.camera_from_table.col(2)).norm(), 1e-6);
+}
+
+TEST(Calibration, ReadsACharucoBoardAlsoWhenPartOfItIsHidden) {
+  const auto board = cv::aruco::CharucoBoard::create(
+      7, 5, 0.02F, 0.015F, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50));
+  cv::Mat picture;
+  board->draw({560, 400}, picture, 0, 1);
+  cv::copyMakeBorder(picture, picture, 40, 40, 40, 40, cv::BORDER_CONSTANT, cv::Scalar(255));
+  picture(cv::Rect(0, 0, 120, 120)).setTo(128);
+  const auto view = find_board(picture, {7, 5, 0.02, 0.015, "4X4_50"}, "charuco");
+  ASSERT_TRUE(view);
+  ASSERT_GT(view->image_px.size(), 15U);
+  // 80 px per square, the middle of the board in the middle of the picture.
+  constexpr double kCorner_px = 0.1;
+  for (std::size_t i = 0; i < view->image_px.size(); ++i) {
+    const Eigen::Vector2d expected(319.5 + 4000.0 * view->board_m[i].x(),
+                                   239.5 - 4000.0 * view->board_m[i].y());
+    EXPECT_LT((view->image_px[i] - expected).norm(), kCorner_px) << i;
+  }
+}
+
+TEST(Calibration, RefusesTooLittle) {
+  EXPECT_FALSE(find_board(cv::Mat(240, 320, CV_8UC1, cv::Scalar(128)), {}, "grey"));
+  EXPECT_THROW((void)calibrate({}, {640, 480}), InputError);
+  BoardPattern pattern;
+  pattern.square_m = 0.0;
+  EXPECT_THROW((void)find_board(cv::Mat(240, 320, CV_8UC1), pattern, "x"), InputError);
+}
+
+// Photo-realistic boards by another renderer, with its camera.
+TEST(Calibration, FindsTheCameraOfARenderedRecording) {
+  const std::filesystem::path folder =
+      std::filesystem::path(TROCHOID_SHARED_DIR) / "recordings/rendered/s3_disc_marker_tilted";
+  if (!std::filesystem::exists(folder / "calib")) GTEST_SKIP() << "no recordings";
+  std::vector<BoardView> views;
+  cv::Size size;
+  for (int i = 0; i < 10; ++i) {
+    const std::string name = "view_0" + std::to_string(i) + ".png";
+    const cv::Mat picture = cv::imread((folder / "calib" / name).string(), cv::IMREAD_GRAYSCALE);
+    size = picture.size();
+    if (auto view = find_board(picture, {9, 6, 0.02, {}, {}}, name)) views.push_back(*view);
+  }
+  ASSERT_GE(views.size(), 8U);
+  Calibration result = calibrate(views, size);
+  const data::Camera truth = data::read_camera(folder / "camera.json");
+  constexpr double kFocal_px = 3.0, kPosition_m = 0.002;
+  EXPECT_LT(result.rms_px, 0.15);
+  EXPECT_NEAR(result.camera.fx, truth.fx, kFocal_px);
+  EXPECT_NEAR(result.camera.distortion[0], truth.distortion[0], 0.01);
+  (void)set_floor(result.camera, {views[0].board_m, views[0].image_px}, 0.003);
+  EXPECT_NEAR(result.camera.position_m().z(), truth.position_m().z(), kPosition_m);
+  EXPECT_NEAR(result.camera.position_m().norm(), truth.position_m().norm(), kPosition_m);
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,238 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/tracking/calibration.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::vector<fs::path> inputs;
+  std::string pattern = "9x6", dictionary = "4X4_50", floor;
+  double square_mm = 0.0, marker_mm = 0.0, floor_height_mm = 0.0, radius_mm = 0.0;
+  fs::path floor_points, circle_points, output, picture;
+};
+
+tracking::BoardPattern pattern_of(const Options& options) {
+  tracking::BoardPattern pattern;
+  char rest = 0;
+  if (std::sscanf(options.pattern.c_str(), "%dx%d%c", &pattern.columns, &pattern.rows, &rest) != 2)
+    throw InputError(fmt::format("--pattern {}: write columns x rows, e.g. 9x6", options.pattern));
+  pattern.square_m = 1e-3 * options.square_mm;
+  if (options.marker_mm > 0.0) pattern.marker_m = 1e-3 * options.marker_mm;
+  pattern.dictionary = options.dictionary;
+  return pattern;
+}
+
+// Pictures with the board found in them, all of one size.
+struct Views {
+  std::vector<tracking::BoardView> found;
+  std::vector<cv::Mat> pictures;  ///< of `found`
+  cv::Size size;
+  int looked_at = 0;
+
+  void look(const cv::Mat& luma, const std::string& name, const tracking::BoardPattern& pattern) {
+    if (looked_at++ == 0) size = luma.size();
+    if (luma.size() != size)
+      throw InputError(
+          fmt::format("{} is {} x {}, the pictures before it {} x {}; one camera has "
+                      "one size",
+                      name, luma.cols, luma.rows, size.width, size.height));
+    if (auto view = tracking::find_board(luma, pattern, name)) {
+      found.push_back(std::move(*view));
+      pictures.push_back(luma);
+    }
+  }
+};
+
+// A video shows the board in hundreds of frames: two per second are looked at, and of those found
+// only the ones where it has moved.
+void look_through_video(const fs::path& path, const tracking::BoardPattern& pattern, Views& views) {
+  constexpr double kEvery_s = 0.5, kMoved = 0.03;
+  constexpr std::size_t kMost = 40;
+  const auto source = tracking::open_video(path);
+  double next_s = 0.0;
+  while (auto frame = source->next()) {
+    if (frame->t_s < next_s) continue;
+    next_s = frame->t_s + kEvery_s;
+    const std::size_t before = views.found.size();
+    views.look(frame->luma, fmt::format("{} frame {}", path.string(), frame->index), pattern);
+    if (views.found.size() < 2 || views.found.size() == before) continue;
+    const auto &a = views.found[before - 1].image_px, &b = views.found[before].image_px;
+    double moved = 0.0;
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+      moved += (a[i] - b[i]).norm() / static_cast<double>(std::min(a.size(), b.size()));
+    if (moved < kMoved * frame->luma.cols) views.found.pop_back(), views.pictures.pop_back();
+    if (views.found.size() >= kMost) break;
+  }
+}
+
+Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
+  Views views;
+  Progress progress("calibrate", "files");
+  std::int64_t done = 0;
+  for (const fs::path& path : options.inputs) {
+    if (!fs::exists(path)) throw InputError(fmt::format("{}: no such file", path.string()));
+    const cv::Mat picture = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+    if (!picture.empty())
+      views.look(picture, path.string(), pattern);
+    else
+      look_through_video(path, pattern, views);
+    progress.update(++done, static_cast<std::int64_t>(options.inputs.size()));
+  }
+  if (views.found.size() < 3)
+    throw InputError(fmt::format(
+        "the board ({} of {:g} mm) is whole in {} of {} pictures; three are needed. Is --pattern "
+        "the number of {}?",
+        options.pattern, options.square_mm, views.found.size(), views.looked_at,
+        pattern.marker_m ? "squares" : "inner corners"));
+  return views;
+}
+
+std::size_t floor_view(const Options& options, const Views& views) {
+  if (options.floor.empty()) return 0;
+  for (std::size_t i = 0; i < views.found.size(); ++i) {
+    const std::string& name = views.found[i].name;
+    if (name == options.floor || fs::path(name).filename() == options.floor) return i;
+  }
+  throw InputError(
+      fmt::format("--floor {}: none of the pictures with a board has this name", options.floor));
+}
+
+std::vector<Eigen::Vector2d> points(const data::Table& table, const char* x, const char* y) {
+  const Eigen::VectorXd u = table.column(x), v = table.column(y);
+  std::vector<Eigen::Vector2d> out;
+  for (Eigen::Index i = 0; i < u.size(); ++i) out.emplace_back(u[i], v[i]);
+  return out;
+}
+
+// The table frame from whatever says where the floor is; a sentence about it.
+std::string place_floor(const Options& options, const Views& views, data::Camera& camera) {
+  const double height_m = 1e-3 * options.floor_height_mm;
+  if (!options.floor_points.empty()) {
+    const data::Table table = data::read_table(options.floor_points);
+    const tracking::FloorPoints floor{points(table, "x_m", "y_m"), points(table, "x_px", "y_px")};
+    const double rms = tracking::set_floor(camera, floor, height_m);
+    return fmt::format("floor from {} points, rms {:.3f} px", floor.table_m.size(), rms);
+  }
+  if (!options.circle_points.empty()) {
+    if (!(options.radius_mm > 0.0))
+      throw InputError("--circle-points needs --radius-mm, the radius of the circle");
+    const data::Table table = data::read_table(options.circle_points);
+    const double rms = tracking::set_floor_from_circle(camera, points(table, "x_px", "y_px"),
+                                                       1e-3 * options.radius_mm, height_m);
+    return fmt::format("floor from a circle, rms {:.3f} px", rms);
+  }
+  const tracking::BoardView& view = views.found[floor_view(options, views)];
+  const double rms = tracking::set_floor(camera, {view.board_m, view.image_px}, height_m);
+  return fmt::format(
+      "floor: the board in {}, rms {:.3f} px{}", view.name, rms,
+      options.floor.empty() ? " (the first picture; choose another with --floor)" : "");
+}
+
+// The corners found and, twenty times enlarged, how far the camera puts them elsewhere.
+void draw_check(const Options& options, const Views& views, data::Camera camera) {
+  constexpr double kEnlarged = 20.0;
+  const std::size_t shown = floor_view(options, views);
+  const tracking::BoardView& view = views.found[shown];
+  (void)tracking::set_floor(camera, {view.board_m, view.image_px}, 0.0);
+  cv::Mat picture;
+  cv::cvtColor(views.pictures[shown], picture, cv::COLOR_GRAY2BGR);
+  const cv::Scalar blue(178, 114, 0), vermillion(0, 94, 213);
+  for (std::size_t i = 0; i < view.image_px.size(); ++i) {
+    const Eigen::Vector2d at = view.image_px[i];
+    const Eigen::Vector2d there =
+        camera.image_from_table<double>({view.board_m[i].x(), view.board_m[i].y(), 0.0});
+    const Eigen::Vector2d tip = at + kEnlarged * (there - at);
+    cv::circle(picture, cv::Point2d(at.x(), at.y()), 4, blue, 1, cv::LINE_AA);
+    cv::line(picture, cv::Point2d(at.x(), at.y()), cv::Point2d(tip.x(), tip.y()), vermillion, 2,
+             cv::LINE_AA);
+  }
+  cv::putText(picture, "residuals x 20", {12, picture.rows - 14}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
+              vermillion, 1, cv::LINE_AA);
+  data::PendingFile pending(options.picture);
+  if (!cv::imwrite(pending.path().string(), picture))
+    throw InputError(fmt::format("{}: cannot be written; use .png", options.picture.string()));
+  pending.commit();
+}
+
+void run(const Options& options) {
+  const tracking::BoardPattern pattern = pattern_of(options);
+  const Views views = look_at_inputs(options, pattern);
+  tracking::Calibration result = tracking::calibrate(views.found, views.size);
+  const std::string floor = place_floor(options, views, result.camera);
+  if (!options.picture.empty()) draw_check(options, views, result.camera);
+  data::write_camera(result.camera, options.output);
+  const auto worst = std::max_element(result.view_rms_px.begin(), result.view_rms_px.end());
+  const data::Camera& c = result.camera;
+  fmt::print(
+      "{}: board found in {} of {} pictures, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
+      options.output.string(), views.found.size(), views.looked_at, result.rms_px, *worst,
+      views.found[static_cast<std::size_t>(worst - result.view_rms_px.begin())].name);
+  fmt::print(
+      "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
+      "{:.4f}, k2 {:.4f}\n",
+      c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
+      result.sigma_k1, c.distortion[1]);
+  const Eigen::Vector3d at = c.position_m();
+  fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
+  constexpr double kPoor_px = 1.0;
+  if (result.rms_px > kPoor_px)
+    throw NotGood(
+        fmt::format("reprojection rms {:.2f} px is poor: a bent board, motion blur or "
+                    "wrong corners",
+                    result.rms_px));
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("calibrate", "Find a camera from pictures of a board, and the floor");
+  command->add_option("inputs", options->inputs, "Pictures of the board, or a video of it")
+      ->required();
+  command->add_option("--pattern", options->pattern,
+                      "Inner corners of a chessboard, squares of a ChArUco board [9x6]");
+  command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
+      ->required()
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--marker-mm", options->marker_mm,
+                   "Side of a marker [mm]: the board is a ChArUco board")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]");
+  command->add_option("--floor", options->floor,
+                      "Picture in which the board lies on the floor [the first]");
+  command->add_option("--floor-height-mm", options->floor_height_mm,
+                      "Height of that board, of the points or of the circle above the floor [0]");
+  command
+      ->add_option("--floor-points", options->floor_points,
+                   "CSV with x_px, y_px, x_m, y_m of four or more points of the floor")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--circle-points", options->circle_points,
+                   "CSV with x_px, y_px of points on the rim of a body at rest on its face")
+      ->check(CLI::ExistingFile);
+  command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
+  command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

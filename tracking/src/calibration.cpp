@@ -1,0 +1,298 @@
+#include "trochoid/tracking/calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+void check(const BoardPattern& pattern) {
+  if (pattern.columns < 3 || pattern.rows < 3)
+    throw InputError(
+        fmt::format("a board of {} x {}: give at least 3 x 3", pattern.columns, pattern.rows));
+  if (!(pattern.square_m > 0.0)) throw InputError("the squares of the board need a size above 0");
+  if (pattern.marker_m && !(*pattern.marker_m > 0.0 && *pattern.marker_m < pattern.square_m))
+    throw InputError("the markers of a ChArUco board must be smaller than its squares");
+}
+
+cv::Ptr<cv::aruco::Dictionary> dictionary_named(const std::string& name) {
+  static const std::map<std::string, cv::aruco::PREDEFINED_DICTIONARY_NAME> kKnown{
+      {"4X4_50", cv::aruco::DICT_4X4_50},   {"4X4_100", cv::aruco::DICT_4X4_100},
+      {"4X4_250", cv::aruco::DICT_4X4_250}, {"5X5_50", cv::aruco::DICT_5X5_50},
+      {"5X5_100", cv::aruco::DICT_5X5_100}, {"5X5_250", cv::aruco::DICT_5X5_250},
+      {"6X6_50", cv::aruco::DICT_6X6_50},   {"6X6_100", cv::aruco::DICT_6X6_100},
+      {"6X6_250", cv::aruco::DICT_6X6_250}, {"7X7_250", cv::aruco::DICT_7X7_250}};
+  const auto found = kKnown.find(name);
+  if (found != kKnown.end()) return cv::aruco::getPredefinedDictionary(found->second);
+  std::string known;
+  for (const auto& [each, value] : kKnown) known += (known.empty() ? "" : ", ") + each;
+  throw InputError(fmt::format("no dictionary \"{}\"; known are {}", name, known));
+}
+
+// Board coordinates with the origin in the middle and y up: z then points out of the board.
+Eigen::Vector2d centred(const cv::Point2d& corner, double width_m, double height_m) {
+  return {corner.x - 0.5 * width_m, 0.5 * height_m - corner.y};
+}
+
+// Corners to where the edges around them cross, looking less than half way to the next corner.
+void sharpen(const cv::Mat& luma, std::vector<cv::Point2f>& corners) {
+  constexpr double kShare = 0.3, kSettled_px = 1e-4;
+  constexpr int kSteps = 60;
+  double nearest = 1e9;
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      nearest = std::min(nearest, cv::norm(corners[i] - corners[j]));
+  const int half = std::clamp(static_cast<int>(kShare * nearest), 2, 12);
+  cv::cornerSubPix(luma, corners, {half, half}, {-1, -1},
+                   {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, kSteps, kSettled_px});
+}
+
+std::optional<BoardView> find_chessboard(const cv::Mat& luma, const BoardPattern& pattern) {
+  const cv::Size size(pattern.columns, pattern.rows);
+  std::vector<cv::Point2f> corners;
+  if (!cv::findChessboardCorners(luma, size, corners) &&
+      !cv::findChessboardCornersSB(luma, size, corners,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE))
+    return std::nullopt;
+  sharpen(luma, corners);
+  BoardView view;
+  const double width = (size.width - 1) * pattern.square_m;
+  const double height = (size.height - 1) * pattern.square_m;
+  for (int i = 0; i < size.area(); ++i) {
+    const cv::Point2d at(pattern.square_m * (i % size.width), pattern.square_m * (i / size.width));
+    view.board_m.push_back(centred(at, width, height));
+    const auto& p = corners[static_cast<std::size_t>(i)];
+    view.image_px.emplace_back(p.x, p.y);
+  }
+  return view;
+}
+
+std::optional<BoardView> find_charuco(const cv::Mat& luma, const BoardPattern& pattern) {
+  constexpr int kFewest = 6;
+  const auto board = cv::aruco::CharucoBoard::create(
+      pattern.columns, pattern.rows, static_cast<float>(pattern.square_m),
+      static_cast<float>(*pattern.marker_m), dictionary_named(pattern.dictionary));
+  std::vector<std::vector<cv::Point2f>> markers;
+  std::vector<int> ids, corner_ids;
+  cv::aruco::detectMarkers(luma, board->dictionary, markers, ids);
+  if (ids.empty()) return std::nullopt;
+  std::vector<cv::Point2f> corners;
+  cv::aruco::interpolateCornersCharuco(markers, ids, luma, board, corners, corner_ids);
+  if (static_cast<int>(corners.size()) < kFewest) return std::nullopt;
+  sharpen(luma, corners);  // what comes out is half a pixel off in this version
+  BoardView view;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    // This version's boards count y upwards from the lower edge.
+    const cv::Point3f at = board->chessboardCorners[static_cast<std::size_t>(corner_ids[i])];
+    view.board_m.emplace_back(at.x - 0.5 * pattern.columns * pattern.square_m,
+                              at.y - 0.5 * pattern.rows * pattern.square_m);
+    view.image_px.emplace_back(corners[i].x, corners[i].y);
+  }
+  return view;
+}
+
+cv::Mat matrix_of(const data::Camera& camera) {
+  return (cv::Mat_<double>(3, 3) << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0,
+          1.0);
+}
+
+// A board seen from above has its x, y counted like the table's when seen in a mirror: all views of
+// it must show the side whose z points to the camera, or the corners were found the wrong way
+// round.
+bool seen_from_above(const BoardView& view) {
+  Eigen::Vector2d board_mean = Eigen::Vector2d::Zero(), image_mean = Eigen::Vector2d::Zero();
+  const auto n = static_cast<double>(view.board_m.size());
+  for (std::size_t i = 0; i < view.board_m.size(); ++i)
+    board_mean += view.board_m[i] / n, image_mean += view.image_px[i] / n;
+  Eigen::Matrix2d cross = Eigen::Matrix2d::Zero();
+  for (std::size_t i = 0; i < view.board_m.size(); ++i)
+    cross += (view.image_px[i] - image_mean) * (view.board_m[i] - board_mean).transpose();
+  return cross.determinant() < 0.0;  // image y points down
+}
+
+double rms_px(const data::Camera& camera, const FloorPoints& points, double height_m) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < points.table_m.size(); ++i)
+    sum +=
+        (camera.image_from_table<double>({points.table_m[i].x(), points.table_m[i].y(), height_m}) -
+         points.image_px[i])
+            .squaredNorm();
+  return std::sqrt(0.5 * sum / static_cast<double>(points.table_m.size()));
+}
+
+}  // namespace
+
+std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pattern,
+                                    const std::string& name) {
+  check(pattern);
+  auto view = pattern.marker_m ? find_charuco(luma, pattern) : find_chessboard(luma, pattern);
+  if (!view) return std::nullopt;
+  view->name = name;
+  if (!seen_from_above(*view))
+    for (Eigen::Vector2d& p : view->board_m) p.y() = -p.y();
+  return view;
+}
+
+Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_px) {
+  constexpr std::size_t kFewest = 3;
+  if (views.size() < kFewest)
+    throw InputError(
+        fmt::format("{} views of the board; at least {} from different directions "
+                    "make a camera",
+                    views.size(), kFewest));
+  std::vector<std::vector<cv::Point3f>> board;
+  std::vector<std::vector<cv::Point2f>> image;
+  for (const BoardView& view : views) {
+    board.emplace_back();
+    image.emplace_back();
+    for (std::size_t i = 0; i < view.board_m.size(); ++i) {
+      board.back().emplace_back(static_cast<float>(view.board_m[i].x()),
+                                static_cast<float>(view.board_m[i].y()), 0.0F);
+      image.back().emplace_back(static_cast<float>(view.image_px[i].x()),
+                                static_cast<float>(view.image_px[i].y()));
+    }
+  }
+  cv::Mat matrix, distortion, intrinsic_sd, extrinsic_sd, view_rms;
+  std::vector<cv::Mat> rotations, translations;
+  double rms = 0.0;
+  try {
+    rms = cv::calibrateCamera(board, image, size_px, matrix, distortion, rotations, translations,
+                              intrinsic_sd, extrinsic_sd, view_rms, cv::CALIB_FIX_K3);
+  } catch (const cv::Exception& error) {
+    throw NumericalError(fmt::format("the views determine no camera ({})", error.err));
+  }
+  Calibration out;
+  data::Camera& camera = out.camera;
+  camera.width_px = size_px.width;
+  camera.height_px = size_px.height;
+  camera.fx = matrix.at<double>(0, 0);
+  camera.fy = matrix.at<double>(1, 1);
+  camera.cx = matrix.at<double>(0, 2);
+  camera.cy = matrix.at<double>(1, 2);
+  for (int i = 0; i < 5; ++i)
+    camera.distortion[static_cast<std::size_t>(i)] = distortion.at<double>(i);
+  out.rms_px = rms / std::sqrt(2.0);  // OpenCV counts both coordinates of a corner as one
+  for (int i = 0; i < view_rms.rows; ++i)
+    out.view_rms_px.push_back(view_rms.at<double>(i) / std::sqrt(2.0));
+  out.sigma_focal_px = std::max(intrinsic_sd.at<double>(0), intrinsic_sd.at<double>(1));
+  out.sigma_centre_px = std::max(intrinsic_sd.at<double>(2), intrinsic_sd.at<double>(3));
+  out.sigma_k1 = intrinsic_sd.at<double>(4);
+  constexpr double kUseless = 0.2;
+  if (!std::isfinite(camera.fx) || !(camera.fx > 0.0 && camera.fy > 0.0) ||
+      out.sigma_focal_px > kUseless * camera.fx)
+    throw NumericalError(
+        "the views determine no camera; tilt the board by 20 to 40 degrees, in "
+        "different directions");
+  return out;
+}
+
+double set_floor(data::Camera& camera, const FloorPoints& points, double height_m) {
+  const std::size_t n = points.table_m.size();
+  if (n < 4 || n != points.image_px.size())
+    throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
+  std::vector<cv::Point3d> table;
+  std::vector<cv::Point2d> image;
+  Eigen::MatrixXd spread(2, static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    table.emplace_back(points.table_m[i].x(), points.table_m[i].y(), 0.0);
+    image.emplace_back(points.image_px[i].x(), points.image_px[i].y());
+    spread.col(static_cast<Eigen::Index>(i)) = points.table_m[i] - points.table_m[0];
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> singular(spread);
+  if (singular.singularValues()[1] < 1e-3 * singular.singularValues()[0])
+    throw InputError("the points of the floor lie on one line");
+  cv::Mat rotation, translation, attitude;
+  const std::vector<double> distortion(camera.distortion.begin(), camera.distortion.end());
+  bool solved = cv::solvePnP(table, image, matrix_of(camera), distortion, rotation, translation,
+                             false, cv::SOLVEPNP_IPPE);
+  if (solved)
+    cv::solvePnPRefineLM(table, image, matrix_of(camera), distortion, rotation, translation);
+  if (!solved) throw NumericalError("the points of the floor determine no pose of the camera");
+  cv::Rodrigues(rotation, attitude);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      camera.camera_from_table(row, column) = attitude.at<double>(row, column);
+    camera.camera_from_table_m[row] = translation.at<double>(row);
+  }
+  // What was z = 0 is height_m above the floor.
+  camera.camera_from_table_m -= camera.camera_from_table.col(2) * height_m;
+  if (camera.position_m().z() <= height_m)
+    throw InputError(
+        "the points of the floor are seen from below; x, y and up must be "
+        "right-handed as seen by the camera");
+  return rms_px(camera, points, height_m);
+}
+
+double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
+                             double radius_m, double height_m) {
+  constexpr std::size_t kFewest = 6;
+  constexpr int kIterations = 50;
+  if (rim_px.size() < kFewest)
+    throw InputError(
+        fmt::format("{} points of the rim; at least {} are needed", rim_px.size(), kFewest));
+  // The circle in camera axes: centre (3) and the plane's tilt about the line of sight (2),
+  // starting square to it at the distance its mean size says.
+  std::vector<Eigen::Vector3d> rays;
+  data::Camera bare = camera;
+  bare.camera_from_table.setIdentity();
+  bare.camera_from_table_m.setZero();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector2d& p : rim_px) {
+    const Eigen::Vector3d d = bare.ray_from_image(p).direction;
+    rays.push_back(d / d.z());
+    middle += rays.back() / static_cast<double>(rim_px.size());
+  }
+  double size = 0.0;
+  for (const auto& ray : rays) size += (ray - middle).norm() / static_cast<double>(rays.size());
+  Eigen::Matrix<double, 5, 1> x;
+  x << middle * (radius_m / size), 0.0, 0.0;
+  const auto residuals = [&](const Eigen::Matrix<double, 5, 1>& at) {
+    const Eigen::Vector3d centre = at.head<3>();
+    const Eigen::Vector3d normal = Eigen::Vector3d(at[3], at[4], -1.0).normalized();
+    Eigen::VectorXd r(static_cast<Eigen::Index>(rays.size()));
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const Eigen::Vector3d p = rays[i] * (centre.dot(normal) / rays[i].dot(normal));
+      r[static_cast<Eigen::Index>(i)] = ((p - centre).norm() - radius_m) * camera.fx / centre.z();
+    }
+    return r;
+  };
+  double damping = 1e-3;
+  for (int i = 0; i < kIterations; ++i) {
+    const Eigen::VectorXd r = residuals(x);
+    Eigen::MatrixXd J(r.size(), 5);
+    for (int k = 0; k < 5; ++k) {
+      Eigen::Matrix<double, 5, 1> moved = x;
+      const double step = 1e-6 * (k < 3 ? x[2] : 1.0);
+      moved[k] += step;
+      J.col(k) = (residuals(moved) - r) / step;
+    }
+    Eigen::Matrix<double, 5, 5> normal = J.transpose() * J;
+    normal.diagonal() *= 1.0 + damping;
+    const Eigen::Matrix<double, 5, 1> next = x - normal.ldlt().solve(J.transpose() * r);
+    const bool better = next.allFinite() && residuals(next).squaredNorm() < r.squaredNorm();
+    damping *= better ? 0.3 : 10.0;
+    if (better) x = next;
+    if (damping > 1e9) break;
+  }
+  const Eigen::Vector3d up = Eigen::Vector3d(x[3], x[4], -1.0).normalized();
+  const Eigen::Vector3d right =
+      (Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitX().dot(up) * up).normalized();
+  camera.camera_from_table.col(0) = right;
+  camera.camera_from_table.col(1) = up.cross(right);
+  camera.camera_from_table.col(2) = up;
+  camera.camera_from_table_m = x.head<3>() - height_m * up;
+  const Eigen::VectorXd left = residuals(x);
+  return std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
+}
+
+}  // namespace trochoid::tracking
