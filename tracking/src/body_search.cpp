@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 
 #include "silhouette.hpp"
 
@@ -128,9 +129,12 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
   return best;
 }
 
-std::optional<Seed> find_seed_at(const std::vector<Frame>& held, const Background& background,
-                                 const BodyFinder& finder, const Eigen::Vector2d& at_px) {
-  const Frame& frame = held.front();
+namespace {
+
+std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index,
+                               const Background& background, const BodyFinder& finder,
+                               const Eigen::Vector2d& at_px) {
+  const Frame& frame = held[index];
   Look look{
       .frame = frame, .background = background.plate(), .noise_levels = background.noise_levels()};
   std::vector<Detection> guesses;
@@ -160,10 +164,32 @@ std::optional<Seed> find_seed_at(const std::vector<Frame>& held, const Backgroun
     const double value = seen->accepted / (0.5 + seen->rms_px);
     if (holds_point && seen->accepted > 0.4 && value > best_value) {
       best_value = value;
-      best = Seed{0, *seen};
+      best = Seed{index, *seen};
     }
   }
   return best;
+}
+
+}  // namespace
+
+std::optional<Seed> find_seed_at(const std::vector<Frame>& held, const Background& background,
+                                 const BodyFinder& finder, const Eigen::Vector2d& at_px) {
+  return seed_about(held, 0, background, finder, at_px);
+}
+
+std::optional<Seed> find_seed_turning(const std::vector<Frame>& held, const Background& background,
+                                      const BodyFinder& finder) {
+  std::vector<std::vector<cv::Point>> regions;
+  cv::Mat closed;
+  cv::morphologyEx(background.active(), closed, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  cv::findContours(closed, regions, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+  if (regions.empty()) return std::nullopt;
+  const auto largest = std::max_element(
+      regions.begin(), regions.end(),
+      [](const auto& a, const auto& b) { return cv::contourArea(a) < cv::contourArea(b); });
+  const cv::Moments m = cv::moments(*largest);
+  if (m.m00 < 100.0) return std::nullopt;
+  return seed_about(held, held.size() / 2, background, finder, {m.m10 / m.m00, m.m01 / m.m00});
 }
 
 }  // namespace trochoid::tracking

@@ -29,6 +29,12 @@ struct Seed {
                                             const Background& background, const BodyFinder& finder,
                                             const std::vector<Follower::Others>& explained);
 
+/// A body that turns in place: it never leaves its background, only its marks change. The circle of
+/// any size that fits best about the middle of the largest changing region, in the middle frame.
+[[nodiscard]] std::optional<Seed> find_seed_turning(const std::vector<Frame>& held,
+                                                    const Background& background,
+                                                    const BodyFinder& finder);
+
 /// The body at a point of the first held frame, given by the user: the region there, or the circle
 /// of any size that fits best.
 [[nodiscard]] std::optional<Seed> find_seed_at(const std::vector<Frame>& held,

@@ -120,7 +120,8 @@ class Tracking {
 
   /// Finds one more body in the held frames and follows it both ways. False if there is none.
   /// @param attempts how many more times to look when what was found does not move.
-  bool follow_next_body(int object, int attempts = 4) {
+  static constexpr int kAttempts = 4;
+  bool follow_next_body(int object, int attempts = kAttempts) {
     const auto& held = recording_.held();
     std::optional<Seed> seed;
     if (object == 0 && scene_.tracking.at_px) {
@@ -129,7 +130,9 @@ class Tracking {
         throw InputError(
             fmt::format("{}: no rim found around the point given with --at", video_.string()));
     } else {
-      seed = find_seed(held, background_, *finder_, explained_);
+      if (attempts < kAttempts) seed = find_seed_turning(held, background_, *finder_);
+      if (!seed || attempts < kAttempts - 1)
+        seed = find_seed(held, background_, *finder_, explained_);
     }
     if (!seed) return false;
     seed = better_reading(held, background_, *finder_, std::move(*seed));
