@@ -115,7 +115,9 @@ void run(const FitCommand& command) {
   fit.scene_toml = data::to_toml(scene);
   if (!command.output.empty()) data::write_fit(fit, command.output);
   print(fit);
-  if (!fit.converged) throw NotGood(fmt::format("the fit did not converge: {}", fit.reason));
+  if (!fit.converged)
+    throw NotGood(fmt::format("the fit did not converge: {}{}", fit.reason,
+                              command.compare ? "" : "; --compare tries what the model lacks"));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -119,10 +120,15 @@ void fit(Run& run, const Options& options) {
   const bool named = run.scene.model.name != "auto";
   Progress progress("fit", "steps");
   fitting::FitOptions how = fit_options(options, progress);
-  // The quick way takes the model the support suggests, the others compare what could apply.
-  if (!named && options.effort != "quick") how.model = "auto";
   try {
-    run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
+    // The quick way takes the model the support suggests, the others compare what could apply.
+    if (named || options.effort == "quick") {
+      run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
+    } else {
+      fitting::Comparison comparison = fitting::compare(run.tracked.file.tracks, run.scene, how);
+      run.fit = std::move(comparison.fit);
+      run.scene = std::move(comparison.scene);
+    }
   } catch (const InputError& error) {
     if (named) throw;
     run.no_fit_reason = error.what();
