@@ -157,7 +157,8 @@ class Tracking {
     path.frames.merge(before);
     if (seed->seen.pose) mend(path, *seed, follower);
     explain(path);
-    if (!moves(path)) return attempts > 0 && follow_next_body(object, attempts - 1);
+    const bool pointed_at = object == 0 && scene_.tracking.at_px;
+    if (!pointed_at && !moves(path)) return attempts > 0 && follow_next_body(object, attempts - 1);
     paths_.push_back(std::move(path));
     followers_.push_back(std::move(follower));
     return true;
