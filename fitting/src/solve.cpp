@@ -127,6 +127,18 @@ void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
 
 }  // namespace
 
+namespace {
+
+// Creeping along a flat valley when the iterations ran out: the last ten changed chi-square by less
+// than 1, which moves nothing by more than its error bar.
+bool settled(const ceres::Solver::Summary& summary) {
+  const std::size_t n = summary.iterations.size();
+  return summary.termination_type == ceres::NO_CONVERGENCE && n > 10 &&
+         summary.iterations[n - 11].cost - summary.final_cost < 0.5;
+}
+
+}  // namespace
+
 void silence_solver_log() {
   FLAGS_minloglevel = google::GLOG_FATAL;
 }
@@ -153,7 +165,7 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   ceres::Solve(ceres_options, &ceres_problem, &summary);
   solution.chi2 = 2.0 * summary.final_cost;
   solution.usable = summary.IsSolutionUsable() && std::isfinite(solution.chi2);
-  solution.converged = summary.termination_type == ceres::CONVERGENCE;
+  solution.converged = summary.termination_type == ceres::CONVERGENCE || settled(summary);
   solution.iterations = static_cast<int>(summary.iterations.size()) - 1;
   solution.message = summary.message;
   if (problem.log)
