@@ -135,6 +135,19 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       if (!seen && is_free) std::erase_if(problem.free, same);
     }
   }
+  // A face that is crowned rests further in than its rim; path and spin together tell.
+  const int contact = problem.predictor->index_of("contact_radius_m");
+  const bool spin_seen = std::any_of(problem.arcs.begin(), problem.arcs.end(), [](const auto& arc) {
+    return arc.observable_index(model::Observable::psi_rad) >= 0;
+  });
+  const bool listed = std::any_of(problem.free.begin(), problem.free.end(),
+                                  [&](const auto& p) { return p.index == contact; });
+  if (puck && contact >= 0 && spin_seen && !listed && scene.fit.free.empty() &&
+      !scene.fit.fixed.contains("contact_radius_m")) {
+    const double radius_m = problem.predictor->parameters()[contact].value;
+    problem.free.push_back(
+        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, {}, {}, radius_m});
+  }
   std::stable_sort(problem.free.begin(), problem.free.end(),
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
 }
@@ -189,7 +202,7 @@ void report_parameters(const Problem& problem, const Uncertainty& error, data::F
     if (one_camera.size() > 0 && infos[free.index].role == model::ParameterInfo::Role::dynamics)
       parameter.note +=
           fmt::format("; +- {:.2g} between clips of this scale and frame rate", one_camera[i]);
-    if (free.held)
+    if (free.held && free.transform.is_over_decades())
       parameter.note +=
           fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
     if (free.prior && parameter.sigma > 0.9 * free.prior->sigma)

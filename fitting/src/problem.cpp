@@ -212,6 +212,13 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
     parameter.given = values[index];
     const auto prior = scene.fit.prior.find(info.name);
     if (prior != scene.fit.prior.end()) parameter.prior = prior->second;
+    // What is known of the camera widens the error bars; a model that is not the whole truth must
+    // not bend it.
+    const bool camera = info.name == kScale || info.name == kTimeFactor;
+    if (camera && parameter.prior && !scene.fit.free_scale) {
+      parameter.held = true;
+      for (Eigen::VectorXd& base : problem.base) base[index] = parameter.prior->value;
+    }
     problem.free.push_back(parameter);
   };
   for (int i = 0; i < count; ++i)

@@ -16,13 +16,25 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using Role = ParameterInfo::Role;
 using Dual8 = Dual<8>;
 
-enum Parameter : int { kX, kY, kVx, kVy, kPsi, kW3, kInitial, kFriction = kInitial, kDrag };
+enum Parameter : int {
+  kX,
+  kY,
+  kVx,
+  kVy,
+  kPsi,
+  kW3,
+  kInitial,
+  kFriction = kInitial,
+  kDrag,
+  kContact,
+  kAll
+};
 
 struct PuckScene {
   double gravity = 9.81, radius_m = 0.0, bore = 0.0, gyration = 0.5;
   double mass_kg = 1.0, height_m = 0.0;
   bool mass_known = false, drag = false;
-  double value[8] = {};  ///< by Parameter
+  double value[kAll] = {};  ///< by Parameter
 };
 
 PuckScene puck_scene(const data::Scene& scene) {
@@ -46,11 +58,15 @@ PuckScene puck_scene(const data::Scene& scene) {
   puck.height_m = scene.body->half_thickness_m();
   puck.drag = scene.model.air_force_N_s_m.has_value();
   const data::StartSettings& start = scene.start;
-  const double initial[] = {
-      start.x_m.value_or(0.0),     start.y_m.value_or(0.0),
-      start.vx_m_s.value_or(0.0),  start.vy_m_s.value_or(0.0),
-      start.psi_rad.value_or(0.0), start.w3_rad_s.value_or(start.dpsi_rad_s.value_or(0.0)),
-      *scene.model.friction,       scene.model.air_force_N_s_m.value_or(0.0)};
+  const double initial[] = {start.x_m.value_or(0.0),
+                            start.y_m.value_or(0.0),
+                            start.vx_m_s.value_or(0.0),
+                            start.vy_m_s.value_or(0.0),
+                            start.psi_rad.value_or(0.0),
+                            start.w3_rad_s.value_or(start.dpsi_rad_s.value_or(0.0)),
+                            *scene.model.friction,
+                            scene.model.air_force_N_s_m.value_or(0.0),
+                            puck.radius_m};
   std::copy(std::begin(initial), std::end(initial), puck.value);
   return puck;
 }
@@ -76,40 +92,47 @@ std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
   if (puck.drag)
     list.push_back({"air_force_N_s_m", "N s/m", Role::dynamics, 0.0, kInfinity, true,
                     puck.value[kDrag], true, "air force on the centre of mass"});
+  // Only a spin that is seen tells how far out the face rests on the floor.
+  list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kInfinity, true,
+                  puck.value[kContact], false, "radius of the contact, as of an evenly pressed disc"});
   return list;
 }
 
 template <class S>
-Puck<S> puck_system(const PuckScene& scene, const S& friction, const S& drag) {
+Puck<S> puck_system(const PuckScene& scene, const S (&p)[kAll]) {
   Puck<S> puck;
-  puck.friction = friction;
-  puck.drag_1_s = drag * (1.0 / scene.mass_kg);
+  puck.friction = p[kFriction];
+  puck.drag_1_s = p[kDrag] * (1.0 / scene.mass_kg);
   puck.gravity = scene.gravity;
-  puck.radius = scene.radius_m;
+  puck.radius = p[kContact];
   puck.bore = scene.bore;
-  puck.gyration = scene.gyration;
+  const S ratio = scene.radius_m / p[kContact];
+  puck.gyration = scene.gyration * ratio * ratio;
   return puck;
 }
 
 /// Runs from parameter values, in the order of `Parameter`.
 template <class S>
-PuckPath<S> puck_path(const PuckScene& scene, const S (&p)[8], std::span<const double> t_s,
+PuckPath<S> puck_path(const PuckScene& scene, const S (&p)[kAll], std::span<const double> t_s,
                       double tolerance) {
-  const State<S, 7> start{p[kVx], p[kVy], p[kW3] * scene.radius_m, p[kX], p[kY], p[kPsi], S(0.0)};
-  return run_puck(puck_system<S>(scene, p[kFriction], p[kDrag]), start, t_s, tolerance);
+  const State<S, 7> start{p[kVx], p[kVy], p[kW3] * p[kContact], p[kX], p[kY], p[kPsi], S(0.0)};
+  return run_puck(puck_system<S>(scene, p), start, t_s, tolerance);
 }
 
 /// The six initial parameters that describe a state.
 template <class S>
-State<S, kInitial> parameters_of(const State<S, 7>& s, double radius_m) {
+State<S, kInitial> parameters_of(const State<S, 7>& s, const S& contact_radius_m) {
   using P = Puck<S>;
-  return {s[P::x], s[P::y], s[P::vx], s[P::vy], s[P::psi], s[P::q] * (1.0 / radius_m)};
+  return {s[P::x], s[P::y], s[P::vx], s[P::vy], s[P::psi], s[P::q] / contact_radius_m};
 }
 
 class PuckPredictor : public Predictor {
  public:
   explicit PuckPredictor(const data::Scene& scene)
-      : scene_(puck_scene(scene)), infos_(puck_parameters(scene_)) {}
+      : scene_(puck_scene(scene)), infos_(puck_parameters(scene_)) {
+    for (int kind = 0; kind < kAll; ++kind)
+      if (kind != kDrag || scene_.drag) kinds_.push_back(kind);
+  }
   [[nodiscard]] const std::string& model_name() const override { return name_; }
   [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override { return infos_; }
   [[nodiscard]] Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
@@ -117,11 +140,18 @@ class PuckPredictor : public Predictor {
 
  private:
   template <class S>
-  void fill(const PuckPath<S>& path, const PredictRequest& request, Prediction& out) const;
+  void fill(const PuckPath<S>& path, const S& contact_radius_m, const PredictRequest& request,
+            Prediction& out) const;
+  /// Place and angle at the start only add to those later; their derivatives need no lane.
+  [[nodiscard]] bool cyclic(int parameter) const {
+    const int kind = kinds_[static_cast<std::size_t>(parameter)];
+    return kind == kX || kind == kY || kind == kPsi;
+  }
 
   std::string name_ = "puck";
   PuckScene scene_;
   std::vector<ParameterInfo> infos_;
+  std::vector<int> kinds_;  ///< of each parameter, a Parameter
 };
 
 /// A puck lies flat: its tilt and node line are zero by convention.
@@ -143,20 +173,33 @@ S seen(const State<S, 7>& s, Observable what) {
 }
 
 template <class S>
-void PuckPredictor::fill(const PuckPath<S>& path, const PredictRequest& request,
-                         Prediction& out) const {
-  // Lane i belongs to column i; columns are at most eight, as many as there are parameters.
-  const auto put = [&](Eigen::Index row, const S& value, Eigen::VectorXd& values,
+void PuckPredictor::fill(const PuckPath<S>& path, const S& contact_radius_m,
+                         const PredictRequest& request, Prediction& out) const {
+  // `seen_kind`: the initial parameter that would read the same as `value`, for cyclic columns.
+  const auto put = [&](Eigen::Index row, const S& value, int seen_kind, Eigen::VectorXd& values,
                        Eigen::MatrixXd& jacobian) {
     values[row] = value_of(value);
     if constexpr (requires { value.derivative; }) {
-      for (Eigen::Index c = 0; c < jacobian.cols(); ++c) jacobian(row, c) = value.derivative[c];
+      int lane = 0;
+      for (Eigen::Index c = 0; c < jacobian.cols(); ++c) {
+        const int parameter = request.derivatives[static_cast<std::size_t>(c)];
+        jacobian(row, c) =
+            cyclic(parameter)
+                ? (kinds_[static_cast<std::size_t>(parameter)] == seen_kind ? 1.0 : 0.0)
+                : value.derivative[lane++];
+      }
     }
+  };
+  const auto kind_of = [](Observable what) {
+    return what == Observable::x_m       ? static_cast<int>(kX)
+           : what == Observable::y_m     ? static_cast<int>(kY)
+           : what == Observable::psi_rad ? static_cast<int>(kPsi)
+                                         : -1;
   };
   Eigen::Index row = 0;
   for (const auto& s : path.rows)
     for (const Observable what : request.observables)
-      put(row++, seen(s, what), out.values, out.jacobian);
+      put(row++, seen(s, what), kind_of(what), out.values, out.jacobian);
   out.outcome = path.end == StepEnd::accepted     ? Outcome::reached_end
                 : path.end == StepEnd::step_limit ? Outcome::step_limit
                                                   : Outcome::tolerance_not_reachable;
@@ -168,10 +211,10 @@ void PuckPredictor::fill(const PuckPath<S>& path, const PredictRequest& request,
                                         value_of(path.rows.back()[4] - path.rows[0][4]));
   out.error_estimate = request.tolerance * path.error_sum * run_m;
   if (!request.want_end_state || path.rows.empty()) return;
-  const auto end = parameters_of(path.rows.back(), scene_.radius_m);
+  const auto end = parameters_of(path.rows.back(), contact_radius_m);
   out.end_state.resize(kInitial);
   out.end_state_jacobian.resize(kInitial, out.jacobian.cols());
-  for (int i = 0; i < kInitial; ++i) put(i, end[i], out.end_state, out.end_state_jacobian);
+  for (int i = 0; i < kInitial; ++i) put(i, end[i], i, out.end_state, out.end_state_jacobian);
 }
 
 Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
@@ -184,17 +227,23 @@ Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& value
   Prediction out;
   out.values.setConstant(rows, kNan);
   out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
+  const auto given = [&](auto& p) {
+    for (int kind = 0; kind < kAll; ++kind) p[kind] = scene_.value[kind];
+    for (std::size_t i = 0; i < kinds_.size(); ++i)
+      p[kinds_[i]] = values[static_cast<Eigen::Index>(i)];
+  };
   if (request.derivatives.empty()) {
-    double p[8] = {};
-    for (Eigen::Index i = 0; i < values.size(); ++i) p[i] = values[i];
-    fill(puck_path(scene_, p, t_s, request.tolerance), request, out);
+    double p[kAll] = {};
+    given(p);
+    fill(puck_path(scene_, p, t_s, request.tolerance), p[kContact], request, out);
     return out;
   }
-  Dual8 p[8];
-  for (Eigen::Index i = 0; i < values.size(); ++i) p[i] = Dual8(values[i]);
-  for (std::size_t c = 0; c < request.derivatives.size(); ++c)
-    p[request.derivatives[c]].derivative[c] = 1.0;
-  fill(puck_path(scene_, p, t_s, request.tolerance), request, out);
+  Dual8 p[kAll];  // at most six parameters are not cyclic
+  given(p);
+  int lane = 0;
+  for (const int parameter : request.derivatives)
+    if (!cyclic(parameter)) p[kinds_[static_cast<std::size_t>(parameter)]].derivative[lane++] = 1.0;
+  fill(puck_path(scene_, p, t_s, request.tolerance), p[kContact], request, out);
   return out;
 }
 
@@ -223,7 +272,7 @@ Trajectory simulate_puck(const data::Scene& scene) {
   const double tolerance = scene.run.tolerance;
   const auto path = puck_path(puck, puck.value, t_s, tolerance);
   const auto check = puck_path(puck, puck.value, t_s, finer(tolerance));
-  const auto system = puck_system<double>(puck, puck.value[kFriction], puck.value[kDrag]);
+  const auto system = puck_system<double>(puck, puck.value);
 
   Trajectory run;
   run.model = "puck";

@@ -94,9 +94,9 @@ struct Puck {
   S friction{0.1};
   S drag_1_s{0.0};        ///< air force over mass
   double gravity = 9.81;  ///< [m/s^2]
-  double radius = 0.0;    ///< R [m]
+  S radius{0.0};          ///< R [m] of the face in contact; less than the body's if it is crowned
   double bore = 0.0;      ///< inner radius of the face over R, 0 <= bore < 1
-  double gyration = 0.5;  ///< C/(m R^2)
+  S gyration{0.5};        ///< C/(m R^2)
 
   /// dv/dt and R dw/dt [m/s^2] while moving, (1), (2).
   [[nodiscard]] FaceForce<S> acceleration(const State<S, kStates>& s) const {
