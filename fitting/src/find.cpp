@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/fitting/parallel.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -100,9 +101,11 @@ Found find_arc(const Problem& problem, const Quest& quest) {
   if (options.strategy == "single") return grow(problem, given, all);
   if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
   if (options.strategy == "integral") return from_best_start(problem, quest.starter);
+  if (options.strategy == "multiple") return shoot_top(problem, given);
   if (options.strategy != "auto")
-    throw InputError(fmt::format(
-        "strategy '{}' is unknown; it is auto, single, growing or integral", options.strategy));
+    throw InputError(
+        fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
+                    options.strategy));
   Found best = search_path(problem, quest);
   if (best.passed || !quest.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
@@ -117,30 +120,35 @@ Found find_arc(const Problem& problem, const Quest& quest) {
 // Every arc alone, then all together from each arc's idea of the shared parameters.
 Found find(Problem& problem, const Quest& quest) {
   if (problem.arcs.size() == 1) return find_arc(problem, quest);
+  const int arcs = static_cast<int>(problem.arcs.size());
+  const int threads = quest.options->threads;
   std::vector<Problem> alone;
+  for (int arc = 0; arc < arcs; ++arc) alone.push_back(single_arc(problem, arc));
+  std::vector<Found> found(alone.size());
+  in_parallel(arcs, threads, [&](int arc) { found[arc] = find_arc(alone[arc], quest); });
   Found best;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    alone.push_back(single_arc(problem, arc));
-    const Found found = find_arc(alone.back(), quest);
-    if (!found.solution.usable) return found;
-    alone.back().set_base(found.solution.u);
-    problem.base[arc] = alone.back().base[0];
-    if (best.path == "none" || best.path == found.path)
-      best.path = found.path;
-    else
-      best.path = "mixed";
+  for (int arc = 0; arc < arcs; ++arc) {
+    if (!found[arc].solution.usable) return found[arc];
+    alone[arc].set_base(found[arc].solution.u);
+    problem.base[arc] = alone[arc].base[0];
+    best.path = arc == 0 || best.path == found[arc].path ? found[arc].path : "mixed";
   }
   const std::string path = best.path;
-  for (const Problem& leader : alone) {
-    Problem trial = problem;
+  std::vector<Problem> trials(alone.size(), problem);
+  std::vector<Solution> solutions(alone.size());
+  in_parallel(arcs, threads, [&](int leader) {
+    Problem& trial = trials[leader];
     for (const FreeParameter& parameter : problem.free)
       if (parameter.arc < 0)
         for (Eigen::VectorXd& base : trial.base)
-          base[parameter.index] = leader.base[0][parameter.index];
-    const Solution solution = solve(trial, trial.start());
+          base[parameter.index] = alone[leader].base[0][parameter.index];
+    solutions[leader] = solve(trial, trial.start());
+  });
+  for (int leader = 0; leader < arcs; ++leader) {
+    const Solution& solution = solutions[leader];
     if (!solution.usable || (best.solution.usable && solution.chi2 >= best.solution.chi2)) continue;
     best.solution = solution;
-    problem.base = trial.base;
+    problem.base = trials[leader].base;
   }
   best.path = path;
   return best;

@@ -14,8 +14,8 @@ struct Quest {
   std::vector<const model::Predictor*> relatives;
 };
 
-/// Every arc alone, without a guess or from the given start; then all arcs together from each arc's
-/// idea of the shared parameters. Writes the arcs' values into problem.base.
+/// Every arc alone (in parallel), without a guess or from the given start; then all arcs together
+/// from each arc's idea of the shared parameters. Writes the arcs' values into problem.base.
 /// @throws InputError if the strategy is unknown.
 [[nodiscard]] Found find(Problem& problem, const Quest& quest);
 

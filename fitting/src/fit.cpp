@@ -18,7 +18,6 @@
 #include "segments.hpp"
 #include "smoothing.hpp"
 #include "statistics.hpp"
-#include "steady_top.hpp"
 #include "strategy.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/inertia.hpp"
@@ -397,7 +396,6 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   if (model.starts_with("top")) {
     add_derived_top(problem, solution.u, error.covariance, scene, result);
     warn_short_top(problem, result);
-    admit_steady_precession(problem, solution.u, result);
   }
   const Squares sum = squares(problem, solution);
   warn_unexplained(sum, result);

@@ -74,4 +74,10 @@ using NodeStarter = std::function<void(double t_s, Eigen::VectorXd& values)>;
 [[nodiscard]] Found multiple_shooting(const Problem& problem, int segments,
                                       const NodeStarter& nodes);
 
+/// Multiple shooting of a top's first nutations from a given start of its dynamics, then single
+/// shooting on growing windows. The states between come from the smoothed path; segments are a
+/// fifth of a nutation by the start's b, then twice and half of that, until one passes the gate.
+/// @throws InputError for another model.
+[[nodiscard]] Found shoot_top(const Problem& problem, const Start& start);
+
 }  // namespace trochoid::fitting

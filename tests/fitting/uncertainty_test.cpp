@@ -101,5 +101,27 @@ TEST(Bootstrap, AgreesWithTheCovarianceOfWhiteNoiseAndRepeatsItself) {
     EXPECT_EQ(one.bootstrap.parameters[i].sigma, two.bootstrap.parameters[i].sigma);
 }
 
+// One body, three throws: a and l are shared, the spin and the start are each recording's own.
+TEST(SeveralRecordings, ShareTheBodyAndKeepTheirStarts) {
+  const std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),
+                                        thesis_track(25.0, 1e-3, 13)};
+  data::Scene scene;
+  scene.model.name = "top";
+  FitOptions options;
+  options.threads = 1;
+  const data::Fit alone = fit(std::span(tracks).first(1), scene, options);
+  const data::Fit all = fit(tracks, scene, options);
+  ASSERT_TRUE(all.converged) << all.reason;
+  ASSERT_EQ(all.arcs.size(), 3U);
+  EXPECT_NE(all.find("theta_rad@2"), nullptr);
+  EXPECT_EQ(all.find("l_m@1"), nullptr);
+  const data::FitParameter& l = *all.find("l_m");
+  EXPECT_LT(std::abs(l.value - 0.1), 4.0 * l.sigma);
+  // Three equal recordings: 1/sqrt(3) = 0.58; the estimated noise adds a few per cent.
+  EXPECT_NEAR(l.sigma / alone.find("l_m")->sigma, 0.58, 0.08);
+  options.threads = 3;
+  EXPECT_EQ(fit(tracks, scene, options).find("l_m")->value, l.value);
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

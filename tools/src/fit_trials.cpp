@@ -109,7 +109,8 @@ std::vector<FitTrial> trials_of_scene(const MadeTrackOptions& tracks,
     std::map<std::string, double> start;
     if (strategy.start == FitStrategy::Start::off) start = off;
     if (strategy.start == FitStrategy::Start::blind) start = blind_start(made);
-    if (strategy.start == FitStrategy::Start::blind && start.empty()) continue;
+    const bool top = made.scene.model.name == "top";
+    if ((strategy.tops_only || strategy.start == FitStrategy::Start::blind) && !top) continue;
     const Attempt tried = attempt(made, strategy.strategy, start);
     FitTrial trial{.scene = scene, .strategy = s, .start_path = tried.fit.start_path};
     trial.time_ms = tried.time_ms;
@@ -200,6 +201,7 @@ std::vector<FitStrategy> fit_strategies() {
   using Start = FitStrategy::Start;
   return {{"no guess", "auto", Start::none},
           {"integral matching only", "integral", Start::none},
+          {"multiple shooting", "multiple", Start::off, true},
           {"growing window", "growing", Start::off},
           {"single shooting", "single", Start::off},
           {"single, blind start", "single", Start::blind}};

@@ -15,6 +15,7 @@ struct FitStrategy {
   std::string name;
   std::string strategy;
   Start start = Start::none;
+  bool tops_only = false;
 };
 [[nodiscard]] std::vector<FitStrategy> fit_strategies();
 

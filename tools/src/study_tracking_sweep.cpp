@@ -163,7 +163,7 @@ class Studio {
     style.shadow = case_.shadow;
     style.blur_px = case_.blur_px;
     style.noise_levels = case_.noise_levels;
-    style.samples = 32;
+    style.samples = 12;
     style.times = 1;
     style.seed = seed;
     return style;

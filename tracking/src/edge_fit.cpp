@@ -43,9 +43,8 @@ inline Step step_at(const NormalTable& table, float x) {
           table.density[i] + part * (table.density[i + 1] - table.density[i])};
 }
 
-// Levels beside the edge: inner and outer, then their slopes, then their bends, and by how much a
-// strip at the edge differs from the rest of the body.
-constexpr int kMostLevels = 7, kWithoutStrip = 6;
+// Levels beside the edge: inner and outer, then their slopes, then their bends.
+constexpr int kMostLevels = 6;
 using Levels = Eigen::Matrix<float, kMostLevels, 1>;
 using Normal = Eigen::Matrix<float, kMostLevels, kMostLevels>;
 
@@ -60,11 +59,11 @@ class EdgeFit {
       ground += model.plate ? profile.background[j] : 1.0f;
     }
     // Slopes [per px] and bends [per px^2] of the light, as shares of it.
-    constexpr float kSlope = 0.06f, kBend = 0.02f, kStrip = 0.3f;
+    constexpr float kSlope = 0.06f, kBend = 0.02f;
     const float outer = brightest * static_cast<float>(profile.count) / std::max(ground, 1.0f);
     const auto precision = [](float sd) { return 1.0f / (sd * sd); };
     prior_ << 0.0f, 0.0f, precision(kSlope * brightest), precision(kSlope * outer),
-        precision(kBend * brightest), precision(kBend * outer), precision(kStrip * brightest);
+        precision(kBend * brightest), precision(kBend * outer);
   }
 
   // Best levels for a step at `offset`.
@@ -74,13 +73,9 @@ class EdgeFit {
     Levels right = Levels::Zero();
     const auto inner = static_cast<float>(kPerIndependent * model_.inner_noise2);
     const auto outer = static_cast<float>(kPerIndependent * model_.outer_noise2);
-    const auto strip = static_cast<float>(model_.strip_px);
     for (int j = 0; j < profile_.count; ++j) {
       const float s = profile_.s_px(j);
       steps_[j] = step_at(table, (s - offset) * inverse_blur_);
-      strips_[j] = strip > 0.0f ? step_at(table, (s - offset + strip) * inverse_blur_).share -
-                                      steps_[j].share
-                                : 0.0f;
       weights_[j] = 1.0f / (inner + steps_[j].share * (outer - inner));
       const Levels c = columns(j);
       if (model_.shading) {
@@ -94,8 +89,7 @@ class EdgeFit {
     }
     normal_(1, 0) = normal_(0, 1);
     inverse_.setZero();
-    if (!model_.shading) return solve<2>(right);
-    return strip > 0.0f ? solve<kMostLevels>(right) : solve<kWithoutStrip>(right);
+    return model_.shading ? solve<kMostLevels>(right) : solve<2>(right);
   }
 
   struct Move {
@@ -107,7 +101,7 @@ class EdgeFit {
     float own = 0.0f, residual = 0.0f;
     for (int j = 0; j < profile_.count; ++j) {
       const float s = profile_.s_px(j), ground = ground_at(j);
-      const float inner = levels_[0] + s * (levels_[2] + s * levels_[4]) + levels_[6];
+      const float inner = levels_[0] + s * (levels_[2] + s * levels_[4]);
       const float outer = levels_[1] + s * (levels_[3] + s * levels_[5]);
       const float d = (inner - outer * ground) * steps_[j].density * inverse_blur_;
       const Levels c = columns(j);
@@ -127,7 +121,7 @@ class EdgeFit {
 
   void describe(double offset, ProfileEdge& edge) const {
     const auto s = static_cast<float>(offset);
-    edge.inner = levels_[0] + s * (levels_[2] + s * levels_[4]) + levels_[6];
+    edge.inner = levels_[0] + s * (levels_[2] + s * levels_[4]);
     const double ground = model_.plate ? profile_.background_at(offset) : 1.0;
     edge.contrast = (levels_[1] + s * (levels_[3] + s * levels_[5])) * ground - edge.inner;
     edge.inner_slope = levels_[2] + 2.0f * s * levels_[4];
@@ -155,7 +149,7 @@ class EdgeFit {
     const float s = profile_.s_px(j), share = steps_[j].share;
     const float inner = 1.0f - share, outer = share * ground_at(j);
     Levels c;
-    c << inner, outer, inner * s, outer * s, inner * s * s, outer * s * s, strips_[j];
+    c << inner, outer, inner * s, outer * s, inner * s * s, outer * s * s;
     return c;
   }
   template <int n>
@@ -179,7 +173,7 @@ class EdgeFit {
   Levels prior_, levels_;
   Normal normal_, inverse_;
   std::array<Step, Profile::kMost> steps_;
-  std::array<float, Profile::kMost> weights_, strips_;
+  std::array<float, Profile::kMost> weights_;
 };
 
 // Squared residual of the best line (or, with a plate, the best multiple of it plus a constant).

@@ -10,8 +10,6 @@ struct EdgeModel {
   /// Both levels may change along the profile (shading, soft shadows): linearly and with a bend,
   /// each by a few per cent of the light.
   bool shading = false;
-  /// Distance inwards to an edge of the body itself, a strip of unknown level between; 0: none.
-  double strip_px = 0.0;
   /// Variance of a sample on either side [8-bit levels squared].
   double inner_noise2 = 2.0, outer_noise2 = 2.0;
 };

@@ -23,7 +23,7 @@ double blur_along(const Scenery& scenery, const OutlineSample& sample, double bl
 // How far a profile may go before the blur of the body's next edge shows.
 double clear_of_next(double next_px, double extent_px, double blur_px) {
   constexpr double kClearOfBlur = 1.5;
-  return std::min(extent_px, next_px - kClearOfBlur * blur_px);
+  return std::min(extent_px, next_px - kClearOfBlur * std::min(blur_px, 1.0));
 }
 
 // The edge near a point of the outline, with what a second fit needs.
@@ -43,15 +43,8 @@ bool look_for_edge(const Scenery& scenery, const OutlineSample& sample, const Se
       look.colour ? std::hypot(search.blur_px, std::sqrt(kColourBlur2Px2)) : search.blur_px;
   const double blur = blur_along(scenery, sample, own_blur);
   const double widen = blur - search.blur_px;
-  const double extent = search.extent_px + 2.0 * widen;
-  double inside = clear_of_next(sample.inside_px, extent, blur);
-  // A wall too narrow to look past: a strip of its own beside the face.
-  look.model.strip_px = 0.0;
-  if (search.shading && sample.edge == Edge::lower_rim && inside < extent) {
-    look.model.strip_px = sample.inside_px;
-    inside = extent;
-  }
-  const double outside = clear_of_next(sample.outside_px, extent, blur);
+  const double inside = clear_of_next(sample.inside_px, search.extent_px + 2.0 * widen, blur);
+  const double outside = clear_of_next(sample.outside_px, search.extent_px + 2.0 * widen, blur);
   if (inside < kLeastInsidePx || outside < kLeastInsidePx) return false;
   static const LightWindow kNoPlate;
   const LightWindow& picture = look.colour ? scenery.colour : scenery.picture;
@@ -231,7 +224,6 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
 double estimate_blur_px(const Scenery& scenery, const Refined& refined) {
   constexpr std::array<double, 9> kTried{0.5, 0.6, 0.72, 0.86, 1.04, 1.25, 1.5, 1.8, 2.1};
   constexpr size_t kEdges = 60;
-  constexpr double kHalf_px = 5.0;
   std::vector<double> best;
   const size_t stride = std::max<size_t>(1, refined.samples.size() / kEdges);
   Profile profile;
@@ -241,10 +233,10 @@ double estimate_blur_px(const Scenery& scenery, const Refined& refined) {
     const double noise2 =
         (edge.inner_square + edge.outer_square) / (edge.inner_freedom + edge.outer_freedom);
     if (refined.equations[i].weight < 0.5 || refined.equations[i].colour || !sample.silhouette ||
-        sample.inside_px < 6.0 || edge.contrast * edge.contrast < 25.0 * noise2)
+        sample.inside_px < 4.0 || edge.contrast * edge.contrast < 25.0 * noise2)
       continue;
-    if (!sample_profile(scenery.picture, scenery.plate, sample.image_px, sample.normal_px, kHalf_px,
-                        kHalf_px, profile))
+    if (!sample_profile(scenery.picture, scenery.plate, sample.image_px, sample.normal_px, 3.0, 3.0,
+                        profile))
       continue;
     // The same profile for every blur: only the model differs.
     double least = std::numeric_limits<double>::infinity(), blur = 0.0;
