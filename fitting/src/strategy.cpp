@@ -236,13 +236,17 @@ Found search(const Problem& problem, const Starter& starter) {
   // Where the angles were seen, starts differ little and a good one is known by its result.
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const std::size_t tried = seen ? 2 : 5;
+  // From positions alone a neighbouring valley can pass the gate as well: above half a standard
+  // deviation of the chi-square distribution the other starts of the window get their turn.
+  const double sure = 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window);
       if (better(found, best)) best = std::move(found);
-      if (best.passed || (seen && best.unexplained < kExplained)) return best;
+      if (best.passed && (seen || best.reduced_chi2 < sure)) return best;
+      if (seen && best.unexplained < kExplained) return best;
     }
     if (best.unexplained < kExplained) return best;
   }

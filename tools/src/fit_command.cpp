@@ -101,7 +101,7 @@ void run(const FitCommand& command) {
   if (command.verbose)
     options.log = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
   data::Fit fit;
-  if (command.compare) {
+  if (command.compare || command.options.model == "auto") {
     fitting::Comparison comparison = fitting::compare(tracks, scene, options);
     fit = std::move(comparison.fit);
     scene = std::move(comparison.scene);
