@@ -31,8 +31,8 @@ struct ArcData {
   std::vector<model::Observable> observables;
   std::vector<Reading> readings;
   int rows = 0;
-  bool folded = false;         ///< faces look alike: theta measured as min(theta, pi - theta)
-  bool filmed = false;         ///< has pixel positions: measured in images, with their common errors
+  bool folded = false;  ///< faces look alike: theta measured as min(theta, pi - theta)
+  bool filmed = false;  ///< has pixel positions: measured in images, with their common errors
   bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
 
   [[nodiscard]] int observable_index(model::Observable observable) const;  ///< -1 if absent

@@ -74,8 +74,7 @@ Found shoot_top(const Problem& problem, const Start& start) {
     const Found found = multiple_shooting(own, segments, nodes_of(own));
     if (!found.solution.usable) continue;
     Found whole = grow(problem, start_at(own, found.solution.u), window);
-    if (better(whole, best))
-      best = std::move(whole);
+    if (better(whole, best)) best = std::move(whole);
     if (best.passed) break;
   }
   return best;

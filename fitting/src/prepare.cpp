@@ -1,0 +1,129 @@
+#include "prepare.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "arcs.hpp"
+#include "segments.hpp"
+#include "smoothing.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+ChannelChoice channels_of(const std::string& model) {
+  if (model == "pivot") return {.position = false, .psi = true};
+  if (model == "puck") return {.position = true, .psi = true};
+  return {.position = true, .theta = true, .phi = true, .psi = true};
+}
+
+// A puck's track falls apart at impacts and rest; other bodies are followed throughout.
+std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& model,
+                                   const FitOptions& options) {
+  const SampleRange chosen = chosen_range(track, options.from, options.to);
+  const SampleRange kept{chosen.first,
+                         kept_samples(chosen.first, chosen.second, options.hold_back)};
+  if (model == "puck") return sliding_ranges(track, kept);
+  return {kept};
+}
+
+std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
+                             const data::Scene& scene, const FitOptions& options) {
+  const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
+                      scene.body->faces_look_alike() && model != "top";
+  std::vector<ArcData> arcs;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    data::check(tracks[i], fmt::format("track {}", i + 1));
+    for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
+      ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
+      arc.track = static_cast<int>(i);
+      if (arc.readings.empty())
+        throw InputError(fmt::format(
+            "track {}: no sample has positions in metres; track with a scale or a camera file",
+            i + 1));
+      arcs.push_back(std::move(arc));
+    }
+  }
+  if (arcs.empty())
+    throw InputError(
+        "no track has a stretch in which the puck slides freely, slowing down; are the positions "
+        "in metres, and does it move?");
+  return arcs;
+}
+
+// 0.02 sigma of a typical sample over the size of the path, within what the integrators do well.
+double tolerance_for(const std::vector<ArcData>& arcs, double share) {
+  double least = 1e-5;
+  for (const ArcData& arc : arcs) {
+    if (arc.observable_index(model::Observable::x_m) < 0) continue;
+    const Eigen::MatrixX2d xy = arc.positions_m();
+    const double extent = (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    std::vector<double> weights;
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == Channel::position) weights.push_back(reading.whitener.norm());
+    const double sigma = 1.0 / std::max(median(std::move(weights)), 1e-300);
+    if (extent > 0.0) least = std::min(least, share * sigma / extent);
+  }
+  return std::clamp(least, 1e-11, 1e-5);
+}
+
+// Turns parameters on that only some measurements show, and off those nothing shows: the spin angle
+// without a mark, and a puck's spin, which the path alone hardly carries.
+void suit_to_data(Problem& problem, const data::Scene& scene) {
+  const bool puck = problem.predictor->model_name() == "puck";
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const bool seen = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
+    for (const char* name : {"psi_rad", "omega_s_rad_s", "w3_rad_s"}) {
+      if (name == std::string("w3_rad_s") && !puck) continue;
+      const int index = problem.predictor->index_of(name);
+      if (index < 0 || scene.fit.fixed.contains(name)) continue;
+      const auto same = [&](const FreeParameter& p) { return p.index == index && p.arc == arc; };
+      const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
+      if (seen && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
+      if (!seen && is_free) std::erase_if(problem.free, same);
+    }
+  }
+  // A face that is crowned rests further in than its rim; path and spin together tell.
+  const int contact = problem.predictor->index_of("contact_radius_m");
+  const bool spin_seen = std::any_of(problem.arcs.begin(), problem.arcs.end(), [](const auto& arc) {
+    return arc.observable_index(model::Observable::psi_rad) >= 0;
+  });
+  const bool listed = std::any_of(problem.free.begin(), problem.free.end(),
+                                  [&](const auto& p) { return p.index == contact; });
+  if (puck && contact >= 0 && spin_seen && !listed && scene.fit.free.empty() &&
+      !scene.fit.fixed.contains("contact_radius_m")) {
+    const double radius_m = problem.predictor->parameters()[contact].value;
+    problem.free.push_back(
+        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, {}, {}, radius_m});
+  }
+  std::stable_sort(problem.free.begin(), problem.free.end(),
+                   [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
+}
+
+}  // namespace
+
+Problem prepare(std::span<const data::Track> tracks, const model::Predictor& predictor,
+                const data::Scene& scene, const FitOptions& options) {
+  const std::string& model = predictor.model_name();
+  Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
+  problem.log = options.log;
+  for (int c = 0; c < kChannels; ++c)
+    for (const ArcData& arc : problem.arcs)
+      problem.noise_scale[c] =
+          std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
+  suit_to_data(problem, scene);
+  const int needed = static_cast<int>(problem.free.size());
+  if (problem.rows() <= needed)
+    throw InputError(fmt::format("{} measurements cannot determine {} parameters of model '{}'",
+                                 problem.rows(), needed, model));
+  for (const auto& [name, value] : options.start)
+    if (const int index = predictor.index_of(name); index >= 0)
+      for (Eigen::VectorXd& base : problem.base) base[index] = value;
+  problem.tolerance =
+      options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
+  return problem;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,17 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "strategy.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+/// Where a search without a guess starts, by the model.
+[[nodiscard]] Starter starter_for(const model::Predictor& predictor, const data::Scene& scene);
+
+/// Easier relatives of a sliding body, see Quest; none for other models.
+[[nodiscard]] std::vector<std::unique_ptr<model::Predictor>> relatives_of(data::Scene scene);
+
+}  // namespace trochoid::fitting
