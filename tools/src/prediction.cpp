@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "fitted_scene.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -37,11 +38,6 @@ data::Scene scene_in(const data::Fit& fit) {
   data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in the fit");
   if (scene.model.name == "auto") scene.model.name = fit.model;
   return scene;
-}
-
-// The time the initial state of an arc belongs to.
-double start_of(const data::Fit& fit, std::size_t arc_index) {
-  return arc_index == 0 ? fit.time_origin_s : fit.arcs[arc_index].from_s;
 }
 
 // Every sample time within the arc and a uniform subdivision between them, so that the curve is
@@ -120,7 +116,7 @@ PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
   replayed.t_s = grid_of(track, arc);
   model::PredictRequest request;
   request.t_s = replayed.t_s;
-  request.start_s = start_of(fit, arc_index);
+  request.start_s = arc_start_s(fit, arc_index);
   request.observables = observables_of(predictor.model_name());
   const model::Prediction run = predictor.predict(values_of(predictor, fit, arc_index), request);
   if (run.outcome != model::Outcome::reached_end) replayed.ended = sentence(run.outcome);
@@ -165,7 +161,7 @@ std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data
     const std::vector<double> grid = grid_of(*track, fit.arcs[i]);
     model::PredictRequest request;
     request.t_s = grid;
-    request.start_s = start_of(fit, i);
+    request.start_s = arc_start_s(fit, i);
     request.tolerance = tolerance;
     const model::Prediction run = predictor->predict(values_of(*predictor, fit, i), request);
     if (run.outcome != model::Outcome::reached_end) return std::nullopt;

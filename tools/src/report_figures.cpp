@@ -173,7 +173,9 @@ std::string cost_figure(const ReportFacts& facts) {
     y.include(point.y());
   }
   if (std::isfinite(facts.median_sigma_m)) y.include(std::log10(facts.median_sigma_m));
-  x = {x.low - 0.3, x.high + 0.3};
+  // Whole decades, so that the axis has numbers on it; room above for the key.
+  x = {std::floor(x.low), std::ceil(x.high)};
+  y.high += 0.25 * y.span();
   SvgPlot plot("cost", x, y, {"run time of one prediction [s]", "largest error of x, y [m]"},
                SvgPlot::Scale::logarithmic, 420.0, 280.0);
   plot.line(points, ink::predicted, 1.5);

@@ -1,6 +1,7 @@
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,16 @@ struct Verdict {
 [[nodiscard]] std::string correlation_figure(const ReportFacts& facts);
 /// Error of the integration against its run time, measured on this fit's own motion. Empty without.
 [[nodiscard]] std::string cost_figure(const ReportFacts& facts);
+
+// --- energy and forces ---
+struct DynamicsChart {
+  std::string label;           ///< with its unit
+  std::vector<double> values;  ///< at the times asked for; NaN where the model does not reach
+};
+/// Energy, normal force and needed friction of the fitted motion of one object at the given times,
+/// as far as its model has them. Forces need the mass.
+[[nodiscard]] std::vector<DynamicsChart> dynamics_of(const data::Fit& fit, int track, int object,
+                                                     std::span<const double> at_s);
 
 // --- time series ---
 /// What report.js draws: per object the times, the charts and the path's cursor positions.

@@ -75,6 +75,7 @@ class Series {
     if (arc_ != nullptr)
       for (int axis = 0; axis < 2; ++axis) made["charts"].push_back(residual(axis));
     for (json& chart : angles()) made["charts"].push_back(std::move(chart));
+    for (json& chart : dynamics()) made["charts"].push_back(std::move(chart));
     return made;
   }
 
@@ -192,6 +193,22 @@ class Series {
         chart["series"].push_back(line("observed", "dots", "observed", column([&](std::size_t i) {
                                          return measured[i] * kDegPerRad;
                                        })));
+      charts.push_back(std::move(chart));
+    }
+    return charts;
+  }
+
+  // Of the model alone: no camera sees energy or force.
+  [[nodiscard]] std::vector<json> dynamics() const {
+    std::vector<json> charts;
+    if (arc_ == nullptr || !facts_.input.fit) return charts;
+    std::vector<double> times_s;
+    for (const Row& row : rows_) times_s.push_back(row.t_s);
+    for (const DynamicsChart& curve :
+         dynamics_of(*facts_.input.fit, facts_.input.fit_track, track_.object, times_s)) {
+      json chart{{"label", curve.label}, {"series", json::array()}};
+      chart["series"].push_back(line("predicted", "line", "predicted",
+                                     column([&](std::size_t i) { return curve.values[i]; })));
       charts.push_back(std::move(chart));
     }
     return charts;

@@ -9,6 +9,7 @@
 
 #include "animation.hpp"
 #include "commands.hpp"
+#include "fitted_scene.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
@@ -26,7 +27,8 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string scene;
-  fs::path output, plots, animation;
+  fs::path fit, output, plots, animation;
+  std::size_t arc = 0;
   std::optional<double> until_s, rate_hz, tolerance;
   std::string model, integrator;
   bool list = false, steady = false, thesis = false;
@@ -88,13 +90,21 @@ void print_steady(const data::Scene& scene) {
   }
 }
 
-void simulate_scene(const Options& options) {
+/// "ring" of ring.toml and ring.fit.json, the name of a bundled scene.
+std::string stem_of(const Options& options) {
+  if (!options.fit.empty()) return options.fit.stem().stem().string();
   const fs::path named(options.scene);
-  const std::string stem = named.extension() == ".toml" ? named.stem().string() : options.scene;
+  return named.extension() == ".toml" ? named.stem().string() : options.scene;
+}
+
+void simulate_scene(const Options& options) {
+  const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
+  const std::string stem = stem_of(options);
   const fs::path output =
       options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
   for (const fs::path& file : {output, options.animation}) check_output(file, {named});
-  data::Scene scene = load_scene(options.scene);
+  data::Scene scene = options.fit.empty() ? load_scene(options.scene)
+                                          : fitted_scene(data::read_fit(options.fit), options.arc);
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene);
   const model::Trajectory run = model::simulate(scene);
@@ -118,9 +128,10 @@ void simulate_scene(const Options& options) {
 
 void run(const Options& options) {
   if (options.list) return list_scenes();
-  if (options.scene.empty())
+  if (options.scene.empty() == options.fit.empty())
     throw InputError(
-        "simulate: name a scene with --scene FILE or --scene NAME (--list shows names)");
+        "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
+        "a fit with --fit FILE");
   simulate_scene(options);
 }
 
@@ -132,6 +143,10 @@ void add_simulate_command(CLI::App& app) {
       app.add_subcommand("simulate", "Run a scene's model and write its trajectory");
   command->add_option("--scene", options->scene,
                       "Scene file (TOML), or the name of a bundled scene");
+  command->add_option(
+      "--fit", options->fit,
+      "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
+  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
   command->add_option("--until", options->until_s, "End time [s]")->check(CLI::PositiveNumber);
   command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(CLI::PositiveNumber);

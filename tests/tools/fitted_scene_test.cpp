@@ -1,0 +1,114 @@
+#include "fitted_scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/table.hpp"
+#include "trochoid/model/predictor.hpp"
+#include "trochoid/model/simulate.hpp"
+
+// A fit's motion run on its own must be what the fit itself predicted: two ways through the models.
+namespace trochoid::tools {
+namespace {
+
+constexpr double kApart_m = 1e-8;  // both runs integrate to 1e-10
+
+/// A fit at the model's own values for the scene, with the given changes.
+data::Fit fit_of(const std::string& toml, const std::map<std::string, double>& changed) {
+  const data::Scene scene = data::parse_scene(toml, "test");
+  const auto predictor = model::make_predictor(scene);
+  data::Fit fit;
+  fit.model = predictor->model_name();
+  fit.scene_toml = toml;
+  fit.time_origin_s = 0.5;
+  fit.arcs.push_back({.track = 0, .object = 0, .from_s = 0.5, .to_s = 1.5, .samples = 101});
+  for (const model::ParameterInfo& info : predictor->parameters()) {
+    const auto other = changed.find(info.name);
+    fit.parameters.push_back({.name = info.name,
+                              .value = other != changed.end() ? other->second : info.value,
+                              .unit = info.unit,
+                              .note = {}});
+  }
+  return fit;
+}
+
+void expect_same_path(const data::Fit& fit) {
+  data::Scene scene = fitted_scene(fit, 0);
+  scene.run.rate_hz = 100.0;
+  const model::Trajectory run = model::simulate(scene);
+  ASSERT_EQ(run.outcome, model::Outcome::reached_end);
+  const auto predictor = model::make_predictor(data::parse_scene(fit.scene_toml, "test"));
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.parameters.size()));
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i)
+    values[static_cast<Eigen::Index>(i)] = fit.parameters[i].value;
+  const data::Table table{.header = {}, .columns = run.columns, .values = run.values};
+  const Eigen::VectorXd t_s = table.column("t_s"), x = table.column("x_m"), y = table.column("y_m");
+  model::PredictRequest request;
+  request.t_s = {t_s.data(), static_cast<std::size_t>(t_s.size())};
+  const model::Prediction expected = predictor->predict(values, request);
+  ASSERT_EQ(t_s.size(), 101);
+  for (Eigen::Index i = 0; i < t_s.size(); ++i) {
+    EXPECT_NEAR(x[i], expected.values[2 * i], kApart_m) << "at " << t_s[i] << " s";
+    EXPECT_NEAR(y[i], expected.values[2 * i + 1], kApart_m) << "at " << t_s[i] << " s";
+  }
+}
+
+TEST(FittedScene, RunsARollingRingAsTheFitPredictsIt) {
+  expect_same_path(fit_of(R"(
+[body]
+kind = "ring"
+radius_m = 0.03
+inner_radius_m = 0.027
+thickness_m = 0.008
+mass_kg = 0.0337
+[model]
+name = "rolling"
+air_linear_N_m_s = [2e-6, 2e-6, 1e-5]
+rolling_friction_m = 1e-5
+[start]
+theta_rad = 1.2
+w2_rad_s = 20.0
+w3_rad_s = 4.0
+)",
+                          {{"theta_rad", 1.1},
+                           {"w3_rad_s", 5.0},
+                           {"x_m", 0.01},
+                           {"air_linear_N_m_s[1]", 4e-6},
+                           {"air_linear_N_m_s[3]", 2e-5},
+                           {"rolling_friction_m", 3e-5}}));
+}
+
+TEST(FittedScene, RunsATopOfUnknownMassFromItsGroupsAlone) {
+  expect_same_path(fit_of(R"(
+[body]
+kind = "top"
+mass_kg = 0.1
+I_kg_m2 = 1e-3
+Is_kg_m2 = 5e-4
+l_m = 0.05
+[model]
+name = "top"
+[start]
+theta_rad = 0.5
+omega_s_rad_s = 60.0
+)",
+                          {{"a_1_s2", 120.0},
+                           {"b_1_s", 25.0},
+                           {"l_m", 0.04},
+                           {"theta_rad", 0.7},
+                           {"dphi_rad_s", 2.0},
+                           {"pivot_x_m", 0.003}}));
+}
+
+TEST(FittedScene, SaysHowManyArcsThereAre) {
+  try {
+    (void)fitted_scene(data::Fit{}, 0);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "the fit has 0 arcs, counted from 0: no arc 0");
+  }
+}
+
+}  // namespace
+}  // namespace trochoid::tools

@@ -1,0 +1,20 @@
+#pragma once
+#include <cstddef>
+#include <string>
+
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+
+namespace trochoid::tools {
+
+/// The scene a fit was made with, its [start] and coefficients replaced by the fitted values of one
+/// arc, so that the motion can be simulated on its own: time 0 is where that arc begins. A top
+/// whose mass or moment is unknown gets the moment 1 kg m^2 (the motion knows only a, b and l).
+/// @param arc  place in Fit::arcs
+/// @throws InputError if there is no such arc.
+[[nodiscard]] data::Scene fitted_scene(const data::Fit& fit, std::size_t arc);
+
+/// Where the arc's initial state belongs [s].
+[[nodiscard]] double arc_start_s(const data::Fit& fit, std::size_t arc);
+
+}  // namespace trochoid::tools
