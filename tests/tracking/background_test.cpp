@@ -29,9 +29,11 @@ TEST(Background, ABodyThatRestsMostOfTheTimeIsNotFloor) {
   std::vector<cv::Point2d> places(16, {150.0, 60.0});  // rests for 11 of 16 samples
   for (int i = 0; i < 5; ++i) places[static_cast<std::size_t>(i)] = {20.0 + 18.0 * i, 60.0};
   const auto frames = frames_of(floor, places);
-  const Background background = Background::from_samples(frames);
-  EXPECT_NEAR(level_at(background.plate(), 150, 60), level_at(floor, 150, 60), 3.0);
-  const auto seen = find_silhouettes(frames.back(), background.plate(), background.noise_levels());
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(level_at(background.plate().luma, 150, 60), level_at(floor, 150, 60), 3.0);
+  Frame last;
+  last.luma = frames.back();
+  const auto seen = find_silhouettes(last, background.plate());
   ASSERT_EQ(seen.size(), 1u);
   // A silhouette is for finding, not for measuring: a pixel or so.
   EXPECT_NEAR(seen[0].detection.centre_px.x(), 150.0, 1.5);
@@ -44,8 +46,8 @@ TEST(Background, NoiseIsMeasuredAndFlickerIsTakenOut) {
   std::vector<cv::Mat> frames;
   for (int i = 0; i < 16; ++i)
     frames.push_back(developed(floor * (1.0 + 0.1 * std::sin(i)), 3.0, random));
-  const Background background = Background::from_samples(frames);
-  EXPECT_NEAR(background.noise_levels(), 3.0, 0.8);
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(background.plate().noise_levels, 3.0, 0.8);
   EXPECT_LT(cv::countNonZero(background.active()), 160 * 120 / 100);
   const double gain = background.gain(frames[3]) / background.gain(frames[0]);
   EXPECT_NEAR(gain, (1.0 + 0.1 * std::sin(3)), 0.01);
@@ -60,8 +62,8 @@ TEST(Background, ABodyThatNeverLeavesIsFilledIn) {
     draw_disc(picture, 100.0, 80.0, 25.0, 25.0, 0.0, 140.0 + 80.0 * std::sin(2.4 * i));
     frames.push_back(developed(picture, 2.0, random));
   }
-  const Background background = Background::from_samples(frames);
-  EXPECT_NEAR(level_at(background.plate(), 100, 80), 60.0, 12.0);
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(level_at(background.plate().luma, 100, 80), 60.0, 12.0);
 }
 
 }  // namespace

@@ -172,54 +172,42 @@ std::optional<double> floor_like(const std::array<int, kSamples>& levels, double
   return sum / count;
 }
 
-}  // namespace
-
-Background Background::from_samples(const std::vector<cv::Mat>& samples) {
-  std::vector<cv::Mat> level = samples;
-  const cv::Mat& reference = samples[samples.size() / 2];
-  for (cv::Mat& image : level) {
-    const double gain = median_ratio(image, reference);
-    // Below one percent the correction would only add rounding.
-    if (std::abs(gain - 1.0) > 0.01) {
-      cv::Mat scaled;
-      image.convertTo(scaled, CV_8U, 1.0 / gain);
-      image = scaled;
-    }
-  }
-  Background background;
-  const Quantiles q = quantiles_of(level);
-  background.plate_ = q.median;
-  // The quartile distance of a normal deviate is 1.35 sigma (here of 16: ranks 4 and 13, 1.4).
-  background.noise_ = std::max(0.7, median_of(q.spread) / 1.4);
-  cv::threshold(q.range, background.active_, std::max(14.0, 7.0 * background.noise_), 255,
-                cv::THRESH_BINARY);
-  cv::Mat restless;
-  cv::threshold(q.half, restless, 8.0 + 4.0 * background.noise_, 255, cv::THRESH_BINARY);
-  background.restless_ =
-      static_cast<double>(cv::countNonZero(restless)) / static_cast<double>(restless.total());
-  background.uncover(level, restless);
-  return background;
+// The quartile distance of a normal deviate is 1.35 sigma (here of 16: ranks 4 and 13, 1.4).
+double noise_of(const Quantiles& q) {
+  return std::max(0.7, median_of(q.spread) / 1.4);
 }
 
-void Background::uncover(const std::vector<cv::Mat>& samples, const cv::Mat& restless) {
+cv::Mat above(const cv::Mat& image, double threshold) {
+  cv::Mat mask;
+  cv::threshold(image, mask, threshold, 255, cv::THRESH_BINARY);
+  return mask;
+}
+
+cv::Mat restless_of(const Quantiles& q, double noise) {
+  return above(q.half, 8.0 + 4.0 * noise);
+}
+
+/// Replaces, in one plane of the plate, what does not look like the static surroundings.
+void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat& active,
+             const cv::Mat& restless, double noise) {
   constexpr double kMostActive = 0.7;  // beyond, the camera moves and nothing is static
-  const int active = cv::countNonZero(active_);
-  if (active == 0 || active > kMostActive * static_cast<double>(active_.total())) return;
-  const Surroundings around = Surroundings::of(plate_, active_);
+  const int count = cv::countNonZero(active);
+  if (count == 0 || count > kMostActive * static_cast<double>(active.total())) return;
+  const Surroundings around = Surroundings::of(plane, active);
   const cv::Mat doubtful = smoothed_mask(restless);
   // The rim of what changed changed too, by less than counts.
   cv::Mat changed;
-  cv::dilate(active_, changed, cv::Mat::ones(5, 5, CV_8U));
+  cv::dilate(active, changed, cv::Mat::ones(5, 5, CV_8U));
   std::array<int, kSamples> levels{};
-  for (int y = 0; y < plate_.rows; ++y)
-    for (int x = 0; x < plate_.cols; ++x) {
+  for (int y = 0; y < plane.rows; ++y)
+    for (int x = 0; x < plane.cols; ++x) {
       if (changed.at<std::uint8_t>(y, x) == 0) continue;
       const int sy = std::min(y / Surroundings::kFactor, around.level.rows - 1);
       const int sx = std::min(x / Surroundings::kFactor, around.level.cols - 1);
       const double level = around.level.at<float>(sy, sx);
       if (level < 0.0) continue;
-      const double tolerance = 5.0 + 2.5 * (noise_ + around.scatter.at<float>(sy, sx));
-      std::uint8_t& plate = plate_.at<std::uint8_t>(y, x);
+      const double tolerance = 5.0 + 2.5 * (noise + around.scatter.at<float>(sy, sx));
+      std::uint8_t& plate = plane.at<std::uint8_t>(y, x);
       if (std::abs(plate - level) <= tolerance) continue;
       for (std::size_t k = 0; k < kSamples; ++k)
         levels[k] = samples[k * samples.size() / kSamples].at<std::uint8_t>(y, x);
@@ -230,17 +218,87 @@ void Background::uncover(const std::vector<cv::Mat>& samples, const cv::Mat& res
     }
 }
 
-double Background::gain(const cv::Mat& luma) const {
-  return median_ratio(luma, plate_);
+/// Colours fade with the light towards the neutral 128.
+void scale(const cv::Mat& from, cv::Mat to, double gain, double neutral) {
+  if (std::abs(gain - 1.0) < 0.004)
+    from.copyTo(to);
+  else
+    from.convertTo(to, CV_8U, gain, neutral * (1.0 - gain));
 }
 
-void Background::scaled_into(cv::Mat& image, double gain, const cv::Rect& box) const {
-  if (image.size() != plate_.size()) image = plate_.clone();
-  cv::Mat part = image(box);
-  if (std::abs(gain - 1.0) < 0.004)
-    plate_(box).copyTo(part);
-  else
-    plate_(box).convertTo(part, CV_8U, gain);
+cv::Rect halved(const cv::Rect& box, const cv::Size& half) {
+  const cv::Point from(box.x / 2, box.y / 2), to((box.br().x + 1) / 2, (box.br().y + 1) / 2);
+  return cv::Rect(from, to) & cv::Rect({}, half);
+}
+
+}  // namespace
+
+Background Background::from_samples(const BackgroundSamples& samples) {
+  std::vector<cv::Mat> level = samples.luma;
+  std::vector<double> gains;
+  const cv::Mat& reference = samples.luma[samples.luma.size() / 2];
+  for (cv::Mat& image : level) {
+    gains.push_back(median_ratio(image, reference));
+    // Below one percent the correction would only add rounding.
+    if (std::abs(gains.back() - 1.0) <= 0.01) continue;
+    cv::Mat scaled;
+    image.convertTo(scaled, CV_8U, 1.0 / gains.back());
+    image = scaled;
+  }
+  Background background;
+  const Quantiles q = quantiles_of(level);
+  Plate& plate = background.plate_;
+  plate.luma = q.median;
+  plate.noise_levels = noise_of(q);
+  background.active_ = above(q.range, std::max(14.0, 7.0 * plate.noise_levels));
+  const cv::Mat restless = restless_of(q, plate.noise_levels);
+  background.restless_ =
+      static_cast<double>(cv::countNonZero(restless)) / static_cast<double>(restless.total());
+  uncover(plate.luma, level, background.active_, restless, plate.noise_levels);
+  if (!samples.chroma.empty()) background.estimate_chroma(samples.chroma, gains);
+  return background;
+}
+
+void Background::estimate_chroma(const std::vector<cv::Mat>& samples,
+                                 const std::vector<double>& gains) {
+  std::array<std::vector<cv::Mat>, 2> planes;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    cv::Mat levelled(samples[k].size(), samples[k].type());
+    scale(samples[k], levelled, 1.0 / gains[k], 128.0);
+    std::array<cv::Mat, 2> two;
+    cv::split(levelled, two.data());
+    for (std::size_t c = 0; c < 2; ++c) planes[c].push_back(two[c]);
+  }
+  const std::array<Quantiles, 2> q{quantiles_of(planes[0]), quantiles_of(planes[1])};
+  const double noise = std::max(noise_of(q[0]), noise_of(q[1]));
+  cv::Mat active;
+  cv::resize(active_, active, samples[0].size(), 0, 0, cv::INTER_NEAREST);
+  for (const Quantiles& plane : q)
+    cv::bitwise_or(active, above(plane.range, std::max(10.0, 7.0 * noise)), active);
+  const cv::Mat restless = restless_of(q[0], noise) | restless_of(q[1], noise);
+  std::array<cv::Mat, 2> estimate{q[0].median, q[1].median};
+  for (std::size_t c = 0; c < 2; ++c) uncover(estimate[c], planes[c], active, restless, noise);
+  cv::merge(estimate.data(), 2, plate_.chroma);
+  plate_.chroma_noise_levels = noise;
+  cv::Mat full;
+  cv::resize(active, full, active_.size(), 0, 0, cv::INTER_NEAREST);
+  cv::bitwise_or(active_, full, active_);
+}
+
+double Background::gain(const cv::Mat& luma) const {
+  return median_ratio(luma, plate_.luma);
+}
+
+void Background::scaled_into(Plate& plate, double gain, const cv::Rect& box) const {
+  if (plate.luma.size() != plate_.luma.size()) {
+    plate = plate_;
+    plate.luma = plate_.luma.clone();
+    plate.chroma = plate_.chroma.clone();
+  }
+  scale(plate_.luma(box), plate.luma(box), gain, 0.0);
+  if (plate_.chroma.empty()) return;
+  const cv::Rect half = halved(box, plate_.chroma.size());
+  scale(plate_.chroma(half), plate.chroma(half), gain, 128.0);
 }
 
 }  // namespace trochoid::tracking

@@ -5,6 +5,19 @@
 
 namespace trochoid::tracking {
 
+/// The scene without the bodies, at the brightness of some frame.
+struct Plate {
+  cv::Mat luma;    ///< CV_8UC1
+  cv::Mat chroma;  ///< CV_8UC2 of half the size as Frame::chroma, or empty
+  /// Standard deviation of one pixel over time [levels].
+  double noise_levels = 1.0, chroma_noise_levels = 1.0;
+};
+
+/// Pictures spread over a recording: luma, and chroma of the same frames or none.
+struct BackgroundSamples {
+  std::vector<cv::Mat> luma, chroma;
+};
+
 /// What the camera sees without the moving bodies, from frames spread over a recording.
 class Background {
  public:
@@ -15,13 +28,13 @@ class Background {
   /// changed and the median does not look like the static surroundings - a body rested or hovered
   /// there most of the time - samples that do take its place; where none does and the picture never
   /// settles, the surroundings themselves do.
-  /// @param samples CV_8UC1 of one size, at least one.
-  static Background from_samples(const std::vector<cv::Mat>& samples);
+  /// Where the chroma of pixels changed - a body as dark as the floor - they changed as well.
+  /// @param samples CV_8UC1 (and CV_8UC2) of one size, at least one.
+  static Background from_samples(const BackgroundSamples& samples);
 
-  [[nodiscard]] bool empty() const { return plate_.empty(); }
-  [[nodiscard]] const cv::Mat& plate() const { return plate_; }
-  /// Standard deviation of one pixel over time [levels], at least 0.7.
-  [[nodiscard]] double noise_levels() const { return noise_; }
+  [[nodiscard]] bool empty() const { return plate_.luma.empty(); }
+  /// At the brightness of one of the samples; noise at least 0.7 levels.
+  [[nodiscard]] const Plate& plate() const { return plate_; }
   /// Pixels that changed in some sample by more than noise (CV_8UC1, 0 or 255).
   [[nodiscard]] const cv::Mat& active() const { return active_; }
   /// Share of the picture that changes most of the time: near 0 for a camera on a stand.
@@ -30,14 +43,14 @@ class Background {
   /// Brightness of a frame relative to the plate: the median ratio over a coarse grid, so that a
   /// body, a hand or a shadow on less than half of the picture does not count.
   [[nodiscard]] double gain(const cv::Mat& luma) const;
-  /// gain x plate within `box`, into an image of the full size (pixels outside are left alone).
-  void scaled_into(cv::Mat& image, double gain, const cv::Rect& box) const;
+  /// gain x plate within `box`, into a plate of the full size (pixels outside are left alone).
+  void scaled_into(Plate& plate, double gain, const cv::Rect& box) const;
 
  private:
-  void uncover(const std::vector<cv::Mat>& samples, const cv::Mat& restless);
+  void estimate_chroma(const std::vector<cv::Mat>& samples, const std::vector<double>& gains);
 
-  cv::Mat plate_, active_;
-  double noise_ = 1.0;
+  Plate plate_;
+  cv::Mat active_;
   double restless_ = 0.0;
 };
 

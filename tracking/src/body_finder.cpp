@@ -26,9 +26,9 @@ class RimFinder final : public BodyFinder {
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     RimSearch search{.reach_px = look.reach_px,
-                     .noise_levels = look.noise_levels,
+                     .noise_levels = look.background.noise_levels,
                      .circle = circle_,
-                     .background = &look.background};
+                     .background = &look.background.luma};
     Ellipse start;
     if (look.predicted != nullptr) {
       start = look.predicted->rim;
@@ -72,7 +72,7 @@ class RimFinder final : public BodyFinder {
       outline.push_back({rim.centre_px + rim.shape_px * u, (inverse * u).normalized(),
                          gap_px(look, (inverse * u).normalized(), 0.5)});
     }
-    return weigh(look.frame.luma, look.background, look.noise_levels, face, outline);
+    return weigh(look.frame, look.background, face, outline);
   }
 
   bool circle_;
@@ -92,7 +92,7 @@ class CylinderFinder final : public BodyFinder {
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     const OutlineEvidence evidence{.luma = look.frame.luma,
-                                   .background = look.background,
+                                   .background = look.background.luma,
                                    .detection = look.detection,
                                    .predicted = look.predicted != nullptr && look.predicted->pose
                                                     ? std::optional(look.predicted->pose->pose)
@@ -102,7 +102,8 @@ class CylinderFinder final : public BodyFinder {
                                                    ? std::optional(look.last->pose->pose)
                                                    : std::nullopt,
                                    .exposure_fraction = exposure_fraction_,
-                                   .chroma = look.frame.chroma};
+                                   .chroma = look.frame.chroma,
+                                   .background_chroma = look.background.chroma};
     auto measured = fitter_.measure(evidence);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,
@@ -168,7 +169,7 @@ class CylinderFinder final : public BodyFinder {
             pose.centre_m + radius * (std::cos(angle) * node + std::sin(angle) * across)));
       }
     }
-    return weigh(look.frame.luma, look.background, look.noise_levels, face, outline);
+    return weigh(look.frame, look.background, face, outline);
   }
 
   /// The ellipse the outer rim of the middle plane appears as, to first order.

@@ -2,6 +2,7 @@
 #include <memory>
 #include <optional>
 
+#include "background.hpp"
 #include "evidence.hpp"
 #include "rim_fit.hpp"
 #include "trochoid/tracking/frame_source.hpp"
@@ -26,8 +27,7 @@ struct Sighting {
 /// Picture evidence and what is expected, for one attempt.
 struct Look {
   const Frame& frame;
-  const cv::Mat& background;  ///< of the frame's brightness near the body
-  double noise_levels = 1.0;
+  const Plate& background;  ///< of the frame's brightness near the body
   std::optional<Detection> detection{};
   const Sighting* predicted = nullptr;
   const Sighting* last = nullptr;  ///< in the frame before, if seen there
@@ -44,8 +44,8 @@ class BodyFinder {
   [[nodiscard]] virtual std::optional<Sighting> find(const Look& look) const = 0;
   /// Puts centre and rim of a guessed sighting where its pose, if it has one, would be seen.
   virtual void place(Sighting& guess) const = 0;
-  /// Measures the other tilt with nearly the same silhouette, mirrored at the line of sight; nothing
-  /// where there is none.
+  /// Measures the other tilt with nearly the same silhouette, mirrored at the line of sight;
+  /// nothing where there is none.
   [[nodiscard]] virtual std::optional<Sighting> mirrored(const Look& /*look*/,
                                                          const Sighting& /*seen*/) const {
     return std::nullopt;

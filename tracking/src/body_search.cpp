@@ -22,13 +22,13 @@ std::vector<Candidate> collect(const std::vector<Frame>& held, const Background&
                                const BodyFinder& finder,
                                const std::vector<Follower::Others>& explained) {
   std::vector<Candidate> candidates;
-  cv::Mat plate;
+  Plate plate;
   const std::size_t looks = std::min<std::size_t>(24, held.size());
   for (std::size_t k = 0; k < looks; ++k) {
     const std::size_t index = (2 * k + 1) * held.size() / (2 * looks);
-    const cv::Mat& luma = held[index].luma;
-    background.scaled_into(plate, background.gain(luma), cv::Rect({}, luma.size()));
-    for (const Silhouette& body : find_bodies(luma, plate, background.noise_levels())) {
+    const Frame& frame = held[index];
+    background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+    for (const Silhouette& body : find_bodies(frame, plate)) {
       const Detection& d = body.detection;
       const auto& taken = explained[index];
       // Also when the region covers the other body and more: two in contact look like one.
@@ -107,13 +107,13 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
   constexpr int kMostTries = 16, kEnough = 4;
   std::optional<Seed> best;
   double best_value = 0.0;
-  cv::Mat plate;
+  Plate plate;
   int tries = 0, good = 0;
   for (const Candidate& c : candidates) {
     if (++tries > kMostTries || good >= kEnough) break;
     const Frame& frame = held[c.held_index];
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
-    Look look{.frame = frame, .background = plate, .noise_levels = background.noise_levels()};
+    Look look{.frame = frame, .background = plate};
     look.detection = c.detection;
     const auto seen = finder.find(look);
     if (!seen || seen->accepted < 0.4) continue;
@@ -135,10 +135,9 @@ std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index
                                const Background& background, const BodyFinder& finder,
                                const Eigen::Vector2d& at_px) {
   const Frame& frame = held[index];
-  Look look{
-      .frame = frame, .background = background.plate(), .noise_levels = background.noise_levels()};
+  Look look{.frame = frame, .background = background.plate()};
   std::vector<Detection> guesses;
-  for (const Silhouette& body : find_silhouettes(frame.luma, background.plate(), look.noise_levels))
+  for (const Silhouette& body : find_silhouettes(frame, background.plate()))
     if (body.detection.box.contains(
             cv::Point(static_cast<int>(at_px.x()), static_cast<int>(at_px.y()))))
       guesses.push_back(body.detection);

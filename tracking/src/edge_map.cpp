@@ -37,11 +37,14 @@ Gradient gradient_of(const cv::Mat& picture) {
   return g;
 }
 
-// Changes below kSoft are shading, far above kSharp a body against its background.
-float strength_of(float change) {
-  constexpr float kSoft = 0.02F, kSharp = 0.06F;
-  const float over = std::max(0.0F, change - kSoft);
-  return over / (over + kSharp);
+// Changes below `soft` are shading, far above `sharp` a body against its background.
+float strength_of(float change, float soft, float sharp) {
+  const float over = std::max(0.0F, change - soft);
+  return over / (over + sharp);
+}
+
+void raise(float& value, float to) {
+  value = std::max(value, to);
 }
 
 }  // namespace
@@ -59,28 +62,65 @@ EdgeMap::EdgeMap(const cv::Mat& luma, const cv::Mat& plate, const cv::Rect& wind
   if (!plate.empty()) changed = gradient_of(picture - logarithm(plate(window_)));
   const cv::Size cells((window_.width + cell_px_ - 1) / cell_px_,
                        (window_.height + cell_px_ - 1) / cell_px_);
-  for (cv::Mat& s : strength_) s = cv::Mat::zeros(cells, CV_32FC1);
+  for (cv::Mat& s : own_) s = cv::Mat::zeros(cells, CV_32FC1);
   for (int y = 0; y < window_.height; ++y) {
     const auto *gx = g.x.ptr<float>(y), *gy = g.y.ptr<float>(y);
     const auto *cx = changed.x.ptr<float>(y), *cy = changed.y.ptr<float>(y);
     for (int x = 0; x < window_.width; ++x) {
       const float least = std::min(std::hypot(gx[x], gy[x]), std::hypot(cx[x], cy[x]));
-      const float strength = strength_of(least);
+      const float strength = strength_of(least, 0.02F, 0.06F);
       if (strength <= 0.0F) continue;
-      float& cell = strength_[static_cast<size_t>(direction_of(gx[x], gy[x]))].at<float>(
-          y / cell_px_, x / cell_px_);
-      cell = std::max(cell, strength);
+      raise(own_[static_cast<size_t>(direction_of(gx[x], gy[x]))].at<float>(y / cell_px_,
+                                                                            x / cell_px_),
+            strength);
     }
   }
-  // A normal between two directions, a point near the border of a cell.
-  std::array<cv::Mat, kDirections> wide;
-  for (size_t i = 0; i < kDirections; ++i) {
-    const cv::Mat& before = strength_[(i + kDirections - 1) % kDirections];
-    const cv::Mat& after = strength_[(i + 1) % kDirections];
-    wide[i] = cv::max(strength_[i], 0.7 * cv::max(before, after));
-    cv::blur(wide[i], wide[i], {3, 3}, {-1, -1}, cv::BORDER_CONSTANT);
+  spread();
+}
+
+void EdgeMap::add_colours(const cv::Mat& chroma, const cv::Mat& plate) {
+  constexpr float kSoftLevels = 2.0F, kSharpLevels = 4.0F;  // per pixel of the half-size planes
+  const cv::Rect half = cv::Rect(cv::Point((window_.x + 1) / 2, (window_.y + 1) / 2),
+                                 cv::Point(window_.br().x / 2, window_.br().y / 2)) &
+                        cv::Rect({}, chroma.size());
+  if (half.width < 3 || half.height < 3) return;
+  for (const int plane : {0, 1}) {
+    cv::Mat now, then;
+    cv::extractChannel(chroma(half), now, plane);
+    now.convertTo(now, CV_32F);
+    const Gradient g = gradient_of(now);
+    Gradient changed = g;
+    if (!plate.empty()) {
+      cv::extractChannel(plate(half), then, plane);
+      then.convertTo(then, CV_32F);
+      changed = gradient_of(now - then);
+    }
+    for (int y = 0; y < half.height; ++y) {
+      const auto *gx = g.x.ptr<float>(y), *gy = g.y.ptr<float>(y);
+      const auto *cx = changed.x.ptr<float>(y), *cy = changed.y.ptr<float>(y);
+      for (int x = 0; x < half.width; ++x) {
+        const float least = std::min(std::hypot(gx[x], gy[x]), std::hypot(cx[x], cy[x]));
+        const float strength = strength_of(least, kSoftLevels, kSharpLevels);
+        if (strength <= 0.0F) continue;
+        cv::Mat& cells = own_[static_cast<size_t>(direction_of(gx[x], gy[x]))];
+        for (int k = 0; k < 4; ++k)
+          raise(cells.at<float>((2 * (half.y + y) + k / 2 - window_.y) / cell_px_,
+                                (2 * (half.x + x) + k % 2 - window_.x) / cell_px_),
+                strength);
+      }
+    }
   }
-  strength_ = wide;
+  spread();
+}
+
+void EdgeMap::spread() {
+  // A normal between two directions, a point near the border of a cell.
+  for (size_t i = 0; i < kDirections; ++i) {
+    const cv::Mat& before = own_[(i + kDirections - 1) % kDirections];
+    const cv::Mat& after = own_[(i + 1) % kDirections];
+    strength_[i] = cv::max(own_[i], 0.7 * cv::max(before, after));
+    cv::blur(strength_[i], strength_[i], {3, 3}, {-1, -1}, cv::BORDER_CONSTANT);
+  }
 }
 
 }  // namespace trochoid::tracking

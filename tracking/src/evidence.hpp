@@ -3,6 +3,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "background.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
 namespace trochoid::tracking {
 
 /// How far a picture speaks for a body being where a fit puts it. A fit to floor texture or to an
@@ -19,10 +22,9 @@ struct Border {
   double gap_px = 1.5;  ///< distance from the edge at which its two levels are pure
 };
 
-/// Weighs face and outline of a body in `luma` against the background at the frame's brightness.
-/// Points outside the picture count as not seen.
-/// @param noise_levels standard deviation of one pixel.
-[[nodiscard]] Evidence weigh(const cv::Mat& luma, const cv::Mat& background, double noise_levels,
+/// Weighs face and outline of a body in a frame against the background at its brightness, by luma
+/// or colour. Points outside the picture count as not seen.
+[[nodiscard]] Evidence weigh(const Frame& frame, const Plate& background,
                              const std::vector<Eigen::Vector2d>& face_px,
                              const std::vector<Border>& outline);
 

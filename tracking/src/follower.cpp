@@ -92,7 +92,7 @@ std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& ex
   const cv::Rect box = box_around(guess.centre_px, 1.6 * size + reach_px + 12.0, frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
   background_.scaled_into(plate_, gain_, box);
-  Look look{.frame = frame, .background = plate_, .noise_levels = background_.noise_levels()};
+  Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.reach_px = reach_px;
   set_shape_knowledge(look, guess);
@@ -139,13 +139,13 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
                             : box_around(predicted.centre_px, gate + 2.2 * size, frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
   background_.scaled_into(plate_, gain_, box);
-  Look look{.frame = frame, .background = plate_, .noise_levels = background_.noise_levels()};
+  Look look{.frame = frame, .background = plate_};
   struct Candidate {
     double score;
     Detection detection;
   };
   std::vector<Candidate> candidates;
-  for (const Silhouette& body : find_bodies(frame.luma, plate_, look.noise_levels, box)) {
+  for (const Silhouette& body : find_bodies(frame, plate_, box)) {
     const Detection& d = body.detection;
     if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) continue;
     if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others))

@@ -44,7 +44,7 @@ class Follower {
   const Background& background_;
   std::shared_ptr<const SpinProfile> marks_;
   Forecast forecast_;
-  cv::Mat plate_;  ///< background at the brightness of the frame, valid near the body
+  Plate plate_;  ///< background at the brightness of the frame, valid near the body
   double gain_ = 1.0;
   double shape_surprise_px_ = 0.3;
   Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();  ///< running mean of whole sightings

@@ -40,7 +40,7 @@ double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim
 struct Watch {
   std::vector<double> radii, ratios, bore;
   cv::Rect2d box;
-  cv::Mat plate;
+  Plate plate;
 
   void add(const Frame& frame, const Background& background, const Ellipse& rim) {
     radii.push_back(rim.semi_major_px());
@@ -48,10 +48,10 @@ struct Watch {
     const cv::Rect2d point(rim.centre_px.x(), rim.centre_px.y(), 1e-9, 1e-9);
     box = radii.size() == 1 ? point : (box | point);
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
-    const double noise = background.noise_levels();
+    const double noise = plate.noise_levels;
     // Less what looks like the floor where the body certainly is: it may have its colour.
-    bore.push_back(floor_share(frame.luma, plate, rim, noise, 0.1, 0.4) -
-                   floor_share(frame.luma, plate, rim, noise, 0.88, 0.96));
+    bore.push_back(floor_share(frame.luma, plate.luma, rim, noise, 0.1, 0.4) -
+                   floor_share(frame.luma, plate.luma, rim, noise, 0.88, 0.96));
   }
 };
 
@@ -81,7 +81,9 @@ Inspection::Body watch(const std::vector<Frame>& held, const Background& backgro
 }  // namespace
 
 Inspection inspect_video(const std::filesystem::path& path) {
-  const Recording recording(path, {});
+  SourceOptions how;
+  how.chroma = true;
+  const Recording recording(path, how);
   const auto& held = recording.held();
   const Background background = Background::from_samples(recording.samples());
   Inspection result;

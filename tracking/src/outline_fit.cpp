@@ -181,11 +181,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   const PoseMotion motion(body_, support_, camera_);
   const bool alike = body_.faces_look_alike() && support_.kind != data::SupportKind::pivot;
   const std::vector<data::Pose<>> starts =
-      evidence.predicted ? std::vector{motion.settled(*evidence.predicted)}
-      : evidence.detection
-          ? starts_from_edges(body_, support_, camera_, motion, *evidence.detection, evidence.luma,
-                              evidence.background)
-          : std::vector<data::Pose<>>{};
+      evidence.predicted   ? std::vector{motion.settled(*evidence.predicted)}
+      : evidence.detection ? starts_from_edges(body_, support_, camera_, motion, evidence)
+                           : std::vector<data::Pose<>>{};
   if (starts.empty()) return std::nullopt;
   const double margin_px = evidence.predicted ? 12.0 : 24.0;
   cv::Rect window = window_of(body_, camera_, starts.front(), margin_px);

@@ -31,11 +31,17 @@ std::optional<Frame> Recording::next() {
   return source_->next();
 }
 
-std::vector<cv::Mat> Recording::samples() const {
-  std::vector<cv::Mat> chosen;
+BackgroundSamples Recording::samples() const {
+  BackgroundSamples chosen;
+  bool coloured = true;
+  const auto choose = [&](const Frame& frame) {
+    chosen.luma.push_back(frame.luma);
+    chosen.chroma.push_back(frame.chroma);
+    coloured = coloured && !frame.chroma.empty();
+  };
   const auto from_held = [&](std::size_t count) {
-    for (std::size_t k = 0; k < count; ++k)
-      chosen.push_back(held_[(2 * k + 1) * held_.size() / (2 * count)].luma);
+    for (std::size_t k = 0; k < count; ++k) choose(held_[(2 * k + 1) * held_.size() / (2 * count)]);
+    if (!coloured) chosen.chroma.clear();
   };
   const auto wanted = static_cast<std::size_t>(Background::kSamples);
   if (!more_) {
@@ -49,19 +55,19 @@ std::vector<cv::Mat> Recording::samples() const {
   options.from.clear();
   options.to.clear();
   const auto keys = open_video(path_, options);
-  std::vector<cv::Mat> later;
+  std::vector<Frame> later;
   std::size_t stride = 1, count = 0;
   while (auto frame = keys->next()) {
     if (count++ % stride != 0) continue;
-    later.push_back(frame->luma);
+    later.push_back(std::move(*frame));
     if (later.size() < 2 * wanted) continue;
-    for (std::size_t k = 0; k < wanted; ++k) later[k] = later[2 * k];
+    for (std::size_t k = 0; k < wanted; ++k) later[k] = std::move(later[2 * k]);
     later.resize(wanted);
     stride *= 2;
   }
   const std::size_t share = std::min(later.size(), wanted / 2);
-  for (std::size_t k = 0; k < share; ++k)
-    chosen.push_back(later[(2 * k + 1) * later.size() / (2 * share)]);
+  for (std::size_t k = 0; k < share; ++k) choose(later[(2 * k + 1) * later.size() / (2 * share)]);
+  if (!coloured) chosen.chroma.clear();
   return chosen;
 }
 

@@ -27,7 +27,7 @@ class Recording {
   [[nodiscard]] std::optional<Frame> next();
   /// Pictures spread over the whole recording, for the background: from the held part, and, where
   /// more follows, from the frames of the file that decode alone.
-  [[nodiscard]] std::vector<cv::Mat> samples() const;
+  [[nodiscard]] BackgroundSamples samples() const;
 
  private:
   std::filesystem::path path_;

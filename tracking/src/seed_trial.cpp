@@ -28,9 +28,9 @@ double trial(const std::vector<Frame>& held, const Background& background, const
 Seed better_reading(const std::vector<Frame>& held, const Background& background,
                     const BodyFinder& finder, Seed seed) {
   const Frame& frame = held[seed.held_index];
-  cv::Mat plate;
+  Plate plate;
   background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
-  Look look{.frame = frame, .background = plate, .noise_levels = background.noise_levels()};
+  Look look{.frame = frame, .background = plate};
   auto other = finder.mirrored(look, seed.seen);
   // The same attitude again: seen face on, tilts this way and that are one.
   if (!other || apart_px(*other, seed.seen) < 0.1 * seed.seen.rim.semi_major_px()) return seed;

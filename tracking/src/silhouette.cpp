@@ -64,19 +64,59 @@ struct Difference {
   int factor = 1;
   double threshold = 0.0;
   cv::Mat size, brighter;  ///< absolute, and where the picture is brighter
+  cv::Mat colour;          ///< how far from the background's colour in any light; may be empty
 };
 
-bool difference_in(const cv::Mat& luma, const cv::Mat& background, double noise_levels,
-                   cv::Rect box, Difference& d) {
-  const cv::Rect whole(0, 0, luma.cols, luma.rows);
+/// Distance of the colour from that of the plate in whatever light falls on it, times `weight`: in
+/// a shadow luma and chroma shrink together.
+cv::Mat colour_off(const cv::Mat& luma, const cv::Mat& plate, const cv::Mat& chroma,
+                   const cv::Mat& plate_chroma, double weight) {
+  constexpr float kNeutral = 128.0F, kDarkest = 0.25F;
+  cv::Mat off(luma.size(), CV_8U);
+  for (int y = 0; y < off.rows; ++y) {
+    const auto *is = luma.ptr<std::uint8_t>(y), *was = plate.ptr<std::uint8_t>(y);
+    const auto *c = chroma.ptr<cv::Vec2b>(y), *p = plate_chroma.ptr<cv::Vec2b>(y);
+    for (int x = 0; x < off.cols; ++x) {
+      const float light = std::clamp(
+          static_cast<float>(is[x]) / std::max(1.0F, static_cast<float>(was[x])), kDarkest, 1.0F);
+      const auto from = [&](int plane) {
+        return static_cast<float>(c[x][plane]) - kNeutral -
+               light * (static_cast<float>(p[x][plane]) - kNeutral);
+      };
+      off.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(static_cast<float>(weight) *
+                                                                   std::hypot(from(0), from(1)));
+    }
+  }
+  return off;
+}
+
+bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Difference& d) {
+  const cv::Rect whole(0, 0, frame.luma.cols, frame.luma.rows);
   d.box = box.empty() ? whole : (box & whole);
+  // The chroma has every second pixel only.
+  d.box = cv::Rect(cv::Point(d.box.x & ~1, d.box.y & ~1), d.box.br());
   if (d.box.width < 4 || d.box.height < 4) return false;
-  d.factor = reduction(luma.size());
-  const cv::Mat now = reduced(luma(d.box), d.factor), plate = reduced(background(d.box), d.factor);
+  d.factor = reduction(frame.luma.size());
+  const cv::Mat now = reduced(frame.luma(d.box), d.factor),
+                plate = reduced(background.luma(d.box), d.factor);
   cv::absdiff(now, plate, d.size);
   cv::subtract(now, plate, d.brighter);
   // Averaging factor^2 pixels beats the noise down; compression and grain leave a floor.
-  d.threshold = std::max(7.0, 4.5 * noise_levels / d.factor);
+  d.threshold = std::max(7.0, 4.5 * background.noise_levels / d.factor);
+  if (frame.chroma.empty() || background.chroma.empty()) return true;
+  const cv::Rect half =
+      cv::Rect(d.box.x / 2, d.box.y / 2, (d.box.width + 1) / 2, (d.box.height + 1) / 2) &
+      cv::Rect({}, frame.chroma.size());
+  const auto to_size = [&](const cv::Mat& chroma) {
+    cv::Mat out;
+    cv::resize(chroma(half), out, now.size(), 0, 0,
+               d.factor > 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
+    return out;
+  };
+  const double colour_threshold = std::max(6.0, 5.0 * background.chroma_noise_levels);
+  d.colour = colour_off(now, plate, to_size(frame.chroma), to_size(background.chroma),
+                        d.threshold / colour_threshold);
+  d.size = cv::max(d.size, d.colour);
   return true;
 }
 
@@ -135,26 +175,25 @@ void largest_first(std::vector<Silhouette>& bodies) {
 
 }  // namespace
 
-std::vector<Silhouette> find_silhouettes(const cv::Mat& luma, const cv::Mat& background,
-                                         double noise_levels, cv::Rect box) {
+std::vector<Silhouette> find_silhouettes(const Frame& frame, const Plate& background,
+                                         cv::Rect box) {
   Difference d;
   std::vector<Silhouette> bodies;
-  if (!difference_in(luma, background, noise_levels, box, d)) return bodies;
+  if (!difference_in(frame, background, box, d)) return bodies;
   for (const Contour& contour : contours_above(d.size, d.threshold)) {
-    Silhouette body = describe(contour, d.factor, d.box.tl(), luma.size());
+    Silhouette body = describe(contour, d.factor, d.box.tl(), frame.luma.size());
     if (body.detection.area_px2 > 0.0) bodies.push_back(std::move(body));
   }
   largest_first(bodies);
   return bodies;
 }
 
-std::vector<Silhouette> find_bodies(const cv::Mat& luma, const cv::Mat& background,
-                                    double noise_levels, cv::Rect box) {
+std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background, cv::Rect box) {
   Difference d;
   std::vector<Silhouette> bodies;
-  if (!difference_in(luma, background, noise_levels, box, d)) return bodies;
+  if (!difference_in(frame, background, box, d)) return bodies;
   const auto add = [&](const Contour& contour) {
-    Silhouette body = describe(contour, d.factor, d.box.tl(), luma.size());
+    Silhouette body = describe(contour, d.factor, d.box.tl(), frame.luma.size());
     if (body.detection.area_px2 <= 0.0) return;
     const bool known = std::any_of(bodies.begin(), bodies.end(), [&](const Silhouette& other) {
       const Detection &a = other.detection, &b = body.detection;
@@ -176,6 +215,8 @@ std::vector<Silhouette> find_bodies(const cv::Mat& luma, const cv::Mat& backgrou
     }
   }
   for (const Contour& contour : contours_above(d.brighter, d.threshold)) add(contour);
+  if (!d.colour.empty())
+    for (const Contour& contour : contours_above(d.colour, d.threshold)) add(contour);
   largest_first(bodies);
   return bodies;
 }

@@ -2,7 +2,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "background.hpp"
 #include "trochoid/tracking/detector.hpp"
+#include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tracking {
 
@@ -14,17 +16,16 @@ struct Silhouette {
   double ellipticity = 0.0;  ///< area of the hull over that of the ellipse with its moments
 };
 
-/// Regions of `luma` that differ from `background` (of the same brightness) by more than noise,
-/// largest first. Works on a picture reduced to about 400 px across.
+/// Regions of a picture that differ from the background (of the same brightness) in luma or colour
+/// by more than noise, largest first. Works on a picture reduced to about 400 px across.
 /// @param box part of the picture to look at; empty = all.
-[[nodiscard]] std::vector<Silhouette> find_silhouettes(const cv::Mat& luma,
-                                                       const cv::Mat& background,
-                                                       double noise_levels, cv::Rect box = {});
+[[nodiscard]] std::vector<Silhouette> find_silhouettes(const Frame& frame, const Plate& background,
+                                                       cv::Rect box = {});
 
 /// Readings of the same regions as bodies, largest first: each region as it is, its part that
-/// differs most (a body without the shadow it casts), and what is brighter than the background
-/// alone (no shadow is).
-[[nodiscard]] std::vector<Silhouette> find_bodies(const cv::Mat& luma, const cv::Mat& background,
-                                                  double noise_levels, cv::Rect box = {});
+/// differs most (a body without the shadow it casts), what is brighter than the background alone,
+/// and what has another colour than the background in any light (no shadow is either).
+[[nodiscard]] std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
+                                                  cv::Rect box = {});
 
 }  // namespace trochoid::tracking

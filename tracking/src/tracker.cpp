@@ -76,7 +76,7 @@ class Tracking {
  private:
   static SourceOptions source_options(const data::Scene& scene, const TrackOptions& options) {
     SourceOptions source;
-    source.chroma = has_shape(scene);  // the rim finder works on luma alone
+    source.chroma = true;
     source.frame_rate_hz = scene.camera.frame_rate_hz;
     source.from = options.from.empty() ? scene.tracking.from : options.from;
     source.to = options.to.empty() ? scene.tracking.to : options.to;
@@ -178,7 +178,7 @@ class Tracking {
 
   [[nodiscard]] std::shared_ptr<const SpinProfile> marks_of(const Frame& frame,
                                                             const Sighting& seen) const {
-    auto profile = SpinProfile::from_face(frame.luma, seen.rim, background_.noise_levels());
+    auto profile = SpinProfile::from_face(frame.luma, seen.rim, background_.plate().noise_levels);
     return profile ? std::make_shared<const SpinProfile>(std::move(*profile)) : nullptr;
   }
 

@@ -45,6 +45,7 @@ struct OutlineEvidence {
   std::optional<data::Pose<>> previous{};  ///< one frame earlier or later: how fast it moves
   double exposure_fraction = 0.0;          ///< shutter time over frame interval: how far it smears
   cv::Mat chroma{};                        ///< CV_8UC2 of half the size, or empty: Frame::chroma
+  cv::Mat background_chroma{};             ///< what it would be without the body, or empty
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
