@@ -136,6 +136,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   }
   m.rms_px = r.solution.rms_px;
   m.accepted = fitted.score;
+  m.evidence = fitted.evidence;
   for (size_t i = 0; i < r.equations.size(); ++i) {
     const EdgeEquation& e = r.equations[i];
     if (e.weight < 0.5) continue;

@@ -31,6 +31,9 @@ struct PoseMeasurement {
   std::optional<double> sigma_psi_rad;
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
   double accepted = 0.0;  ///< fraction of the predicted outline with an accepted edge
+  /// Sum over the outline [px] of how much better its edges explain the picture than none would,
+  /// less their misfit: compares fits to one picture.
+  double evidence = 0.0;
   std::vector<EdgePoint> edges;
 };
 
