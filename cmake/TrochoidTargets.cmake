@@ -8,7 +8,7 @@ if(TROCHOID_SANITIZE)
   target_compile_options(trochoid_warnings INTERFACE
     -fsanitize=${TROCHOID_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
     # GCC 12 warns falsely about its own <regex> once the sanitizers have changed its inlining.
-    -Wno-maybe-uninitialized)
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(trochoid_warnings INTERFACE -fsanitize=${TROCHOID_SANITIZE})
 endif()
 

@@ -6,11 +6,11 @@
 #include <optional>
 
 #include "commands.hpp"
+#include "fit_job.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
@@ -100,19 +100,8 @@ void run(const FitCommand& command) {
   fitting::FitOptions options = command.options;
   if (command.verbose)
     options.log = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
-  data::Fit fit;
-  if (command.compare || command.options.model == "auto") {
-    fitting::Comparison comparison = fitting::compare(tracks, scene, options);
-    fit = std::move(comparison.fit);
-    scene = std::move(comparison.scene);
-  } else {
-    fit = fitting::fit(tracks, scene, options);
-  }
+  data::Fit fit = fit_job(tracks, scene, options, command.compare);
   fit.inputs = provenance.inputs;
-  fit.versions["trochoid"] = TROCHOID_VERSION;
-  if (!command.options.model.empty() && !command.compare) scene.model.name = fit.model;
-  if (scene.model.name == "auto") scene.model.name = fit.model;
-  fit.scene_toml = data::to_toml(scene);
   if (!command.output.empty()) data::write_fit(fit, command.output);
   print(fit);
   if (!fit.converged)

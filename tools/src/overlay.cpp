@@ -214,6 +214,7 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   cv::VideoWriter writer = open_writer(pending.path(), written.frame_rate_hz, painter.size());
   Progress progress("overlay");
   while (const auto frame = source->next()) {
+    if (options.between_pictures) options.between_pictures();
     const double t_s = content.time_of_frame(frame->index, frame->t_s);
     writer.write(painter.paint(*frame, t_s));
     written.frame.push_back(frame->index);

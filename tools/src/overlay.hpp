@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@ struct OverlayOptions {
   /// Play this many times slower than it happened; 0 = just enough that no more than 60 pictures a
   /// second are shown, which is what screens show.
   double slow = 0.0;
+  /// Called before every picture; may be empty. What it throws ends the work, nothing is written.
+  std::function<void()> between_pictures{};
 };
 
 /// What an overlay video holds: picture k of the video is frame[k] of the recording at t_s[k].

@@ -15,6 +15,7 @@
 #include "scene_library.hpp"
 #include "thesis_quantities.hpp"
 #include "trajectory_plots.hpp"
+#include "trajectory_table.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
@@ -40,25 +41,6 @@ void apply_overrides(const Options& options, data::Scene& scene) {
   if (options.tolerance) scene.run.tolerance = *options.tolerance;
   if (!options.model.empty()) scene.model.name = options.model;
   if (!options.integrator.empty()) scene.run.integrator = options.integrator;
-}
-
-data::Table as_table(const model::Trajectory& run) {
-  data::Table table;
-  table.header = {
-      {"trochoid trajectory 1", ""},
-      {"made by", "trochoid " TROCHOID_VERSION},
-      {"model", run.model},
-      {"integrator", fmt::format("{}: {}", run.integrator, run.integrator_reason)},
-      {"outcome", fmt::format("{} at t = {} s: {}", model::name(run.outcome), run.end_s,
-                              model::sentence(run.outcome))},
-      {"error estimate [m]", fmt::format("{:.1e}", run.error_estimate_m)},
-      {"steps", fmt::format("{} accepted, {} rejected, {} evaluations", run.statistics.steps,
-                            run.statistics.rejected, run.statistics.evaluations)}};
-  for (const model::Event& event : run.events)
-    table.header.emplace_back("event", fmt::format("{} at t = {} s", event.name, event.t_s));
-  table.columns = run.columns;
-  table.values = run.values;
-  return table;
 }
 
 void list_scenes() {
@@ -108,7 +90,7 @@ void simulate_scene(const Options& options) {
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene);
   const model::Trajectory run = model::simulate(scene);
-  data::Table table = as_table(run);
+  data::Table table = trajectory_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
   fmt::print("{}: {} rows, {}\n", output.string(), table.values.rows(),

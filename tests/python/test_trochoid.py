@@ -1,0 +1,189 @@
+"""The Python package against closed forms, planted parameters and a bundled recording."""
+
+import _thread
+import inspect
+import os
+import pathlib
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import trochoid
+
+SAMPLE = pathlib.Path(os.environ["TROCHOID_SAMPLES"]) / "s1_disc_paper"
+HAS_TRACKING = hasattr(trochoid._core, "track")
+
+TOP = {"body": {"kind": "top", "mass_kg": 0.1, "I_kg_m2": 1e-4, "Is_kg_m2": 1.5e-4, "l_m": 0.03},
+       "support": {"kind": "pivot"},
+       "model": {"name": "top"},
+       "start": {"theta_rad": 0.6, "omega_s_rad_s": 40.0},
+       "run": {"until_s": 1.5, "rate_hz": 200.0}}
+
+
+class Simulate(unittest.TestCase):
+    def test_a_spinning_top_keeps_its_energy_and_its_distance_from_the_pivot(self):
+        run = trochoid.simulate(TOP)
+        self.assertEqual(run.outcome, "reached_end")
+        self.assertEqual(run.values.shape, (301, len(run.columns)))
+        tolerance = 1e-6  # far above the integration's 1e-10, far below any wrong equation
+        energy_J = run["energy_J"]
+        np.testing.assert_allclose(energy_J, energy_J[0], rtol=tolerance)
+        # The centre of mass is at l sin(theta) beside the pivot's vertical.
+        np.testing.assert_allclose(np.hypot(run["x_m"], run["y_m"]), 0.03 * np.sin(run["theta_rad"]),
+                                   atol=tolerance * 0.03)
+
+    def test_overrides_win_over_the_scene(self):
+        run = trochoid.simulate(TOP, until_s=0.5, rate_hz=50, integrator="dop853")
+        self.assertEqual(len(run.values), 26)
+        self.assertEqual(run.integrator, "dop853")
+
+    def test_bundled_scenes_have_names_and_a_sentence(self):
+        self.assertIn("thesis-base", trochoid.scenes())
+        self.assertTrue(all(trochoid.scenes().values()))
+        self.assertEqual(trochoid.simulate("thesis-base", until_s=1.0).model, "top")
+
+    def test_a_scene_survives_the_trip_through_its_text(self):
+        scene = trochoid.Scene(TOP)
+        self.assertEqual(trochoid.Scene.from_toml(scene.toml).toml, scene.toml)
+
+
+class Errors(unittest.TestCase):
+    def test_a_wrong_key_names_the_right_one(self):
+        with self.assertRaisesRegex(trochoid.InputError, "radius_m"):
+            trochoid.Scene({"body": {"radus_m": 0.03}})
+
+    def test_errors_are_also_pythons_own(self):
+        self.assertTrue(issubclass(trochoid.InputError, ValueError))
+        self.assertTrue(issubclass(trochoid.NumericalError, ArithmeticError))
+        with self.assertRaises(ValueError):
+            trochoid.simulate(TOP, until_s=-1.0)
+        with self.assertRaises(KeyError):
+            trochoid.simulate(TOP, until_s=0.1)["no_such_column"]
+
+    def test_arrays_of_the_wrong_shape_are_named(self):
+        t_s = np.arange(10.0)
+        for wrong in (np.zeros((9, 2)), np.zeros(10), np.zeros((2, 10))):
+            with self.assertRaisesRegex(trochoid.InputError, "centre_m"):
+                trochoid.fit(trochoid.Track(t_s, wrong), model="top")
+        with self.assertRaisesRegex(trochoid.InputError, "does not increase"):
+            trochoid.fit(trochoid.Track(t_s[::-1], np.zeros((10, 2))), model="top")
+        with self.assertRaisesRegex(trochoid.InputError, "not an array"):
+            trochoid.fit(trochoid.Track(t_s, [["a", "b"]] * 10), model="top")
+        with self.assertRaisesRegex(trochoid.InputError, "frame"):
+            trochoid.fit(trochoid.Track(t_s, np.zeros((10, 2)), frame=np.full(10, np.nan)),
+                         model="top")
+        with self.assertRaises(trochoid.InputError):
+            trochoid.fit(17, model="top")
+
+    def test_everything_public_is_documented(self):
+        for name in trochoid.__all__:
+            self.assertTrue(inspect.getdoc(getattr(trochoid, name)), name)
+
+
+def noisy_track(sigma_m=1e-4, seed=1):
+    run = trochoid.simulate(TOP)
+    noise = np.random.default_rng(seed).normal(0.0, sigma_m, (len(run.values), 2))
+    return trochoid.Track(run["t_s"], np.column_stack([run["x_m"], run["y_m"]]) + noise,
+                          covariance_m2=np.tile(sigma_m**2 * np.eye(2), (len(noise), 1, 1)))
+
+
+class Fit(unittest.TestCase):
+    def test_planted_parameters_come_back_within_their_errors(self):
+        fit = trochoid.fit(noisy_track(), model="top")
+        self.assertTrue(fit.converged, fit.reason)
+        l = fit["l_m"]
+        self.assertLess(abs(l.value - 0.03), 4.0 * l.sigma)  # 4 sigma: once in 16,000 seeds
+        self.assertEqual(fit.covariance.shape, 2 * (len(fit.covariance_names),))
+
+    def test_the_answer_does_not_depend_on_threads_and_survives_its_file(self):
+        track = noisy_track()
+        with tempfile.TemporaryDirectory() as folder:
+            one, many, again = (os.path.join(folder, name) for name in ("1", "4", "again"))
+            trochoid.fit(track, model="top", bootstrap=8, threads=1, output=one)
+            trochoid.fit(track, model="top", bootstrap=8, threads=4, output=many)
+            trochoid.read_fit(one).write(again)
+            texts = [pathlib.Path(path).read_bytes() for path in (one, many, again)]
+        self.assertEqual(texts[0], texts[1])
+        self.assertEqual(texts[0], texts[2])
+
+    def test_a_fit_is_replayed_close_to_its_track(self):
+        track = noisy_track()
+        arc, = trochoid.predict(trochoid.fit(track, model="top"), track)
+        at = np.searchsorted(arc.t_s, track.t_s)
+        residuals = arc.centre_m[at, :2] - track.centre_m
+        # The noise is 1e-4; the mean over 602 numbers scatters by 3 %.
+        self.assertLess(np.sqrt(np.mean(residuals**2)), 1.1e-4)
+
+    def test_a_track_survives_its_file(self):
+        track = noisy_track()
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "Spur – größer.csv")
+            trochoid.TrackFile([track]).write(path)
+            back, = trochoid.read_track(path).tracks
+        np.testing.assert_array_equal(back.t_s, track.t_s)
+        np.testing.assert_array_equal(back.centre_m, track.centre_m)
+        self.assertTrue(np.isnan(back.theta_rad).all())
+
+
+class Threads(unittest.TestCase):
+    def test_other_threads_run_during_a_fit(self):
+        beats, stop = [], threading.Event()
+
+        def beat():
+            while not stop.wait(0.002):
+                beats.append(time.monotonic())
+
+        thread = threading.Thread(target=beat)
+        thread.start()
+        start = time.monotonic()
+        trochoid.fit(noisy_track(), model="top", bootstrap=200)
+        lasted_s = time.monotonic() - start
+        stop.set()
+        thread.join()
+        self.assertGreater(len(beats), 0.05 * lasted_s / 0.002)
+
+    def test_control_c_ends_a_long_fit(self):
+        timer = threading.Timer(0.3, _thread.interrupt_main)
+        timer.start()
+        start = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            trochoid.fit(noisy_track(), model="top", bootstrap=100000)
+        self.assertLess(time.monotonic() - start, 20.0)
+
+
+@unittest.skipUnless(HAS_TRACKING, "built without tracking")
+class Recording(unittest.TestCase):
+    def test_a_recording_is_tracked_and_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            output, still, table = (pathlib.Path(folder) / name for name in
+                                    ("overlay.mp4", "path.png", "s1.track.csv"))
+            file = trochoid.track(SAMPLE / "video.mp4", SAMPLE / "scene.toml", to="f40", output=table)
+            track, = file.tracks
+            self.assertEqual(len(track), file.summary["found"])
+            np.testing.assert_array_equal(trochoid.read_track(table).tracks[0].t_s, track.t_s)
+            truth = np.genfromtxt(SAMPLE / "truth.csv", delimiter=",", names=True)
+            rows = truth[np.searchsorted(truth["frame"], track.frame)]
+            pixels = np.column_stack([rows["x_px"], rows["y_px"]])
+            rms_px = np.sqrt(np.mean((track.centre_px - pixels) ** 2))
+            self.assertLess(rms_px, 0.3)  # several times what this clean recording needs
+            frames = trochoid.overlay(SAMPLE / "video.mp4", file, output=output, still=still,
+                                      scene=SAMPLE / "scene.toml", to="f10")
+            self.assertEqual(len(frames.frame), 11)
+            self.assertGreater(output.stat().st_size, 1000)
+            self.assertGreater(still.stat().st_size, 1000)
+
+    def test_control_c_ends_tracking(self):
+        threading.Timer(0.2, _thread.interrupt_main).start()
+        with self.assertRaises(KeyboardInterrupt):
+            trochoid.track(SAMPLE / "video.mp4")
+
+    def test_what_is_no_recording_is_an_input_error(self):
+        with self.assertRaisesRegex(trochoid.InputError, "no_such.mp4"):
+            trochoid.track("no_such.mp4")
+
+
+if __name__ == "__main__":
+    unittest.main()

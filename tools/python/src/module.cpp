@@ -1,0 +1,313 @@
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <optional>
+
+#include "arrays.hpp"
+#include "fit_job.hpp"
+#include "interruptible.hpp"
+#include "prediction.hpp"
+#include "progress.hpp"
+#include "scene_library.hpp"
+#include "trajectory_table.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/model/simulate.hpp"
+#ifdef TROCHOID_HAS_TRACKING
+#include "overlay.hpp"
+#include "run_folder.hpp"
+#include "trochoid/tracking/tracker.hpp"
+#endif
+
+// The compiled half of the Python package: values cross here, as dicts of arrays; signatures,
+// documentation and types are trochoid/__init__.py. Each function calls what the subcommand of its
+// name calls.
+namespace trochoid::python {
+namespace py = pybind11;
+namespace fs = std::filesystem;
+namespace {
+
+struct SceneValue {
+  data::Scene scene;
+};
+
+/// What was set from Python passes the same checks as a scene file. @throws InputError
+data::Scene checked(const data::Scene& scene) {
+  return data::parse_scene(data::to_toml(scene), "scene");
+}
+
+std::vector<data::Track> tracks_of(const py::list& list) {
+  std::vector<data::Track> tracks;
+  for (const py::handle track : list)
+    tracks.push_back(track_of(track.cast<py::dict>(), "track " + std::to_string(tracks.size())));
+  return tracks;
+}
+
+data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
+              const py::dict& options, const std::map<std::string, std::string>& inputs) {
+  const std::vector<data::Track> values = tracks_of(tracks);
+  fitting::FitOptions how;
+  how.model = options["model"].cast<std::string>();
+  how.from = options["from"].cast<std::string>();
+  how.to = options["to"].cast<std::string>();
+  how.free_pivot = options["free_pivot"].cast<bool>();
+  how.profile = options["profile"].cast<bool>();
+  how.bootstrap = options["bootstrap"].cast<int>();
+  how.threads = options["threads"].cast<int>();
+  how.seed = options["seed"].cast<std::uint64_t>();
+  how.start = options["start"].cast<std::map<std::string, double>>();
+  data::Fit result;
+  run_interruptibly([&](const Interrupt& interrupt) {
+    how.log = [&](const std::string&) { interrupt.check(); };
+    how.progress = [&](const std::string&, double) { interrupt.check(); };
+    result = tools::fit_job(values, scene.scene, how, compare);
+  });
+  result.inputs = inputs;
+  return result;
+}
+
+py::dict dict_of_run(const model::Trajectory& run) {
+  py::dict dict;
+  dict["model"] = run.model;
+  dict["integrator"] = run.integrator;
+  dict["integrator_reason"] = run.integrator_reason;
+  dict["columns"] = run.columns;
+  dict["values"] = array_of(run.values);
+  py::list events;
+  for (const model::Event& event : run.events) events.append(py::make_tuple(event.t_s, event.name));
+  dict["events"] = events;
+  dict["outcome"] = std::string(model::name(run.outcome));
+  dict["sentence"] = std::string(model::sentence(run.outcome));
+  dict["end_s"] = run.end_s;
+  dict["error_estimate_m"] = run.error_estimate_m;
+  dict["error_estimate_rad"] = run.error_estimate_rad;
+  dict["steps"] = run.statistics.steps;
+  dict["evaluations"] = run.statistics.evaluations;
+  return dict;
+}
+
+py::dict simulate(const SceneValue& scene, const fs::path& output) {
+  model::Trajectory run;
+  run_interruptibly([&](const Interrupt&) {
+    run = model::simulate(scene.scene);
+    if (!output.empty()) data::write_table(tools::trajectory_table(run), output);
+  });
+  return dict_of_run(run);
+}
+
+/// The fitted model's path over each arc of the tracks.
+py::list predict(const data::Fit& fit, const py::dict& file, int fit_track) {
+  const data::TrackFile tracks = file_of(file);
+  tools::PredictedPath path;
+  run_interruptibly([&](const Interrupt&) { path = tools::replay(fit, tracks, fit_track); });
+  py::list arcs;
+  for (const tools::PredictedArc& arc : path.arcs) {
+    Eigen::MatrixXd centre_m(arc.pose.size(), 3), angles_rad(arc.pose.size(), 3);
+    for (Eigen::Index i = 0; i < centre_m.rows(); ++i) {
+      const data::Pose<>& pose = arc.pose[static_cast<std::size_t>(i)];
+      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+      centre_m.row(i) = pose.centre_m;
+      angles_rad.row(i) << (arc.has_tilt ? pose.theta_rad : kNone),
+          (arc.has_tilt ? pose.phi_rad : kNone), (arc.has_spin ? pose.psi_rad : kNone);
+    }
+    py::dict dict;
+    dict["object"] = arc.object;
+    dict["t_s"] = array_of(arc.t_s);
+    dict["centre_m"] = array_of(centre_m);
+    dict["angles_rad"] = array_of(angles_rad);
+    dict["ended"] = arc.ended;
+    arcs.append(dict);
+  }
+  return arcs;
+}
+
+#ifdef TROCHOID_HAS_TRACKING
+py::tuple track(const fs::path& video, const SceneValue& scene,
+                const std::optional<fs::path>& camera_file, const py::dict& options) {
+  data::Scene with = scene.scene;
+  if (!options["rate_hz"].is_none()) with.camera.frame_rate_hz = options["rate_hz"].cast<double>();
+  if (!options["objects"].is_none()) with.tracking.objects = options["objects"].cast<int>();
+  if (!options["at_px"].is_none()) {
+    const auto [x, y] = options["at_px"].cast<std::pair<double, double>>();
+    with.tracking.at_px = Eigen::Vector2d(x, y);
+  }
+  with = checked(with);
+  std::optional<data::Camera> camera;
+  if (camera_file) camera = data::read_camera(*camera_file);
+  tracking::TrackOptions how;
+  how.objects = with.tracking.objects;
+  how.from = options["from"].cast<std::string>();
+  how.to = options["to"].cast<std::string>();
+  if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
+  tracking::TrackResult result;
+  run_interruptibly([&](const Interrupt& interrupt) {
+    how.progress = [&](std::int64_t, std::int64_t) { interrupt.check(); };
+    result = tracking::track_video(video, with, camera, how);
+  });
+  result.file.made_by = "trochoid " TROCHOID_VERSION;
+  const tracking::TrackSummary& s = result.summary;
+  py::dict summary;
+  summary["frames"] = s.frames;
+  summary["found"] = s.found;
+  summary["lost"] = s.lost;
+  summary["doubtful"] = s.doubtful;
+  summary["damaged"] = s.damaged;
+  summary["metres"] = s.camera_words;
+  return py::make_tuple(dict_of(result.file), summary);
+}
+
+py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* fit,
+                 const SceneValue* scene, const std::optional<fs::path>& camera_file,
+                 const py::dict& options) {
+  tools::OverlayInput input;
+  input.video = video;
+  input.tracks = file_of(file);
+  if (fit != nullptr) input.fit = *fit;
+  if (scene != nullptr)
+    input.scene = scene->scene;
+  else if (fit != nullptr)
+    input.scene = tools::scene_of_fit(*fit, fs::path("."));
+  if (camera_file) input.camera = data::read_camera(*camera_file);
+  input.fit_track = options["fit_track"].cast<int>();
+  tools::OverlayOptions how{.from = options["from"].cast<std::string>(),
+                            .to = options["to"].cast<std::string>(),
+                            .slow = options["slow"].cast<double>(),
+                            .between_pictures = {}};
+  const auto output = options["output"].cast<fs::path>(), still = options["still"].cast<fs::path>();
+  tools::OverlayFrames frames;
+  run_interruptibly([&](const Interrupt& interrupt) {
+    how.between_pictures = [&] { interrupt.check(); };
+    if (!still.empty()) tools::write_still(input, how, still);
+    if (!output.empty()) frames = tools::write_overlay(input, how, output);
+  });
+  py::dict dict;
+  dict["frame_rate_hz"] = frames.frame_rate_hz;
+  dict["slowed"] = frames.slowed;
+  dict["frame"] =
+      py::array_t<std::int64_t>(static_cast<py::ssize_t>(frames.frame.size()), frames.frame.data());
+  dict["t_s"] = array_of(frames.t_s);
+  return dict;
+}
+#endif
+
+void add_fit_values(py::module_& module) {
+  using data::Fit, data::FitParameter, data::FitArc, data::ModelScore;
+  py::class_<FitParameter>(module, "Parameter", "One parameter of a fit.")
+      .def_readonly("name", &FitParameter::name)
+      .def_readonly("value", &FitParameter::value)
+      .def_readonly("sigma", &FitParameter::sigma, "Standard deviation; 0 if fixed, inf if unseen.")
+      .def_readonly("unit", &FitParameter::unit)
+      .def_readonly("identifiable", &FitParameter::identifiable)
+      .def_readonly("note", &FitParameter::note)
+      .def_property_readonly(
+          "status",
+          [](const FitParameter& p) {
+            constexpr const char* kWords[] = {"free", "fixed", "derived", "prior"};
+            return kWords[static_cast<std::size_t>(p.status)];
+          },
+          "free, fixed, derived or prior")
+      .def("__repr__", [](const FitParameter& p) {
+        return py::str("{} = {:.8g} +- {:.2g} {}").format(p.name, p.value, p.sigma, p.unit);
+      });
+  py::class_<FitArc>(module, "Arc", "A stretch of a track that was fitted as one motion.")
+      .def_readonly("track", &FitArc::track)
+      .def_readonly("object", &FitArc::object)
+      .def_readonly("from_s", &FitArc::from_s)
+      .def_readonly("to_s", &FitArc::to_s)
+      .def_readonly("samples", &FitArc::samples);
+  py::class_<ModelScore>(module, "ModelScore", "A model that was tried.")
+      .def_readonly("model", &ModelScore::model)
+      .def_readonly("chi2", &ModelScore::chi2)
+      .def_readonly("aicc", &ModelScore::aicc)
+      .def_readonly("bic", &ModelScore::bic)
+      .def_readonly("whiteness_p", &ModelScore::whiteness_p)
+      .def_readonly("held_back_rms_sigma", &ModelScore::held_back_rms_sigma)
+      .def_readonly("parameters", &ModelScore::parameters)
+      .def_readonly("recommended", &ModelScore::recommended);
+  py::class_<Fit>(module, "FitValue")
+      .def_readonly("model", &Fit::model)
+      .def_readonly("converged", &Fit::converged)
+      .def_readonly("outcome", &Fit::outcome)
+      .def_readonly("reason", &Fit::reason)
+      .def_readonly("start_path", &Fit::start_path)
+      .def_readonly("parameters", &Fit::parameters)
+      .def_readonly("covariance_names", &Fit::covariance_names)
+      .def_property_readonly("covariance", [](const Fit& f) { return array_of(f.covariance); })
+      .def_readonly("chi2", &Fit::chi2)
+      .def_readonly("dof", &Fit::dof)
+      .def_readonly("noise_scale", &Fit::noise_scale)
+      .def_readonly("aicc", &Fit::aicc)
+      .def_readonly("bic", &Fit::bic)
+      .def_readonly("whiteness_p", &Fit::whiteness_p)
+      .def_readonly("rank", &Fit::rank)
+      .def_readonly("arcs", &Fit::arcs)
+      .def_readonly("comparison", &Fit::comparison)
+      .def_readonly("recommendation", &Fit::recommendation)
+      .def_readonly("warnings", &Fit::warnings)
+      .def_readonly("inputs", &Fit::inputs)
+      .def_readonly("versions", &Fit::versions)
+      .def_readonly("seed", &Fit::seed)
+      .def_readonly("scene_toml", &Fit::scene_toml);
+  module.def("read_fit", [](const fs::path& path) { return data::read_fit(path); });
+  module.def("write_fit", [](const Fit& fit, const fs::path& path) { data::write_fit(fit, path); });
+}
+
+void add_scene(py::module_& module) {
+  py::class_<SceneValue>(module, "SceneValue")
+      .def(py::init())
+      .def_static("load",
+                  [](const std::string& name) { return SceneValue{tools::load_scene(name)}; })
+      .def_static(
+          "parse",
+          [](const std::string& toml) { return SceneValue{data::parse_scene(toml, "scene")}; })
+      .def("with_run",
+           [](SceneValue value, std::optional<double> until_s, std::optional<double> rate_hz,
+              std::optional<double> tolerance, const std::string& model,
+              const std::string& integrator) {
+             data::RunSettings& run = value.scene.run;
+             run.until_s = until_s.value_or(run.until_s);
+             run.rate_hz = rate_hz.value_or(run.rate_hz);
+             run.tolerance = tolerance.value_or(run.tolerance);
+             if (!model.empty()) value.scene.model.name = model;
+             if (!integrator.empty()) run.integrator = integrator;
+             return SceneValue{checked(value.scene)};
+           })
+      .def_property_readonly("toml",
+                             [](const SceneValue& value) { return data::to_toml(value.scene); });
+  module.def("bundled_scenes", [] {
+    std::map<std::string, std::string> names;
+    for (const tools::BundledScene& scene : tools::bundled_scenes())
+      names.emplace(scene.name, scene.summary());
+    return names;
+  });
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, module) {
+  tools::set_talk(tools::Talk::quiet);
+  fitting::silence_solver_log();
+  const auto base = py::register_exception<Error>(module, "Error");
+  py::register_exception<InputError>(module, "InputError",
+                                     py::make_tuple(base, py::handle(PyExc_ValueError)));
+  py::register_exception<NumericalError>(module, "NumericalError",
+                                         py::make_tuple(base, py::handle(PyExc_ArithmeticError)));
+  module.attr("__version__") = TROCHOID_VERSION;
+  add_scene(module);
+  add_fit_values(module);
+  module.def("read_track", [](const fs::path& path) { return dict_of(data::read_track(path)); });
+  module.def("write_track", [](const py::dict& file, const fs::path& path) {
+    data::write_track(file_of(file), path);
+  });
+  module.def("sha256_of_file", &data::sha256_of_file);
+  module.def("simulate", &simulate);
+  module.def("fit", &fit);
+  module.def("predict", &predict);
+#ifdef TROCHOID_HAS_TRACKING
+  module.def("track", &track);
+  module.def("overlay", &overlay);
+#endif
+}
+
+}  // namespace trochoid::python

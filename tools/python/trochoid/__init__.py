@@ -1,0 +1,377 @@
+"""Track, simulate and fit spinning and rolling discs and rings.
+
+The functions are called like the commands of the program and do the same:
+
+    track(video, scene)          recording -> TrackFile: centre of mass in every frame, with covariance
+    fit(track, scene)            track -> Fit: parameters with error bars, no first guess needed
+    overlay(video, track, fit)   prediction and observation drawn into the recording
+    simulate(scene)              scene -> Trajectory: the model alone
+
+Everything is SI and says so in its name (``t_s``, ``centre_m``); arrays are numpy's. The table frame has
+z up and the floor at z = 0; pixels have x right, y down, pixel centres at whole numbers.
+
+A scene may be given as the path of a TOML file, the name of a bundled scene (``scenes()``), a dict of
+dicts with the keys of the TOML file, or a ``Scene``. What is wrong with an input raises ``InputError``
+(a ``ValueError``), what cannot be computed ``NumericalError`` (an ``ArithmeticError``), both with one line
+that names the place, the value and the remedy. Work runs without the GIL; Ctrl-C ends it at the next
+frame, picture or minimisation (a simulation: when it is done).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any, Mapping, Optional, Sequence, Union
+
+import numpy as np
+
+from . import _core
+from ._core import Arc, Error, InputError, ModelScore, NumericalError, Parameter
+
+__version__ = _core.__version__
+__all__ = ["track", "fit", "overlay", "simulate", "predict", "scenes", "read_track", "read_fit",
+           "Scene", "Track", "TrackFile", "Trajectory", "Fit", "PredictedArc", "OverlayFrames",
+           "Parameter", "Arc", "ModelScore", "Error", "InputError", "NumericalError"]
+
+Path = Union[str, "os.PathLike[str]"]
+Moment = Union[None, str, float, int]
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml_value(v)}" for key, v in value.items()) + "}"
+    if isinstance(value, (Sequence, np.ndarray)):
+        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    raise InputError(f"scene: a {type(value).__name__} cannot be written in a scene")
+
+
+def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    lines = []
+    for name, table in tables.items():
+        if not isinstance(table, Mapping):
+            raise InputError(f"scene: '{name}' is not a table; give a dict of dicts")
+        lines.append(f"[{name}]")
+        lines += [f"{key} = {_toml_value(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+class Scene:
+    """What is known beforehand: body, support, camera, model, start, run, fit (docs/formats.md).
+
+    ``Scene("ring.toml")``, ``Scene("thesis-base")``, ``Scene({"body": {"radius_m": 0.03}})``.
+    """
+
+    def __init__(self, scene: Union[None, Path, Mapping, "Scene"] = None):
+        if scene is None:
+            self._value = _core.SceneValue()
+        elif isinstance(scene, Scene):
+            self._value = scene._value
+        elif isinstance(scene, Mapping):
+            self._value = _core.SceneValue.parse(_toml(scene))
+        else:
+            self._value = _core.SceneValue.load(os.fspath(scene))
+
+    @classmethod
+    def from_toml(cls, text: str) -> "Scene":
+        """A scene from the text of a scene file."""
+        scene = cls()
+        scene._value = _core.SceneValue.parse(text)
+        return scene
+
+    @property
+    def toml(self) -> str:
+        """The scene as the text of a scene file."""
+        return self._value.toml
+
+    def __repr__(self) -> str:
+        return f"Scene.from_toml({self.toml!r})"
+
+
+def scenes() -> dict[str, str]:
+    """Names of the bundled scenes with a sentence about each."""
+    return _core.bundled_scenes()
+
+
+@dataclasses.dataclass
+class Track:
+    """The path of one body; n samples, strictly increasing in time; frames without the body have none.
+
+    Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN.
+    """
+
+    t_s: np.ndarray                                #: (n,) presentation time [s]
+    centre_m: Optional[np.ndarray] = None          #: (n, 2) centre of mass, table frame [m]
+    covariance_m2: Optional[np.ndarray] = None     #: (n, 2, 2) its covariance [m^2]
+    frame: Optional[np.ndarray] = None             #: (n,) 0-based number of the frame; -1: none
+    centre_px: Optional[np.ndarray] = None         #: (n, 2) image of the centre of mass [px]
+    theta_rad: Optional[np.ndarray] = None         #: (n,) tilt: axis against the vertical [rad]
+    sigma_theta_rad: Optional[np.ndarray] = None
+    phi_rad: Optional[np.ndarray] = None           #: (n,) precession, unwrapped [rad]
+    sigma_phi_rad: Optional[np.ndarray] = None
+    psi_rad: Optional[np.ndarray] = None           #: (n,) spin, unwrapped [rad]
+    sigma_psi_rad: Optional[np.ndarray] = None
+    quality: Optional[np.ndarray] = None           #: (n,) 0 doubtful .. 1 sure
+    object: int = 0                                #: number of the body in the recording
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+
+@dataclasses.dataclass
+class TrackFile:
+    """The tracks of a recording and where they come from."""
+
+    tracks: list[Track]
+    source: str = ""              #: file name of the recording
+    source_sha256: str = ""
+    camera: str = ""              #: how metres were obtained, in words
+    made_by: str = ""
+    angles_folded: bool = False   #: faces look alike: theta is min(theta, pi - theta)
+    notes: list[str] = dataclasses.field(default_factory=list)
+    summary: Optional[dict[str, Any]] = None  #: of track(): frames, found, lost, doubtful, damaged
+
+    def write(self, path: Path) -> None:
+        """Writes the track file (CSV), whole or not at all."""
+        _core.write_track(_file_dict(self), path)
+
+
+def _file_dict(file: TrackFile) -> dict[str, Any]:
+    fields = {name: getattr(file, name) for name in
+              ("source", "source_sha256", "camera", "made_by", "angles_folded", "notes")}
+    return {**fields, "tracks": [vars(track) for track in file.tracks]}
+
+
+def _file(values: dict[str, Any], summary: Optional[dict[str, Any]] = None) -> TrackFile:
+    tracks = [Track(**track) for track in values.pop("tracks")]
+    return TrackFile(tracks=tracks, summary=summary, **values)
+
+
+def read_track(path: Path) -> TrackFile:
+    """Reads a track CSV; a bare ``t_s,x_m,y_m`` will do."""
+    return _file(_core.read_track(path))
+
+
+def _moment(value: Moment) -> str:
+    return "" if value is None else str(value)
+
+
+def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
+          camera: Optional[Path] = None, objects: Optional[int] = None, from_: Moment = None,
+          to: Moment = None, at_px: Optional[tuple[float, float]] = None,
+          rate_hz: Optional[float] = None, edges: Optional[Path] = None,
+          output: Optional[Path] = None) -> TrackFile:
+    """Follows the moving bodies of a recording (``trochoid track``).
+
+    video    file, folder of images or series (``img/%04d.png``)
+    camera   camera file, replaces the scene's
+    objects  number of moving bodies [1]
+    from_, to  first and last moment: seconds (1.5) or a frame ("f120")
+    at_px    a point (x, y) [px] on the body in the first frame used
+    rate_hz  true frame rate [Hz] where the file's is not (slow motion)
+    edges    write the accepted edge points into this CSV
+    output   write the track into this CSV
+    """
+    options = {"objects": objects, "from": _moment(from_), "to": _moment(to), "at_px": at_px,
+               "rate_hz": rate_hz, "edges": edges}
+    values, summary = _core.track(video, Scene(scene)._value, camera, options)
+    file = _file(values, summary)
+    if output is not None:
+        file.write(output)
+    return file
+
+
+Tracks = Union[Path, Track, TrackFile, Sequence[Union[Path, Track, TrackFile]]]
+
+
+def _all_tracks(given: Tracks) -> tuple[list[Track], dict[str, str]]:
+    if isinstance(given, (str, os.PathLike)):
+        name = os.path.basename(os.fspath(given))
+        return read_track(given).tracks, {name: _core.sha256_of_file(given)}
+    if isinstance(given, Track):
+        return [given], {}
+    if isinstance(given, TrackFile):
+        return list(given.tracks), {}
+    if not isinstance(given, Sequence):
+        raise InputError(f"tracks: a {type(given).__name__} is no track, track file or path")
+    tracks: list[Track] = []
+    inputs: dict[str, str] = {}
+    for one in given:
+        more, sources = _all_tracks(one)
+        tracks += more
+        inputs.update(sources)
+    return tracks, inputs
+
+
+class Fit:
+    """Parameters of a model with error bars, as `fit` finds and ``read_fit`` reads them.
+
+    ``fit["radius_m"]`` is a ``Parameter`` (value, sigma, unit, status, identifiable, note); the other
+    attributes are those of the JSON file: model, converged, outcome, reason, chi2, dof, noise_scale,
+    aicc, bic, whiteness_p, rank, arcs, comparison, recommendation, warnings, seed, scene_toml.
+    """
+
+    def __init__(self, value: "_core.FitValue"):
+        self._value = value
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Parameters by name; those of arc i > 0 end in "@i"."""
+        return {parameter.name: parameter for parameter in self._value.parameters}
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(k, k) covariance of the k free parameters ``covariance_names``."""
+        return self._value.covariance
+
+    def __getitem__(self, name: str) -> Parameter:
+        return self.parameters[name]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._value, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(n for n in dir(self._value) if not n.startswith("_"))})
+
+    def __repr__(self) -> str:
+        return f"<Fit of {self.model}: {self.outcome}, chi2 {self.chi2:.6g} for {self.dof}>"
+
+    def write(self, path: Path) -> None:
+        """Writes the fit file (JSON), whole or not at all."""
+        _core.write_fit(self._value, path)
+
+
+def read_fit(path: Path) -> Fit:
+    """Reads a fit JSON."""
+    return Fit(_core.read_fit(path))
+
+
+def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, model: str = "",
+        from_: Moment = None, to: Moment = None, free_pivot: bool = False, compare: bool = False,
+        profile: bool = False, bootstrap: int = 0, threads: int = 0, seed: int = 1,
+        start: Optional[Mapping[str, float]] = None, output: Optional[Path] = None) -> Fit:
+    """Fits model parameters to one or more tracks of a body (``trochoid fit``).
+
+    tracks     a path, Track or TrackFile, or a list of them (several recordings of one body)
+    model      top, rolling, sliding, puck, pivot or auto; overrides the scene's
+    compare    try the models that make sense, fit the simplest that suffices
+    profile    profile likelihood of the body's and the table's parameters
+    bootstrap  number of fits to resampled residuals, 0: none
+    threads    at most so many, 0: all cores; the answer does not depend on it
+    start      a first guess by parameter name; seldom needed
+    output     write the fit into this JSON
+
+    An unwelcome answer is not an exception: look at ``converged``, ``outcome`` and ``warnings``.
+    """
+    values, inputs = _all_tracks(tracks)
+    if scene is None and not model:
+        raise InputError("fit: give a scene, or model='top' (the only one that needs no body)")
+    if isinstance(scene, (str, os.PathLike)) and os.path.isfile(scene):
+        inputs[os.path.basename(os.fspath(scene))] = _core.sha256_of_file(scene)
+    options = {"model": model, "from": _moment(from_), "to": _moment(to), "free_pivot": free_pivot,
+               "profile": profile, "bootstrap": bootstrap, "threads": threads, "seed": seed,
+               "start": dict(start or {})}
+    result = Fit(_core.fit([vars(t) for t in values], Scene(scene)._value, compare, options, inputs))
+    if output is not None:
+        result.write(output)
+    return result
+
+
+@dataclasses.dataclass
+class PredictedArc:
+    """The fitted model's path over one arc, m moments: every sample's and several in between."""
+
+    object: int
+    t_s: np.ndarray         #: (m,) [s]
+    centre_m: np.ndarray    #: (m, 3) centre of mass, table frame [m]
+    angles_rad: np.ndarray  #: (m, 3) theta, phi, psi [rad]; NaN where the model has none
+    ended: str              #: why it stops before the arc does, else empty
+
+
+def predict(fit: Fit, tracks: Union[Path, Track, TrackFile], *,
+            fit_track: int = 0) -> list[PredictedArc]:
+    """Replays a fit over the track it was made from; ``fit_track`` counts tracks fitted together."""
+    file = TrackFile(_all_tracks(tracks)[0])
+    arcs = _core.predict(fit._value, _file_dict(file), fit_track)
+    return [PredictedArc(**arc) for arc in arcs]
+
+
+@dataclasses.dataclass
+class OverlayFrames:
+    """Picture k of an overlay shows frame[k] of the recording, at t_s[k]."""
+
+    frame_rate_hz: float   #: of the overlay
+    slowed: float          #: so many times slower than it happened
+    frame: np.ndarray      #: (k,)
+    t_s: np.ndarray        #: (k,) [s]
+
+
+def overlay(video: Path, track: Union[Path, TrackFile], fit: Union[None, Path, Fit] = None, *,
+            scene: Union[None, Path, Mapping, Scene] = None, camera: Optional[Path] = None,
+            output: Optional[Path] = None, still: Optional[Path] = None, from_: Moment = None,
+            to: Moment = None, slow: float = 0.0, fit_track: int = 0) -> OverlayFrames:
+    """Draws observed and predicted path into the recording (``trochoid overlay``).
+
+    fit     without it only the observation is drawn
+    scene   default: the one stored in the fit
+    output  overlay video (.mp4);  still: one picture of the whole path (.png, .jpg)
+    slow    play so many times slower; 0: at most 60 pictures a second
+    """
+    if output is None and still is None:
+        raise InputError("overlay: nothing to write; give output='overlay.mp4', still='path.png' or both")
+    file = track if isinstance(track, TrackFile) else read_track(track)
+    if fit is not None and not isinstance(fit, Fit):
+        fit = read_fit(fit)
+    options = {"output": output or "", "still": still or "", "from": _moment(from_),
+               "to": _moment(to), "slow": slow, "fit_track": fit_track}
+    frames = _core.overlay(video, _file_dict(file), fit._value if fit is not None else None,
+                           Scene(scene)._value if scene is not None else None, camera, options)
+    return OverlayFrames(**frames)
+
+
+@dataclasses.dataclass
+class Trajectory:
+    """A finished run. ``run["x_m"]`` is the column of that name, (rows,)."""
+
+    model: str
+    integrator: str
+    integrator_reason: str
+    columns: list[str]           #: names with units
+    values: np.ndarray           #: (rows, columns), uniform in time up to the end of the run
+    events: list[tuple[float, str]]  #: (t_s, name): slip, stick, flat ...
+    outcome: str                 #: why the run ended: reached_end, flat, rim_switch, lift_off ...
+    sentence: str                #: the same for people
+    end_s: float
+    error_estimate_m: float      #: of the path
+    error_estimate_rad: float    #: of the direction of the axis
+    steps: int
+    evaluations: int             #: of the right-hand side
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        try:
+            return self.values[:, self.columns.index(column)]
+        except ValueError:
+            raise KeyError(f"{column}; there are {', '.join(self.columns)}") from None
+
+
+def simulate(scene: Union[Path, Mapping, Scene], *, until_s: Optional[float] = None,
+             rate_hz: Optional[float] = None, tolerance: Optional[float] = None, model: str = "",
+             integrator: str = "", output: Optional[Path] = None) -> Trajectory:
+    """Runs a scene's model (``trochoid simulate``); what is given overrides the scene.
+
+    until_s, rate_hz  end time [s] and output rate [Hz]
+    tolerance         of the integration
+    integrator        auto, dop853, taylor, cvode-adams, cvode-bdf or arkode
+    output            write the trajectory into this CSV
+    """
+    value = Scene(scene)._value.with_run(until_s, rate_hz, tolerance, model, integrator)
+    return Trajectory(**_core.simulate(value, output or ""))

@@ -1,0 +1,18 @@
+#pragma once
+#include <span>
+
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::tools {
+
+/// What `trochoid fit` does between reading and writing: fits the scene's model, or with `compare`
+/// (or the model "auto" in the options) the simplest that suffices; puts the program's version and
+/// the scene as resolved into the answer, so that it can be replayed alone.
+/// @throws InputError as fitting::fit and fitting::compare do.
+[[nodiscard]] data::Fit fit_job(std::span<const data::Track> tracks, data::Scene scene,
+                                const fitting::FitOptions& options, bool compare);
+
+}  // namespace trochoid::tools
