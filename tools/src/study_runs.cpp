@@ -27,6 +27,22 @@ void compare(const model::Trajectory& run, const ReferenceRun& reference, StudyR
   }
 }
 
+bool loses_energy(const data::ModelSettings& model) {
+  return model.air_linear_N_m_s || model.air_quadratic_N_m_s2 || model.air_force_N_s_m ||
+         model.gap_viscosity_Pa_s || model.friction || model.rolling_friction_m ||
+         model.pivoting_friction_m || model.contour_friction_m || model.drag_transverse_N_m_s ||
+         model.drag_spin_N_m_s;
+}
+
+std::optional<double> energy_drift(const data::Scene& scene, const model::Trajectory& run) {
+  const auto column = std::find(run.columns.begin(), run.columns.end(), "energy_J");
+  if (column == run.columns.end() || loses_energy(scene.model) || run.values.rows() == 0)
+    return std::nullopt;
+  const Eigen::VectorXd energy = run.values.col(column - run.columns.begin());
+  return (energy.array() - energy[0]).abs().maxCoeff<Eigen::PropagateNaN>() /
+         energy.cwiseAbs().maxCoeff();
+}
+
 }  // namespace
 
 StudyRun study_run(const data::Scene& scene, const ReferenceRun& reference, int repeats) {
@@ -45,6 +61,7 @@ StudyRun study_run(const data::Scene& scene, const ReferenceRun& reference, int 
     result.statistics = run.statistics;
     result.estimate_rad = run.error_estimate_rad;
     compare(run, reference, result);
+    result.energy_drift = energy_drift(scene, run);
   } catch (const Error& error) {
     result.refusal = error.what();
   }

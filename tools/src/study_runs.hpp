@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 
 #include "high_precision.hpp"
@@ -15,6 +16,9 @@ struct StudyRun {
   double path_error_m = 0.0;  ///< largest distance of the CoM from the reference
   double time_us = 0.0;       ///< fastest of the repeats, outputs included
   model::Statistics statistics;
+  /// Largest change of the energy over its largest size, where the scene loses none and its mass is
+  /// known.
+  std::optional<double> energy_drift;
   double estimate_rad = 0.0;  ///< what the run itself says of its error in the axis
 };
 
