@@ -89,6 +89,8 @@ void fit_keys(Visit&& visit) {
   visit("converged", &Fit::converged);
   visit("outcome", &Fit::outcome);
   visit("reason", &Fit::reason);
+  visit("verdict", &Fit::verdict);
+  visit("verdict_words", &Fit::verdict_words);
   visit("start_path", &Fit::start_path);
   visit("parameters", &Fit::parameters);
   visit("covariance_names", &Fit::covariance_names);

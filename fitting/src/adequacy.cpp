@@ -2,7 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "smoothing.hpp"
 
@@ -31,10 +34,111 @@ Squares squares(const Problem& problem, const Solution& solution) {
   return sum;
 }
 
+namespace {
+
+constexpr double kHopeless = 3.0;  // times the noise: far beyond what a tracker misjudges
+
 // A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
 // samples scatter far less about a smooth curve.
 bool explains_path(const Squares& sum) {
   return sum.ok && (sum.residual <= 0.03 * sum.motion || sum.residual <= 4.0 * sum.scatter);
+}
+
+// Residuals over noise of the worst channel; the noise is the larger one of the track's own sigmas
+// and the scatter of its samples about a smooth curve.
+double misfit(const Problem& problem, const Squares& sum) {
+  double worst = 0.0;
+  for (int c = 0; c < kChannels; ++c) {
+    double scatter = 1.0;
+    bool seen = false;
+    for (const ArcData& arc : problem.arcs) {
+      scatter = std::max(scatter, excess_scatter(arc, static_cast<Channel>(c)));
+      for (const Reading& reading : arc.readings)
+        seen |= reading.channel == static_cast<Channel>(c);
+    }
+    if (seen) worst = std::max(worst, problem.noise_scale[c] / scatter);
+  }
+  int rows = 0;
+  for (const ArcData& arc : problem.arcs)
+    for (const Reading& reading : arc.readings)
+      rows += reading.channel == Channel::position ? 2 : 0;
+  if (rows > 0 && sum.ok)
+    worst = std::max(worst, std::sqrt(sum.residual / std::max<double>(rows, sum.scatter)));
+  return worst;
+}
+
+// Chi-square of the positions about a polynomial in time, weighted as in the fit.
+double polynomial_chi2(const Problem& problem, int arc, int degree) {
+  const ArcData& data = problem.arcs[arc];
+  std::vector<const Reading*> readings;
+  for (const Reading& reading : data.readings)
+    if (reading.channel == Channel::position) readings.push_back(&reading);
+  const auto n = static_cast<Eigen::Index>(readings.size());
+  const double duration_s = std::max(data.duration_s(), 1e-300);
+  Eigen::MatrixXd basis(2 * n, 2 * (degree + 1));
+  Eigen::VectorXd right(2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Reading& reading = *readings[i];
+    double weight = 1.0 / problem.noise_scale[0];
+    if (problem.row_weights[arc].size() > 0) weight *= problem.row_weights[arc][reading.row];
+    const Eigen::Matrix2d wt = weight * reading.whitener.transpose();
+    const double t = 2.0 * (data.t_s[reading.sample] - data.t_s.front()) / duration_s - 1.0;
+    double power = 1.0;
+    for (int k = 0; k <= degree; ++k, power *= t) basis.block<2, 2>(2 * i, 2 * k) = power * wt;
+    right.segment<2>(2 * i) = wt * reading.value;
+  }
+  const Eigen::VectorXd c = basis.colPivHouseholderQr().solve(right);
+  return (right - basis * c).squaredNorm();
+}
+
+// The least degree of polynomials that explain the positions as well as the model does, by BIC; -1
+// if none, or where position is not what carries the model.
+int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u) {
+  const std::string& model = problem.predictor->model_name();
+  if (model == "puck" || model == "pivot" || model == "smooth") return -1;
+  constexpr int kHighest = 3;
+  double rows = 0.0, chi2 = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    // A tilt or an azimuth in the track says more about the motion than the path does.
+    if (data.observable_index(model::Observable::x_m) < 0 ||
+        data.observable_index(model::Observable::phi_rad) >= 0 ||
+        data.observable_index(model::Observable::theta_rad) >= 0)
+      return -1;
+    Eigen::VectorXd r;
+    if (!evaluate(problem, arc, u, r, nullptr)) return -1;
+    for (const Reading& reading : data.readings)
+      if (reading.channel == Channel::position) {
+        chi2 += r.segment<2>(reading.row).squaredNorm();
+        rows += 2.0;
+      }
+  }
+  // Losses that mean nothing do not count against the model.
+  const auto counted =
+      std::count_if(problem.free.begin(), problem.free.end(),
+                    [&](const FreeParameter& parameter) { return !is_loss(problem, parameter); });
+  const double bic = chi2 + static_cast<double>(counted) * std::log(rows);
+  for (int degree = 0; degree <= kHighest; ++degree) {
+    double sum = 0.0;
+    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+      sum += polynomial_chi2(problem, arc, degree) + 2.0 * (degree + 1) * std::log(rows);
+    if (sum <= bic) return degree;
+  }
+  return -1;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
+}
+
+std::vector<std::string> undetermined(const data::Fit& fit) {
+  std::vector<std::string> names;
+  for (const data::FitParameter& parameter : fit.parameters)
+    if (parameter.status == data::ParameterStatus::free && !parameter.identifiable)
+      names.push_back(parameter.name);
+  return names;
 }
 
 void warn_unexplained(const Squares& sum, data::Fit& fit) {
@@ -44,6 +148,63 @@ void warn_unexplained(const Squares& sum, data::Fit& fit) {
       fmt::format("the residuals are {:.1f} times the scatter of the samples about a smooth curve: "
                   "the model lacks something, or a better minimum exists",
                   std::sqrt(sum.residual / sum.scatter)));
+}
+
+void refuse(const char* outcome, const char* verdict, std::string words, data::Fit& fit) {
+  fit.converged = false;
+  fit.outcome = outcome;
+  fit.verdict = verdict;
+  fit.reason = std::move(words);
+  fit.verdict_words = fit.reason;
+}
+
+void accept(const Solution& solution, const Uncertainty& error, data::Fit& fit) {
+  fit.converged = true;
+  fit.outcome = "converged";
+  fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
+  const double widened = std::sqrt(error.whiteness.inflation);
+  const bool correlated = error.whiteness.inflation > 1.0;
+  std::string words = "the model explains the track";
+  if (correlated)
+    words += fmt::format(
+        " to {:.2g} times its stated noise; what is left hangs together over {:.2g} s, and the "
+        "error bars are widened {:.2g} times for that",
+        fit.noise_scale, error.whiteness.correlation_time_s, widened);
+  else
+    words += fmt::format(", and what is left looks like noise ({:.2g} times the stated)",
+                         fit.noise_scale);
+  const std::vector<std::string> open = undetermined(fit);
+  fit.verdict = !open.empty() ? "weak" : correlated ? "good_correlated" : "good";
+  if (!open.empty()) words += "; not determined: " + listed(open);
+  fit.verdict_words = words;
+}
+
+}  // namespace
+
+void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
+           data::Fit& fit) {
+  const Squares sum = squares(problem, solution);
+  warn_unexplained(sum, fit);
+  const double times = misfit(problem, sum);
+  const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
+  if (!solution.converged) return refuse("no_convergence", "unexplained", solution.message, fit);
+  if (!explains_path(sum))
+    return refuse("unexplained", "unexplained",
+                  "the best path found leaves most of the motion unexplained", fit);
+  if (times > kHopeless)
+    return refuse(
+        "unexplained", "unexplained",
+        fmt::format("the model does not explain the track: the residuals are {:.2g} times "
+                    "its noise",
+                    times),
+        fit);
+  if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)
+    return refuse("not_identifiable", "no_feature",
+                  fmt::format("{} in time explains the path as well: nothing in it asks for the "
+                              "model '{}', whose parameters mean nothing here",
+                              kPolynomials[degree], fit.model),
+                  fit);
+  accept(solution, error, fit);
 }
 
 }  // namespace trochoid::fitting

@@ -1,5 +1,6 @@
 #pragma once
 #include "problem.hpp"
+#include "statistics.hpp"
 #include "trochoid/data/fit.hpp"
 
 namespace trochoid::fitting {
@@ -12,10 +13,19 @@ struct Squares {
 };
 [[nodiscard]] Squares squares(const Problem& problem, const Solution& solution);
 
-/// False for a quiet minimiser in the wrong valley: the residuals carry a good part of the motion
-/// although the samples scatter far less about a smooth curve.
-[[nodiscard]] bool explains_path(const Squares& sum);
-
-void warn_unexplained(const Squares& sum, data::Fit& fit);
+/// What a fit is worth. Words of data::Fit::verdict:
+///   unexplained      not a minimum, or residuals beyond 3 times both the track's own sigmas and
+///   the
+///                    samples' scatter about a smooth curve, or a 30th of the motion's variance
+///                    left
+///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
+///                    well (BIC): nothing in them asks for the model
+///   weak             explained, but parameters of the motion are not determined
+///   good_correlated  explained; residuals hang together, error bars are widened for that
+///   good             explained; what is left looks like noise
+/// Sets converged, outcome, reason, verdict and verdict_words; warns of residuals above the
+/// scatter.
+void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
+           data::Fit& fit);
 
 }  // namespace trochoid::fitting

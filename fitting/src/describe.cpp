@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "adequacy.hpp"
 #include "derived.hpp"
 #include "observed.hpp"
+#include "steady_top.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -125,6 +125,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);
   warn_short_top(problem, fit);
+  admit_steady_precession(problem, solution.u, fit);
 }
 
 }  // namespace trochoid::fitting

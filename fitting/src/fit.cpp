@@ -1,7 +1,5 @@
 #include "trochoid/fitting/fit.hpp"
 
-#include <fmt/core.h>
-
 #include <memory>
 #include <optional>
 
@@ -69,7 +67,8 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
 
 data::Fit& refuse(const Problem& problem, const std::string& reason, data::Fit& fit) {
   fit.outcome = "no_convergence";
-  fit.reason = reason;
+  fit.verdict = "unexplained";
+  fit.reason = fit.verdict_words = reason;
   describe_arcs(problem, fit);
   return fit;
 }
@@ -82,17 +81,6 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
   if (options.bootstrap > 0)
     fit.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
                               options.bootstrap, options.seed, options.threads);
-}
-
-void conclude(const Problem& problem, const Solution& solution, data::Fit& fit) {
-  const Squares sum = squares(problem, solution);
-  warn_unexplained(sum, fit);
-  fit.converged = solution.converged && explains_path(sum);
-  fit.outcome = fit.converged ? "converged" : "no_convergence";
-  fit.reason = fit.converged
-                   ? fmt::format("{} iterations from {}", solution.iterations, fit.start_path)
-               : solution.converged ? "the best path found leaves most of the motion unexplained"
-                                    : solution.message;
 }
 
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
@@ -125,7 +113,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   }
   describe(problem, solution, error, scene, fit);
   add_what_was_asked_for(problem, solution, error, options, fit);
-  conclude(problem, solution, fit);
+  judge(problem, solution, error, fit);
   return fit;
 }
 

@@ -132,6 +132,12 @@ int Problem::rows() const {
   return rows;
 }
 
+bool is_loss(const Problem& problem, const FreeParameter& parameter) {
+  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+  return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
+         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction";
+}
+
 namespace {
 
 bool listed(const std::vector<std::string>& names, const std::string& name) {

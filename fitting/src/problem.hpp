@@ -61,6 +61,10 @@ struct Problem {
   [[nodiscard]] int max_steps() const;  ///< of one integration; 0 = the model's own limit
 };
 
+/// Whether a free parameter is the strength of a loss: short windows do not see it, and it may be
+/// absent altogether. The friction of a sliding body and a top's a, b and l are not.
+[[nodiscard]] bool is_loss(const Problem& problem, const FreeParameter& parameter);
+
 /// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it
 /// names none) are free, those of role `initial` once per arc.
 /// `held` names parameters that stay fixed whatever the scene says.

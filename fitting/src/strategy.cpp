@@ -17,12 +17,6 @@ int free_rows(const Problem& problem) {
   return std::max(1, problem.rows() - static_cast<int>(problem.free.size()));
 }
 
-bool is_loss(const Problem& problem, const FreeParameter& parameter) {
-  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
-  return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
-         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction";
-}
-
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
 // are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
 void leash(Problem& problem) {

@@ -205,5 +205,21 @@ TEST(TopFit, RefusesUnknownParameterNames) {
   EXPECT_THROW((void)fit_one(track_of({}), scene), InputError);
 }
 
+// Without nutation the path is a circle whatever a, b and l are.
+TEST(TopFit, AdmitsThatSteadyPrecessionHidesTheTop) {
+  Planted planted;
+  const double theta = 1.0, rate = 0.5, b = 0.75;
+  planted.values["theta_rad"] = theta;
+  planted.values["dphi_rad_s"] = rate;
+  planted.values["b_1_s"] = b;
+  planted.values["a_1_s2"] = b * rate - rate * rate * std::cos(theta);
+  planted.duration_s = 20.0;
+  const data::Fit result = fit_one(track_of(planted));
+  for (const char* name : {"a_1_s2", "b_1_s", "l_m"})
+    EXPECT_FALSE(result.find(name)->identifiable) << name;
+  EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("no nutation")));
+  EXPECT_TRUE(fit_one(track_of({})).find("l_m")->identifiable);
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

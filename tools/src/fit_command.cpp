@@ -49,6 +49,7 @@ const char* word(data::ParameterStatus status) {
 
 void print(const data::Fit& fit) {
   fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
+  if (fit.converged) fmt::print("  {}: {}\n", fit.verdict, fit.verdict_words);
   for (const data::FitParameter& p : fit.parameters)
     fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
                word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
@@ -104,9 +105,11 @@ void run(const FitCommand& command) {
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
   print(fit);
-  if (!fit.converged)
-    throw NotGood(fmt::format("the fit did not converge: {}{}", fit.reason,
-                              command.compare ? "" : "; --compare tries what the model lacks"));
+  if (!fit.converged) {
+    const bool lacking = fit.verdict != "no_feature" && !command.compare;
+    throw NotGood(fmt::format("the fit is not good: {}{}", fit.reason,
+                              lacking ? "; --compare tries what the model lacks" : ""));
+  }
 }
 
 }  // namespace

@@ -8,8 +8,6 @@
 namespace trochoid::tools {
 namespace {
 
-constexpr double kVisiblePattern =
-    0.01;                         // p-value of whiteness below which residuals hold a pattern
 constexpr double kTooWide = 1.5;  // residuals this many times the track's sigma need a reason
 
 std::string length_words(double length_m) {
@@ -32,33 +30,23 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                   std::isfinite(facts.rms_axis_sigma)
                       ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
                       : "");
-  const bool pattern = fit.whiteness_p < kVisiblePattern;
+  const bool doubtful = !fit.converged;
+  const bool weak = fit.verdict == "weak";
   const bool wide = facts.rms_axis_sigma > kTooWide;
-  if (!fit.converged) {
-    verdict = {
-        "bad",
-        "not trustworthy",
-        fmt::format(
-            "The model “{}” was tried and the fit did not settle: {}. Do not use its numbers.",
-            fit.model, fit.reason),
-        {}};
-  } else if (!pattern && !wide) {
-    verdict = {"good",
-               "explained",
-               fmt::format("{}: the model “{}” passes through them with {}, and what is left shows "
-                           "no pattern (p = {:.2g}).",
-                           tracked_words(facts), fit.model, scatter, fit.whiteness_p),
-               {}};
-  } else {
-    verdict = {"fair",
-               "use with care",
-               fmt::format("{}: the model “{}” follows them to {}, but {}.", tracked_words(facts),
-                           fit.model, scatter,
-                           pattern ? "the residuals hang together, so the model or the camera "
-                                     "misses something; the error bars allow for it"
-                                   : "that is more than the tracker expects"),
-               {}};
-  }
+  if (doubtful)
+    return {"bad",
+            fit.verdict == "no_feature" ? "nothing to fit" : "not trustworthy",
+            fmt::format("The model “{}” was tried: {}. Do not use its numbers.", fit.model,
+                        fit.verdict_words.empty() ? fit.reason : fit.verdict_words),
+            {}};
+  const char* word = weak                               ? "explained, not all determined"
+                     : fit.verdict == "good_correlated" ? "explained, residuals correlated"
+                                                        : "explained";
+  verdict = {weak || wide ? "fair" : "good",
+             word,
+             fmt::format("{}: the model “{}” passes through them with {}: {}.",
+                         tracked_words(facts), fit.model, scatter, fit.verdict_words),
+             {}};
   return verdict;
 }
 

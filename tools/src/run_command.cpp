@@ -301,7 +301,7 @@ void run(const Options& options) {
     throw NotGood(
         fmt::format("only {} of {} moving bodies found", run.tracked.file.tracks.size(), wanted));
   if (run.fit && !run.fit->converged)
-    throw NotGood(fmt::format("the fit did not converge: {}", run.fit->reason));
+    throw NotGood(fmt::format("the fit is not good: {}", run.fit->reason));
 }
 
 }  // namespace

@@ -75,8 +75,14 @@ struct Bootstrap {
 struct Fit {
   std::string model;
   bool converged = false;
-  std::string outcome;  ///< one word: converged, no_convergence, not_identifiable, too_short
-  std::string reason;   ///< one sentence
+  /// One word: converged; no_convergence; unexplained, the best minimum does not follow the track
+  /// to its noise; not_identifiable, nothing in the track asks for the model.
+  std::string outcome;
+  std::string reason;  ///< one sentence
+  /// What the fit is worth: good; good_correlated, residuals hang together and error bars are
+  /// widened for that; weak, explained but parameters are not determined; no_feature; unexplained.
+  std::string verdict;
+  std::string verdict_words;  ///< the same as a sentence
   std::string
       start_path;  ///< which start won: integral_matching, windows, shooting, multistart, given
   std::vector<FitParameter> parameters;

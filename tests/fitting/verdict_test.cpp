@@ -1,0 +1,146 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "trochoid/fitting/fit.hpp"
+#include "trochoid/model/predictor.hpp"
+
+// What a fit says of its own worth.
+namespace trochoid::fitting {
+namespace {
+
+constexpr double kSigma_m = 2e-4;
+constexpr int kSamples = 180;
+constexpr double kRate_Hz = 60.0;
+
+data::Scene top() {
+  data::Scene scene;
+  scene.model.name = "top";
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m = Eigen::Vector3d::Zero();
+  return scene;
+}
+
+data::Scene rolling_disc() {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::disc;
+  body.radius_m = 0.0375;
+  body.thickness_m = 0.005;
+  scene.model.name = "rolling";
+  return scene;
+}
+
+using Path = std::function<Eigen::Vector2d(double t_s)>;
+using Noise = std::function<double()>;
+
+Noise white(double sigma_m, std::uint64_t seed) {
+  return [generator = std::mt19937_64(seed),
+          normal = std::normal_distribution<double>(0.0, sigma_m)]() mutable {
+    return normal(generator);
+  };
+}
+
+data::Track track_of(const Path& path, Noise noise) {
+  data::Track track;
+  for (int i = 0; i < kSamples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = i / kRate_Hz;
+    sample.centre_m = path(sample.t_s);
+    sample.centre_m.x() += noise();
+    sample.centre_m.y() += noise();
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+data::Fit fit_of(const data::Track& track, const data::Scene& scene) {
+  return fit(std::span(&track, 1), scene);
+}
+
+// A nutating top, 2.5 nutations in the three seconds.
+Path nutating_top() {
+  const auto predictor = model::make_predictor(top());
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = predictor->parameters()[i].value;
+  const auto set = [&](const char* name, double value) {
+    values[predictor->index_of(name)] = value;
+  };
+  set("a_1_s2", 8.0);
+  set("b_1_s", 6.0);
+  set("l_m", 0.1);
+  set("theta_rad", 0.8);
+  std::vector<double> t_s;
+  for (int i = 0; i < kSamples; ++i) t_s.push_back(i / kRate_Hz);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  const Eigen::VectorXd xy = predictor->predict(values, request).values;
+  return [xy](double t) -> Eigen::Vector2d {
+    return xy.segment<2>(2 * static_cast<Eigen::Index>(std::lround(t * kRate_Hz)));
+  };
+}
+
+TEST(Verdict, IsGoodForATopInWhiteNoise) {
+  const data::Fit fit = fit_of(track_of(nutating_top(), white(kSigma_m, 1)), top());
+  EXPECT_TRUE(fit.converged);
+  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+}
+
+TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
+  Noise noise = [white = white(0.5 * kSigma_m, 2), x = 0.0, y = 0.0]() mutable {
+    std::swap(x, y);  // two coordinates, each with a memory of ten samples
+    return x = 0.9 * x + white();
+  };
+  const data::Fit fit = fit_of(track_of(nutating_top(), noise), top());
+  EXPECT_TRUE(fit.converged);
+  EXPECT_EQ(fit.verdict, "good_correlated") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("widened"));
+}
+
+TEST(Verdict, FindsNothingOfATopInAStraightLine) {
+  const auto line = [](double t) { return Eigen::Vector2d(0.05 * t, 0.01 - 0.02 * t); };
+  const data::Fit fit = fit_of(track_of(line, white(kSigma_m, 3)), top());
+  EXPECT_FALSE(fit.converged);
+  EXPECT_EQ(fit.outcome, "not_identifiable");
+  EXPECT_EQ(fit.verdict, "no_feature");
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("a straight line in time"));
+}
+
+TEST(Verdict, FindsNothingInWhiteNoise) {
+  const auto nowhere = [](double) { return Eigen::Vector2d(0.0, 0.0); };
+  const data::Track track = track_of(nowhere, white(kSigma_m, 4));
+  for (const data::Scene& scene : {top(), rolling_disc()}) {
+    const data::Fit fit = fit_of(track, scene);
+    EXPECT_FALSE(fit.converged) << fit.model;
+    EXPECT_NE(fit.outcome, "converged") << fit.model;
+  }
+}
+
+TEST(Verdict, DoesNotTakeAFigureOfAnotherOriginForAMotionItKnows) {
+  const auto figure = [](double t) {
+    return Eigen::Vector2d(0.03 * std::cos(2.0 * t) + 0.01 * std::cos(5.0 * t + 1.0),
+                           0.02 * std::sin(3.0 * t));
+  };
+  const data::Track track = track_of(figure, white(kSigma_m, 5));
+  for (const data::Scene& scene : {top(), rolling_disc()}) {
+    const data::Fit fit = fit_of(track, scene);
+    EXPECT_FALSE(fit.converged) << fit.model;
+    EXPECT_EQ(fit.verdict, "unexplained") << fit.model;
+  }
+}
+
+TEST(Verdict, IsWeakWhereParametersAreNotDetermined) {
+  const auto circle = [](double t) {
+    return Eigen::Vector2d(0.03 * std::cos(2.0 * t), 0.03 * std::sin(2.0 * t));
+  };
+  const data::Fit fit = fit_of(track_of(circle, white(kSigma_m, 6)), top());
+  EXPECT_EQ(fit.verdict, "weak") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("not determined: a_1_s2"));
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
