@@ -91,19 +91,21 @@ class CylinderFinder final : public BodyFinder {
         fitter_(body, support, camera) {}
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
-    const OutlineEvidence evidence{.luma = look.frame.luma,
-                                   .background = look.background.luma,
-                                   .detection = look.detection,
-                                   .predicted = look.predicted != nullptr && look.predicted->pose
-                                                    ? std::optional(look.predicted->pose->pose)
-                                                    : std::nullopt,
-                                   .attitude_known = true,
-                                   .previous = look.last != nullptr && look.last->pose
-                                                   ? std::optional(look.last->pose->pose)
-                                                   : std::nullopt,
-                                   .exposure_fraction = exposure_fraction_,
-                                   .chroma = look.frame.chroma,
-                                   .background_chroma = look.background.chroma};
+    const OutlineEvidence evidence{
+        .luma = look.frame.luma,
+        .background = look.background.luma,
+        .detection = look.detection,
+        .predicted = look.predicted != nullptr && look.predicted->pose
+                         ? std::optional(look.predicted->pose->pose)
+                         : std::nullopt,
+        .attitude_known = true,
+        .previous = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->pose)
+                                                            : std::nullopt,
+        .exposure_fraction = exposure_fraction_,
+        .chroma = look.frame.chroma,
+        .background_chroma = look.background.chroma,
+        .blur_px = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->blur_px)
+                                                           : std::nullopt};
     auto measured = fitter_.measure(evidence);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,

@@ -20,10 +20,20 @@ namespace {
 // Coarse to fine, the first two on blurred pictures: a wide edge is seen from far and through
 // noise, a sharp one is precise.
 constexpr double kFarBlurPx = 2.5, kNearBlurPx = 1.0;
-constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, false, false, 4};
-constexpr Search kNear{1.3, 4.5, 3.5, 2.0, 4, false, true, 3};
-Search exact(double blur_px) {
-  return {blur_px, 2.0 + 2.5 * blur_px, 0.5 + 2.0 * blur_px, 1.25, 5, true, true, 1};
+constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, 0.1, false};
+constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
+// From a prediction: where the last sharp look then starts.
+constexpr Search kDraw{1.3, 4.5, 3.5, 4.0, 2, 0.5, false};
+// Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
+Search exact(double blur_px, double outline_px) {
+  constexpr double kLeastStepPx = 1.25, kPoints = 200.0;
+  return {blur_px,
+          2.0 + 2.5 * blur_px,
+          0.5 + 2.0 * blur_px,
+          std::max(kLeastStepPx, outline_px / kPoints),
+          4,
+          0.06,
+          true};
 }
 
 cv::Rect window_of(const data::Body& body, const data::Camera& camera, const data::Pose<>& pose,
@@ -45,16 +55,24 @@ struct Fitted {
   double evidence = 0.0;  ///< evidence_of the fit
 };
 
-// The last stage, from a pose that is right to about the blur of the picture.
-std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& start) {
-  auto refined = refine(scenery, start, exact(kUsualBlurPx));
-  if (!refined) return std::nullopt;
+// The last stage, from a pose that is right to about the blur of the picture. Too sharp or too wide
+// an edge model is looked at again with the right one.
+std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& start,
+                                  double outline_px, std::optional<double> known_blur_px) {
+  constexpr double kSharpestPx = 0.45, kWidestPx = 2.2, kClosePx = 0.06;
   Fitted out;
-  out.blur_px = estimate_blur_px(scenery, *refined);
-  refined = refine(scenery, refined->pose, exact(out.blur_px));
-  if (!refined) return std::nullopt;
-  out.refined = std::move(*refined);
-  out.score = outline_score(scenery, out.refined.pose, out.blur_px);
+  double blur_px = known_blur_px.value_or(kUsualBlurPx);
+  data::Pose<> pose = start;
+  for (int round = 0; round < 3; ++round) {
+    auto refined = refine(scenery, pose, exact(blur_px, outline_px));
+    if (!refined) return std::nullopt;
+    out.refined = std::move(*refined);
+    out.blur_px = std::clamp(blur_px + out.refined.wider_px, kSharpestPx, kWidestPx);
+    if (known_blur_px || std::abs(out.blur_px - blur_px) < kClosePx) break;
+    blur_px = out.blur_px;
+    pose = out.refined.pose;
+  }
+  out.score = outline_score(out.refined);
   out.evidence = evidence_of(out.refined);
   return out;
 }
@@ -66,13 +84,17 @@ std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
 
 std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
   const auto refined = refine(scenery.blurred(kNearBlurPx), start, kNear);
-  return refined ? fit_exactly(scenery, refined->pose) : std::nullopt;
+  return refined ? fit_exactly(scenery, refined->pose, refined->outline_px, std::nullopt)
+                 : std::nullopt;
 }
 
 // A prediction is often right to the blur already; the wider look is easily misled by shadows.
-std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted) {
+std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
+                                          std::optional<double> blur_px) {
   constexpr double kSure = 0.6;
-  auto fitted = fit_exactly(scenery, predicted);
+  std::optional<Fitted> fitted;
+  if (const auto drawn = refine(scenery, predicted, kDraw))
+    fitted = fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px);
   if (fitted && fitted->score >= kSure) return fitted;
   return better(std::move(fitted), fit_from(scenery, predicted));
 }
@@ -86,8 +108,7 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
   for (const auto& start : starts) {
     auto refined = refine(far, start, kFar);
     if (refined) refined = refine(near, refined->pose, kNear);
-    if (refined)
-      drawn.emplace_back(outline_score(scenery, refined->pose, kUsualBlurPx), refined->pose);
+    if (refined) drawn.emplace_back(outline_score(*refined), refined->pose);
   }
   std::sort(drawn.begin(), drawn.end(),
             [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -135,6 +156,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
     if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
   }
   m.rms_px = r.solution.rms_px;
+  m.blur_px = fitted.blur_px;
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
   for (size_t i = 0; i < r.equations.size(); ++i) {
@@ -203,7 +225,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
-  auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front())
+  auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front(), evidence.blur_px)
                                  : fit_best(scenery, starts, mirrors);
   if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
       best->score < kDoubtful) {

@@ -2,7 +2,7 @@
 #include <optional>
 #include <vector>
 
-#include "edge_fit.hpp"
+#include "edge_stretch.hpp"
 #include "outline_samples.hpp"
 #include "robust_step.hpp"
 
@@ -32,16 +32,17 @@ struct Scenery {
   }
 };
 
-/// How one round of refinement looks for edges.
+/// How rounds of refinement look for edges.
 struct Search {
   double blur_px;    ///< of the model edge; wider reaches further
   double extent_px;  ///< of the profiles to either side
   double reach_px;   ///< largest offset believed
   double step_px;    ///< between outline points
   int iterations;
-  bool own_edges;       ///< also edges between two surfaces of the body
-  bool shading;         ///< the levels beside an edge may change along the profile
-  int edge_iterations;  ///< 1: best linear estimate of each edge
+  double settled_px;  ///< a smaller step is the last [px, rms along the outline]
+  /// With everything that bears on accuracy: slopes beside the edges, edges between two surfaces of
+  /// the body, what edge models may be wrong by, the covariance.
+  bool exact;
 };
 
 struct Refined {
@@ -50,24 +51,19 @@ struct Refined {
   std::vector<OutlineSample> samples;  ///< those with an edge
   std::vector<ProfileEdge> edges;
   std::vector<EdgeEquation> equations;
-  double covered = 0.0;  ///< share of the predicted outline with an accepted edge
+  double outline_px = 0.0;  ///< length of the predicted silhouette
+  double seen_px = 0.0;     ///< of it, with an edge exactly there
+  double covered = 0.0;     ///< share of the predicted outline with an accepted edge
+  double wider_px = 0.0;    ///< exact: by how much the edges are wider than the model's
 };
-
-/// The edges along the outline of a pose, without moving it.
-[[nodiscard]] Refined collect_edges(const Scenery& scenery, const data::Pose<>& pose,
-                                    const Search& search);
 
 /// Iterates edges and pose; nothing if too few edges are found.
 [[nodiscard]] std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
                                             const Search& search);
 
-/// Blur of the edges of this picture [px], from the refined outline's own profiles.
-[[nodiscard]] double estimate_blur_px(const Scenery& scenery, const Refined& refined);
-
-/// Share of the predicted silhouette, 0..1, with an edge exactly there: near 1 for the right pose,
-/// a third or less for a pose that merely has settled among edges.
-[[nodiscard]] double outline_score(const Scenery& scenery, const data::Pose<>& pose,
-                                   double blur_px);
+/// Share of the silhouette, 0..1, with an edge exactly there: near 1 for the right pose, a third or
+/// less for a pose that merely has settled among edges.
+[[nodiscard]] double outline_score(const Refined& refined);
 
 /// What speaks for this pose rather than another one with nearly the same silhouette: the gain of
 /// all edges, limited per edge so that no single one decides, less what their residuals take.

@@ -1,54 +1,69 @@
 #include "robust_step.hpp"
 
 #include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <utility>
+
+#include "arrow_system.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
-// Unknowns: the pose, the two nuisances common to the outline, and per group the error of the edge
-// model as a function of direction, given at kKnots directions and blended between them.
-constexpr int kCommon = 5, kKnots = 8;
-constexpr int kMost = PoseMotion::kMost + kCommon + kGroups * kKnots;
+// Unknowns: per group the error of the edge model as a function of direction, given at kKnots
+// directions and blended between them; then the pose and the nuisances common to the outline.
+constexpr int kCommon = 6, kKnots = 8;
+static_assert(PoseMotion::kMost + kCommon + kGroups * kKnots <= ArrowSystem::kMost);
 constexpr int kRow = PoseMotion::kMost + kCommon + 2;
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
-using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
+using Vector = ArrowSystem::Vector;
+
+// Where the pose begins among the unknowns.
+int pose_at(bool directions) {
+  return directions ? kGroups * kKnots : 0;
+}
 
 // The rim may be a little larger or smaller than the caliper says, edges a little towards the
 // bright side of where the transfer curve puts them.
 constexpr double kSwellSdPx = 0.3;
 constexpr double kPolaritySdPx = 0.2;
+// An edge's shift by a transfer curve other than the usual one, per contrast over mean level.
+constexpr double kToneSdPx = 0.05;
 // The colour planes: towards the brighter side, and as a whole beyond half a pixel of the other
 // common place of the samples.
 constexpr double kColourPolaritySdPx = 0.3, kColourShiftSdPx = 0.08;
 
-// The few unknowns an equation depends on.
+// The few unknowns an equation depends on, in the order of their indices but for the knots.
 struct Row {
   std::array<int, kRow> index;
   std::array<double, kRow> value;
   int count = 0;
 
-  explicit Row(const EdgeEquation& e) {
-    const int n = static_cast<int>(e.motion.size());
-    for (int i = 0; i < n; ++i) add(i, e.motion[i]);
-    add(n, e.swell);
-    if (e.colour) {
-      add(n + 2, e.polarity);
-      add(n + 3, std::cos(e.direction_rad));
-      add(n + 4, std::sin(e.direction_rad));
-    } else {
-      add(n + 1, e.polarity);
+  Row(const EdgeEquation& e, bool directions) {
+    if (directions) {
+      // Cosine and sine keep the variance the same between the knots.
+      const double place = (e.direction_rad / (2.0 * std::numbers::pi) + 1.0) * kKnots;
+      const int knot = static_cast<int>(place);
+      const double part = 0.5 * std::numbers::pi * (place - knot);
+      const int first = e.group * kKnots;
+      add(first + knot % kKnots, e.model_px * std::cos(part));
+      add(first + (knot + 1) % kKnots, e.model_px * std::sin(part));
+      if (index[0] > index[1]) std::swap(index[0], index[1]), std::swap(value[0], value[1]);
     }
-    // Cosine and sine keep the variance the same between the knots.
-    const double place = (e.direction_rad / (2.0 * std::numbers::pi) + 1.0) * kKnots;
-    const int knot = static_cast<int>(place);
-    const double part = 0.5 * std::numbers::pi * (place - knot);
-    const int first = n + kCommon + e.group * kKnots;
-    add(first + knot % kKnots, e.model_px * std::cos(part));
-    add(first + (knot + 1) % kKnots, e.model_px * std::sin(part));
+    const int first = pose_at(directions), n = static_cast<int>(e.motion.size());
+    for (int i = 0; i < n; ++i) add(first + i, e.motion[i]);
+    add(first + n, e.swell);
+    if (e.colour) {
+      add(first + n + 2, e.polarity);
+      add(first + n + 3, std::cos(e.direction_rad));
+      add(first + n + 4, std::sin(e.direction_rad));
+    } else {
+      add(first + n + 1, e.polarity);
+      add(first + n + 5, e.tone);
+    }
   }
   void add(int i, double v) {
     index[static_cast<size_t>(count)] = i;
@@ -58,18 +73,17 @@ struct Row {
   [[nodiscard]] double dot(const Vector& x) const {
     double sum = 0.0;
     for (int k = 0; k < count; ++k)
-      sum += value[static_cast<size_t>(k)] * x[index[static_cast<size_t>(k)]];
+      sum += value[static_cast<size_t>(k)] * x[static_cast<size_t>(index[static_cast<size_t>(k)])];
     return sum;
   }
-  // Adds weight * row^T row to the lower triangle, weight * row * offset to the right side.
-  void accumulate(double weight, double offset, Matrix& information, Vector& right) const {
+  // Adds weight * row^T row and weight * row * offset.
+  void accumulate(double weight, double offset, ArrowSystem& system) const {
     for (int a = 0; a < count; ++a) {
       const int i = index[static_cast<size_t>(a)];
       const double w = weight * value[static_cast<size_t>(a)];
-      right[i] += w * offset;
-      for (int b = 0; b < count; ++b)
-        if (const int j = index[static_cast<size_t>(b)]; j <= i)
-          information(i, j) += w * value[static_cast<size_t>(b)];
+      system.right(i) += w * offset;
+      for (int b = 0; b <= a; ++b)
+        system(i, index[static_cast<size_t>(b)]) += w * value[static_cast<size_t>(b)];
     }
   }
 };
@@ -80,17 +94,19 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-Matrix prior_information(const PoseMotion::Step& prior_sd) {
-  const auto n = prior_sd.size();
-  const auto size = n + kCommon + kGroups * kKnots;
-  Matrix information = Matrix::Identity(size, size);
-  for (int i = 0; i < n; ++i) information(i, i) = 1.0 / (prior_sd[i] * prior_sd[i]);
-  information(n, n) = 1.0 / (kSwellSdPx * kSwellSdPx);
-  information(n + 1, n + 1) = 1.0 / (kPolaritySdPx * kPolaritySdPx);
-  information(n + 2, n + 2) = 1.0 / (kColourPolaritySdPx * kColourPolaritySdPx);
-  information(n + 3, n + 3) = information(n + 4, n + 4) =
-      1.0 / (kColourShiftSdPx * kColourShiftSdPx);
-  return information;
+ArrowSystem prior_information(const PoseMotion::Step& prior_sd, bool directions) {
+  const int n = static_cast<int>(prior_sd.size()), first = pose_at(directions);
+  ArrowSystem system(directions ? kGroups : 0, directions ? kKnots : 0, n + kCommon);
+  for (int i = 0; i < first; ++i) system(i, i) = 1.0;
+  const auto expect = [&](int i, double sd) { system(first + i, first + i) = 1.0 / (sd * sd); };
+  for (int i = 0; i < n; ++i) expect(i, prior_sd[i]);
+  expect(n, kSwellSdPx);
+  expect(n + 1, kPolaritySdPx);
+  expect(n + 2, kColourPolaritySdPx);
+  expect(n + 3, kColourShiftSdPx);
+  expect(n + 4, kColourShiftSdPx);
+  expect(n + 5, kToneSdPx);
+  return system;
 }
 
 // Errors of neighbouring edges are correlated (texture, relief, compression). Sums over blocks of
@@ -125,29 +141,32 @@ double correlation_factor(const std::vector<EdgeEquation>& equations, double sca
 // directions is left out, over what the covariance expects. Sees errors that neighbours share,
 // whatever their cause.
 double jackknife_ratio(const std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
-                       const Matrix& prior, double scale, const Eigen::MatrixXd& covariance) {
+                       const ArrowSystem& prior, double scale, const Eigen::MatrixXd& covariance) {
   constexpr int kSectors = 6;
-  const auto size = prior.rows();
-  const auto n = covariance.rows();
-  std::array<Matrix, kSectors> information;
-  std::array<Vector, kSectors> right;
-  Matrix all = prior;
-  Vector all_right = Vector::Zero(size);
-  for (size_t k = 0; k < kSectors; ++k)
-    information[k] = Matrix::Zero(size, size), right[k] = Vector::Zero(size);
+  const auto n = static_cast<int>(covariance.rows());
+  const ArrowSystem none = [&] {
+    ArrowSystem zero = prior;
+    zero.add(prior, -1.0);
+    return zero;
+  }();
+  std::array<ArrowSystem, kSectors> parts;
+  parts.fill(none);
   for (size_t i = 0; i < equations.size(); ++i) {
     const EdgeEquation& e = equations[i];
     const double turn = e.direction_rad / (2.0 * std::numbers::pi) + 1.0;
     const auto sector = static_cast<size_t>(turn * kSectors) % kSectors;
-    rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px,
-                       information[sector], right[sector]);
+    rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px, parts[sector]);
   }
-  for (size_t k = 0; k < kSectors; ++k) all += information[k], all_right += right[k];
+  ArrowSystem all = prior;
+  for (const ArrowSystem& part : parts) all.add(part, 1.0);
   Eigen::MatrixXd answers(n, kSectors);
   for (size_t k = 0; k < kSectors; ++k) {
-    const Matrix rest = all - information[k];
-    answers.col(static_cast<Eigen::Index>(k)) =
-        rest.ldlt().solve(Vector(all_right - right[k])).head(n);
+    ArrowSystem rest = all;
+    rest.add(parts[k], -1.0);
+    if (!rest.factorise()) return std::numeric_limits<double>::infinity();
+    const Vector x = rest.solved_right();
+    for (int i = 0; i < n; ++i)
+      answers(i, static_cast<Eigen::Index>(k)) = x[static_cast<size_t>(kGroups * kKnots + i)];
   }
   const Eigen::VectorXd mean = answers.rowwise().mean();
   const Eigen::MatrixXd off = answers.colwise() - mean;
@@ -155,54 +174,103 @@ double jackknife_ratio(const std::vector<EdgeEquation>& equations, const std::ve
   return covariance.ldlt().solve(variance).trace() / static_cast<double>(n);
 }
 
-}  // namespace
-
-bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, RobustSolution& out) {
-  constexpr size_t kFewest = 8;
-  constexpr int kIterations = 8;
+// Tukey's weights about the solution so far, for errors that are `scale` times as large as claimed.
+double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows, const Vector& x,
+             double least_scale_px, std::vector<double>& sizes) {
   constexpr double kTukey = 4.685;  // 95 % efficiency for normal errors
-  if (equations.size() < kFewest) return false;
-  const auto n = prior_sd.size();
-  const Matrix prior = prior_information(prior_sd);
-  const auto size = prior.rows();
-  std::vector<Row> rows(equations.begin(), equations.end());
-  Vector x = Vector::Zero(size);
-  Matrix information;
-  double scale = 1.0;
-  std::vector<double> sizes(equations.size());
-  Eigen::LDLT<Matrix> factor;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    for (size_t i = 0; i < equations.size(); ++i) {
-      auto& e = equations[i];
-      e.residual_px = e.offset_px - rows[i].dot(x);
-      sizes[i] = std::abs(e.residual_px) / std::sqrt(e.variance_px2);
-    }
-    std::vector<double> copy = sizes;
-    // Never below what the edges claim.
-    scale = std::max(1.4826 * median(copy), 1.0);
-    information = prior;
-    Vector right = Vector::Zero(size);
-    for (size_t i = 0; i < equations.size(); ++i) {
-      auto& e = equations[i];
-      const double bound = kTukey * std::max(scale, least_scale_px / std::sqrt(e.variance_px2));
-      const double t = sizes[i] / bound;
-      e.weight = t < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
-      rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px, information,
-                         right);
-    }
-    factor.compute(information);
-    const Vector next = factor.solve(right);
-    if (!next.allFinite()) return false;
-    const double change =
-        (next - x).head(n).cwiseProduct(information.diagonal().head(n).cwiseSqrt()).norm();
-    x = next;
-    if (change < 0.02) break;  // in standard deviations
-  }
-  double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0, z2 = 0.0;
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     e.residual_px = e.offset_px - rows[i].dot(x);
+    sizes[i] = std::abs(e.residual_px) / std::sqrt(e.variance_px2);
+  }
+  std::vector<double> copy = sizes;
+  // Never below what the edges claim.
+  const double scale = std::max(1.4826 * median(copy), 1.0);
+  for (size_t i = 0; i < equations.size(); ++i) {
+    auto& e = equations[i];
+    const double bound = kTukey * std::max(scale, least_scale_px / std::sqrt(e.variance_px2));
+    const double t = sizes[i] / bound;
+    e.weight = t < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
+  }
+  return scale;
+}
+
+// Tukey-weighted least squares as it goes: the last solution and the system that gave it.
+struct Solving {
+  std::vector<EdgeEquation>& equations;
+  std::vector<Row>& rows;
+  const ArrowSystem& prior;
+  int first, count;  // the pose among the unknowns
+  double least_scale_px;
+  Vector x{};
+  ArrowSystem system{};  // factorised
+  double scale = 1.0;
+  std::vector<double> sizes{};
+
+  bool run() {
+    constexpr int kIterations = 8;
+    constexpr double kSettled = 0.03;  // in standard deviations
+    sizes.resize(equations.size());
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      scale = weigh(equations, rows, x, least_scale_px, sizes);
+      system = prior;
+      for (size_t i = 0; i < equations.size(); ++i)
+        if (equations[i].weight > 0.0)
+          rows[i].accumulate(equations[i].weight / (equations[i].variance_px2 * scale * scale),
+                             equations[i].offset_px, system);
+      Vector information{};
+      for (int i = first; i < first + count; ++i) information[at(i)] = system(i, i);
+      if (!system.factorise()) return false;
+      const Vector next = system.solved_right();
+      double change2 = 0.0;
+      for (int i = first; i < first + count; ++i) {
+        if (!std::isfinite(next[at(i)])) return false;
+        change2 += std::pow(next[at(i)] - x[at(i)], 2) * information[at(i)];
+      }
+      x = next;
+      if (change2 < kSettled * kSettled) break;
+    }
+    return true;
+  }
+  static constexpr size_t at(int i) { return static_cast<size_t>(i); }
+  // Diagonal of the covariance of all unknowns, and the whole of it for the pose.
+  [[nodiscard]] Vector variances(Eigen::MatrixXd& pose) const {
+    Vector all{};
+    pose.resize(count, count);
+    for (int i = 0; i < system.size(); ++i) {
+      Vector unit{};
+      unit[at(i)] = 1.0;
+      system.solve(unit);
+      all[at(i)] = unit[at(i)];
+      if (i < first || i >= first + count) continue;
+      for (int j = 0; j < count; ++j) pose(j, i - first) = unit[at(first + j)];
+    }
+    return all;
+  }
+};
+
+}  // namespace
+
+bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+                    double least_scale_px, bool directions, RobustSolution& out) {
+  constexpr size_t kFewest = 8;
+  if (equations.size() < kFewest) return false;
+  const auto n = static_cast<int>(prior_sd.size());
+  const int first = pose_at(directions);
+  const ArrowSystem prior = prior_information(prior_sd, directions);
+  std::vector<Row> rows;
+  rows.reserve(equations.size());
+  for (const EdgeEquation& e : equations) rows.emplace_back(e, directions);
+  Solving solving{equations, rows, prior, first, n, least_scale_px};
+  if (!solving.run()) return false;
+  Eigen::MatrixXd inverse;
+  Vector variances{};
+  if (directions) variances = solving.variances(inverse);
+  const double scale = solving.scale;
+  double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0, z2 = 0.0;
+  for (size_t i = 0; i < equations.size(); ++i) {
+    auto& e = equations[i];
+    e.residual_px = e.offset_px - rows[i].dot(solving.x);
     square += e.weight * e.residual_px * e.residual_px;
     z2 += e.weight * e.residual_px * e.residual_px / e.variance_px2;
     weight += e.weight;
@@ -210,21 +278,24 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
     if (e.weight > 0.5) accepted += e.arc_px;
   }
   if (!(weight > 0.0)) return false;
-  const double scale2 = std::max(z2 / weight, 1.0);
-  const Matrix inverse = factor.solve(Matrix::Identity(size, size));
-  // Of each unknown the share that the edges determine and not the prior.
-  double fitted = 0.0;
-  for (int i = 0; i < size; ++i) fitted += 1.0 - prior(i, i) * inverse(i, i);
-  out.step = x.head(n);
-  out.swell_px = x[n];
-  out.polarity_px = x[n + 1];
-  out.colour_shift_px = {x[n + 3], x[n + 4]};
+  const auto of = [&](int i) { return solving.x[static_cast<size_t>(first + i)]; };
+  out.step.resize(n);
+  for (int i = 0; i < n; ++i) out.step[i] = of(i);
+  out.swell_px = of(n);
+  out.polarity_px = of(n + 1);
+  out.colour_shift_px = {of(n + 3), of(n + 4)};
   out.rms_px = std::sqrt(square / weight);
   out.accepted = accepted / arc;
+  if (!directions) return true;
+  const double scale2 = std::max(z2 / weight, 1.0);
+  // Of each unknown the share that the edges determine and not the prior.
+  double fitted = 0.0;
+  for (int i = 0; i < solving.system.size(); ++i)
+    fitted += 1.0 - prior(i, i) * variances[static_cast<size_t>(i)];
   out.correlation = correlation_factor(equations, scale2, fitted);
   // Noise grows with the correlation, what the edge models may be wrong by does not.
   const double inflation = out.correlation * scale2 / (scale * scale);
-  out.covariance = inflation * inverse.topLeftCorner(n, n);
+  out.covariance = inflation * inverse;
   // The sixths share some of their errors, so that the ratio is a little low; a small one may also
   // be luck.
   constexpr double kShared = 1.3, kLeast = 0.6, kMostInflated = 25.0;

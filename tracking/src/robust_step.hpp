@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "pose_motion.hpp"
@@ -15,6 +16,8 @@ inline constexpr int kGroups = 4;  ///< outer silhouette, bore, the body's own e
 struct EdgeEquation {
   PoseMotion::Step motion;
   double swell = 1.0, polarity = 1.0;
+  /// Contrast over mean level: how far the edge moves if the transfer curve is not the one assumed.
+  double tone = 0.0;
   /// What the edge model may be wrong by [px], alike for neighbours in direction within a group.
   double model_px = 0.0;
   int group = 0;               ///< 0 .. kGroups - 1
@@ -41,7 +44,9 @@ struct RobustSolution {
 
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
 /// `prior_sd` per parameter. False if fewer than 8 equations.
+/// @param directions also allow for what the edge models may be wrong by in every direction, and
+/// give the covariance; without, the step alone: enough for drawing a pose towards edges.
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, RobustSolution& out);
+                    double least_scale_px, bool directions, RobustSolution& out);
 
 }  // namespace trochoid::tracking

@@ -34,6 +34,7 @@ struct PoseMeasurement {
   /// Sum over the outline [px] of how much better its edges explain the picture than none would,
   /// less their misfit: compares fits to one picture.
   double evidence = 0.0;
+  double blur_px = 0.0;   ///< of the edges of this picture, for the next one
   std::vector<EdgePoint> edges;
 };
 
@@ -49,6 +50,8 @@ struct OutlineEvidence {
   double exposure_fraction = 0.0;          ///< shutter time over frame interval: how far it smears
   cv::Mat chroma{};                        ///< CV_8UC2 of half the size, or empty: Frame::chroma
   cv::Mat background_chroma{};             ///< what it would be without the body, or empty
+  /// PoseMeasurement::blur_px of the frame before; without, it is found by looking repeatedly.
+  std::optional<double> blur_px{};
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its

@@ -1,0 +1,307 @@
+#include "edge_stretch.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "normal_table.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kLeastNoise2 = 0.05;  // [8-bit levels squared]
+
+// Unknowns of the linear model: inner level, outer level and offset; slope inside and outside, bend
+// inside and outside; blur.
+constexpr int kOwn = 3, kShading = 4, kAll = kOwn + kShading + 1;
+using Vector4 = Eigen::Vector4d;
+using Matrix4 = Eigen::Matrix4d;
+
+struct Columns {
+  std::array<float, Profile::kMost> share, density, ground;
+};
+
+struct Noise {
+  double inner = 0.0, outer = 0.0, inner_freedom = 0.0, outer_freedom = 0.0;
+};
+
+// One profile with the sums over its model columns and what they say.
+struct Working {
+  bool usable = false;
+  float inner = 0.0f, outer = 0.0f;  // levels of the plain step
+  std::array<std::array<float, kAll>, kAll> normal{};
+  std::array<float, kAll> right{};
+  float square = 0.0f;
+  Vector4 shading = Vector4::Zero();  // slopes and bends
+  Matrix4 shading_covariance = Matrix4::Zero();
+  double blur_step = 0.0, blur_information = 0.0;
+  Noise noise;
+};
+
+void columns_of(const StretchProfile& p, Columns& c) {
+  const NormalTable& table = NormalTable::instance();
+  const float inverse = 1.0f / static_cast<float>(p.blur_px);
+  float mean = 0.0f;
+  for (int j = 0; j < p.profile.count; ++j) mean += p.profile.background[static_cast<size_t>(j)];
+  // Of mean one, so that levels and slopes compare with those of neighbours without a plate.
+  const float scale = p.plate ? static_cast<float>(p.profile.count) / std::max(mean, 1.0f) : 0.0f;
+  for (int j = 0; j < p.profile.count; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const auto step = table.at(p.profile.s_px(j) * inverse);
+    c.share[k] = step.share;
+    c.density[k] = step.density * inverse;
+    c.ground[k] = p.plate ? scale * p.profile.background[k] : 1.0f;
+  }
+}
+
+bool plain_levels(const StretchProfile& p, const Columns& c, Working& w) {
+  float aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
+  for (int j = 0; j < p.profile.count; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const float a = 1.0f - c.share[k], b = c.share[k] * c.ground[k], y = p.profile.light[k];
+    aa += a * a, ab += a * b, bb += b * b, ay += a * y, by += b * y;
+  }
+  const float determinant = aa * bb - ab * ab;
+  if (!(determinant > 1e-3f * aa * bb)) return false;
+  w.inner = (bb * ay - ab * by) / determinant;
+  w.outer = (aa * by - ab * ay) / determinant;
+  return true;
+}
+
+// Sums of all columns; the right side is what the plain step leaves.
+void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
+  const auto inverse_blur = static_cast<float>(1.0 / p.blur_px);
+  for (int j = 0; j < p.profile.count; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const float s = p.profile.s_px(j), ground = c.ground[k];
+    const float a = 1.0f - c.share[k], b = c.share[k] * ground;
+    const float d = (w.inner - w.outer * ground) * c.density[k];
+    const std::array<float, kAll> row{a,     b,         d,         s * a,
+                                      s * b, s * s * a, s * s * b, d * s * inverse_blur};
+    const float rest = p.profile.light[k] - w.inner * a - w.outer * b;
+    for (size_t m = 0; m < kAll; ++m) {
+      for (size_t n = 0; n <= m; ++n) w.normal[m][n] += row[m] * row[n];
+      w.right[m] += row[m] * rest;
+    }
+    w.square += rest * rest;
+  }
+}
+
+// Largest slopes [per px] and bends [per px^2] of the light, as shares of it.
+Vector4 largest_shading(const Working& w) {
+  constexpr double kSlope = 0.06, kBend = 0.02;
+  const double brightest = std::max(
+      {2.0, std::abs(static_cast<double>(w.inner)), std::abs(static_cast<double>(w.outer))});
+  return {kSlope * brightest, kSlope * brightest, kBend * brightest, kBend * brightest};
+}
+
+// Slopes and bends with levels and offset free, then the blur with all of them free.
+void find_shading(const StretchProfile& p, Working& w) {
+  std::array<std::array<double, kAll>, kAll> m{};
+  std::array<double, kAll> r{};
+  for (size_t i = 0; i < kAll; ++i) {
+    for (size_t j = 0; j <= i; ++j) m[i][j] = static_cast<double>(w.normal[i][j]);
+    r[i] = static_cast<double>(w.right[i]);
+  }
+  m[2][2] += 1.0;  // without contrast any offset fits; about a pixel is possible
+  double square = static_cast<double>(w.square);
+  const auto eliminate = [&](size_t k) {
+    const double pivot = m[k][k];
+    if (!(pivot > 1e-9)) return;
+    square -= r[k] * r[k] / pivot;
+    for (size_t i = k + 1; i < kAll; ++i) {
+      const double factor = m[i][k] / pivot;
+      r[i] -= factor * r[k];
+      for (size_t j = k + 1; j <= i; ++j) m[i][j] -= factor * m[j][k];
+    }
+  };
+  for (size_t k = 0; k < kOwn; ++k) eliminate(k);
+  Matrix4 normal;
+  Vector4 right, cross;
+  for (size_t i = 0; i < kShading; ++i) {
+    for (size_t j = 0; j <= i; ++j)
+      normal(static_cast<int>(i), static_cast<int>(j)) =
+          normal(static_cast<int>(j), static_cast<int>(i)) = m[kOwn + i][kOwn + j];
+    right[static_cast<int>(i)] = r[kOwn + i];
+    cross[static_cast<int>(i)] = m[kAll - 1][kOwn + i];
+  }
+  const double blur = m[kAll - 1][kAll - 1], blur_right = r[kAll - 1];
+  const Vector4 prior = largest_shading(w).cwiseAbs2().cwiseInverse();
+  for (size_t k = kOwn; k < kOwn + kShading; ++k) {
+    m[k][k] += prior[static_cast<int>(k) - kOwn];
+    eliminate(k);
+  }
+  const double freedom = std::max(0.5, p.profile.count / kSamplesPerIndependent - 5.0);
+  const double noise2 = kSamplesPerIndependent *
+                        (kLeastNoise2 + std::max(0.0, square) / kSamplesPerIndependent / freedom);
+  normal.diagonal() += noise2 * prior;
+  const Eigen::LLT<Matrix4> factor(normal);
+  const Matrix4 inverse = factor.solve(Matrix4::Identity());
+  w.shading = inverse * right;
+  w.shading_covariance = noise2 * inverse;
+  const double own = blur - cross.dot(inverse * cross);
+  w.blur_information = own / noise2;
+  w.blur_step = own > 0.0 ? (blur_right - cross.dot(w.shading)) / own : 0.0;
+}
+
+// By how much the edges should be wider: the median, so that shadows that end beside some of them
+// do not count.
+double blur_step(const std::vector<Working>& all) {
+  constexpr size_t kFewest = 8;
+  constexpr double kLeastInformation = 30.0, kMost = 0.3;
+  std::vector<double> steps;
+  for (const Working& w : all)
+    if (w.usable && w.blur_information > kLeastInformation)
+      steps.push_back(std::clamp(w.blur_step, -kMost, kMost));
+  if (steps.size() < kFewest) return 0.0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+// The level beside the edge at a distance from it.
+float shaded(float level, float slope, float bend, float s) {
+  return level + s * (slope + s * bend);
+}
+
+// Squared residuals on either side about the best step with this shading, whose levels it keeps.
+void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
+  Eigen::Matrix3d m;
+  Eigen::Vector3d r;
+  for (int i = 0; i < kOwn; ++i) {
+    const auto row = static_cast<size_t>(i);
+    for (int j = 0; j <= i; ++j)
+      m(i, j) = m(j, i) = static_cast<double>(w.normal[row][static_cast<size_t>(j)]);
+    r[i] = static_cast<double>(w.right[row]);
+    for (int k = 0; k < kShading; ++k)
+      r[i] -= static_cast<double>(w.normal[static_cast<size_t>(kOwn + k)][row]) * w.shading[k];
+  }
+  m(2, 2) += 1.0;
+  const Eigen::Vector3f own = m.ldlt().solve(r).cast<float>();
+  const Eigen::Vector4f v = w.shading.cast<float>();
+  const float inner = w.inner + own[0], outer = w.outer + own[1];
+  constexpr auto kShare = static_cast<float>(1.0 / kSamplesPerIndependent);
+  float inner_square = 0, outer_square = 0, inner_count = 0, outer_count = 0;
+  for (int j = 0; j < p.profile.count; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const float s = p.profile.s_px(j), a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
+    const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
+                       shaded(outer, v[1], v[3], s) * b -
+                       own[2] * (w.inner - w.outer * c.ground[k]) * c.density[k];
+    const float square = kShare * rest * rest;
+    inner_square += a * square, outer_square += c.share[k] * square;
+    inner_count += kShare * a, outer_count += kShare * c.share[k];
+  }
+  w.inner = inner, w.outer = outer;
+  // Half of what was fitted comes from either side; priors make slopes and bends count less.
+  constexpr float kFitted = 1.9f, kLeastFreedom = 0.2f;
+  w.noise = {inner_square, outer_square, std::max(kLeastFreedom, inner_count - kFitted),
+             std::max(kLeastFreedom, outer_count - kFitted)};
+}
+
+// Variances of a sample on either side, from a stretch of the outline.
+std::vector<std::array<float, 2>> noise_of_neighbours(const std::vector<Working>& all,
+                                                      const std::vector<StretchProfile>& profiles) {
+  constexpr int kReach = 5;
+  const int n = static_cast<int>(all.size());
+  std::vector<std::array<float, 2>> out(all.size());
+  for (int i = 0; i < n; ++i) {
+    Noise sum{0.0, 0.0, 1e-3, 1e-3};
+    for (int j = std::max(0, i - kReach); j <= std::min(n - 1, i + kReach); ++j) {
+      const auto k = static_cast<size_t>(j);
+      if (!all[k].usable || profiles[k].curve != profiles[static_cast<size_t>(i)].curve) continue;
+      const Noise& own = all[k].noise;
+      sum.inner += own.inner, sum.inner_freedom += own.inner_freedom;
+      sum.outer += own.outer, sum.outer_freedom += own.outer_freedom;
+    }
+    const auto of = [](double square, double freedom) {
+      return static_cast<float>(kSamplesPerIndependent * std::max(square / freedom, kLeastNoise2));
+    };
+    out[static_cast<size_t>(i)] = {of(sum.inner, sum.inner_freedom),
+                                   of(sum.outer, sum.outer_freedom)};
+  }
+  return out;
+}
+
+// The offset with slopes given, samples weighed by the noise of their side.
+void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>& noise,
+                const Working& w) {
+  std::array<float, 6> n{};  // lower triangle of a, b, d
+  std::array<float, kOwn> r{};
+  std::array<std::array<float, kShading>, kOwn> cross{};
+  const Eigen::Vector4f v = w.shading.cast<float>();
+  for (int j = 0; j < p.profile.count; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const float s = p.profile.s_px(j), ground = c.ground[k], share = c.share[k];
+    const float a = 1.0f - share, b = share * ground;
+    const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
+    const float weight = 1.0f / (noise[0] + share * (noise[1] - noise[0]));
+    const float rest = p.profile.light[k] - inner * a - outer * b;
+    const std::array<float, kOwn> row{a, b, (inner - outer * ground) * c.density[k]};
+    const std::array<float, kShading> shading{s * a, s * b, s * s * a, s * s * b};
+    size_t at = 0;
+    for (size_t i = 0; i < kOwn; ++i) {
+      const float wr = weight * row[i];
+      for (size_t l = 0; l <= i; ++l) n[at++] += wr * row[l];
+      r[i] += wr * rest;
+      for (size_t l = 0; l < kShading; ++l) cross[i][l] += wr * shading[l];
+    }
+  }
+  const float determinant = n[0] * n[2] - n[1] * n[1];
+  p.found = false;
+  if (!(determinant > 1e-4f * n[0] * n[2])) return;
+  // d with the levels projected out.
+  const float in = (n[2] * n[3] - n[1] * n[4]) / determinant;
+  const float out = (n[0] * n[4] - n[1] * n[3]) / determinant;
+  const float information = n[5] - in * n[3] - out * n[4];
+  if (!(information > 1e-4f)) return;
+  const double offset = (r[2] - in * r[0] - out * r[1]) / information;
+  if (!(std::abs(offset) <= p.reach_px)) return;
+  Vector4 pull;
+  for (size_t l = 0; l < kShading; ++l)
+    pull[static_cast<int>(l)] = (cross[2][l] - in * cross[0][l] - out * cross[1][l]) / information;
+  ProfileEdge& e = p.edge;
+  e.offset_px = offset;
+  e.noise_variance_px2 = 1.0 / static_cast<double>(information);
+  e.shading_variance_px2 = pull.dot(w.shading_covariance * pull);
+  const float s = std::clamp(static_cast<float>(offset), p.profile.first_px, -p.profile.first_px);
+  const float ground = c.ground[static_cast<size_t>(std::clamp(
+      (s - p.profile.first_px) / Profile::kStepPx, 0.0f, static_cast<float>(p.profile.count - 1)))];
+  const double inner = shaded(w.inner, v[0], v[2], s);
+  e.contrast = shaded(w.outer, v[1], v[3], s) * ground - inner;
+  e.mean_level = inner + 0.5 * e.contrast;
+  e.inner_slope = v[0] + 2.0f * s * v[2];
+  e.outer_slope = (v[1] + 2.0f * s * v[3]) * ground;
+  const double square = w.noise.inner + w.noise.outer;
+  const double freedom = std::max(1.0, w.noise.inner_freedom + w.noise.outer_freedom);
+  constexpr double kLeastGainNoise2 = 0.1;
+  e.gain = 0.5 * freedom *
+           std::log((square_without_edge(p.profile, p.plate) / kSamplesPerIndependent +
+                     freedom * kLeastGainNoise2) /
+                    (square + freedom * kLeastGainNoise2));
+  p.found = true;
+}
+
+}  // namespace
+
+double fit_stretches(std::vector<StretchProfile>& profiles) {
+  std::vector<Working> all(profiles.size());
+  std::vector<Columns> columns(profiles.size());
+  for (size_t i = 0; i < profiles.size(); ++i) {
+    columns_of(profiles[i], columns[i]);
+    all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
+    if (!all[i].usable) continue;
+    accumulate(profiles[i], columns[i], all[i]);
+    find_shading(profiles[i], all[i]);
+    find_noise(profiles[i], columns[i], all[i]);
+  }
+  const auto noise = noise_of_neighbours(all, profiles);
+  for (size_t i = 0; i < profiles.size(); ++i) {
+    profiles[i].found = false;
+    if (all[i].usable) fit_offset(profiles[i], columns[i], noise[i], all[i]);
+  }
+  return blur_step(all);
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,27 @@
+#pragma once
+#include <vector>
+
+#include "edge_fit.hpp"
+
+namespace trochoid::tracking {
+
+/// A profile across a predicted edge at s = 0.
+struct StretchProfile {
+  Profile profile;
+  double blur_px = 0.7;   ///< of its edge
+  bool plate = false;     ///< the outer level is a multiple of the background plate
+  int curve = 0;          ///< neighbours are profiles of the same curve
+  double reach_px = 2.0;  ///< largest offset believed
+  bool found = false;     ///< out: an edge within reach
+  ProfileEdge edge{};     ///< out
+};
+
+/// Fits the profiles of an outline, linearly about s = 0: the best estimate for averaging, however
+/// noisy. Each has its own levels, which may change along the normal, linearly and with a bend, by
+/// a few per cent of the light (shading, soft shadows); how noisy either side is, is common to
+/// neighbours: the relief of a coin and the floor are not equally noisy, and a single profile has
+/// too few degrees of freedom to know its own.
+/// @returns by how much the blur of the edges should be larger [px], 0 if they do not tell.
+double fit_stretches(std::vector<StretchProfile>& profiles);
+
+}  // namespace trochoid::tracking
