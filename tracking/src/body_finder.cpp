@@ -127,11 +127,16 @@ class CylinderFinder final : public BodyFinder {
     guess.rim = rim_of(guess.pose->pose);
     guess.centre_px = guess.pose->centre_px = guess.rim.centre_px;
   }
+  [[nodiscard]] std::optional<data::Pose<>> mirror_image(const data::Pose<>& pose) const override {
+    if (motion_.rotation() < 0 || pivoted_) return std::nullopt;
+    return tracking::mirrored(camera_, motion_, pose);
+  }
   [[nodiscard]] std::optional<Sighting> mirrored(const Look& look,
                                                  const Sighting& seen) const override {
-    if (!seen.pose || motion_.rotation() < 0 || pivoted_) return std::nullopt;
+    const auto image = seen.pose ? mirror_image(seen.pose->pose) : std::nullopt;
+    if (!image) return std::nullopt;
     Sighting guess = seen;
-    guess.pose->pose = tracking::mirrored(camera_, motion_, seen.pose->pose);
+    guess.pose->pose = *image;
     Look there = look;
     there.predicted = &guess;
     return find(there);

@@ -19,7 +19,8 @@ struct Sighting {
   std::optional<double> turned_rad;  ///< of the face since the seed frame, image angle, unwrapped
   double turned_sigma_rad = 0.0;
   double rms_px = 0.0;
-  double accepted = 0.0;  ///< share of the outline with an edge
+  double accepted = 0.0;           ///< share of the outline with an edge
+  bool attitude_doubtful = false;  ///< it may be the mirror image of what is said
   Evidence evidence{};
   std::vector<EdgePoint> edges;
 };
@@ -48,6 +49,11 @@ class BodyFinder {
   /// nothing where there is none.
   [[nodiscard]] virtual std::optional<Sighting> mirrored(const Look& /*look*/,
                                                          const Sighting& /*seen*/) const {
+    return std::nullopt;
+  }
+  /// The other tilt with nearly the same silhouette, nothing where there is none.
+  [[nodiscard]] virtual std::optional<data::Pose<>> mirror_image(
+      const data::Pose<>& /*pose*/) const {
     return std::nullopt;
   }
   /// Semi-major axis of the rim of the body lying there [px]; 0 if its size is not known.

@@ -41,9 +41,16 @@ void Follower::start(const Frame& frame, const Sighting& seen) {
   usual_accepted_ = seen.accepted;
   usual_ = seen.evidence;
   usual_clarity_ = clarity(seen);
+  usual_evidence_ = seen.pose ? seen.pose->evidence : 0.0;
   mean_shape_px_ = seen.rim.shape_px;
   shape_scatter_px_ = 1.0;
   lost_ = 0;
+}
+
+void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
+  if (seen.empty()) return;
+  forecast_.start(seen.front().first, seen.front().second);
+  for (std::size_t i = 1; i < seen.size(); ++i) forecast_.add(seen[i].first, seen[i].second, true);
 }
 
 /// Evidence for a sighting compared with what is usual for this body here: about 1 when all of it
@@ -61,7 +68,7 @@ double Follower::wholeness(const Sighting& seen) const {
 /// is that the hidden body is where it was expected.
 bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double reach_px) const {
   constexpr double kWhole = 0.75, kLeast = 0.35;
-  if (seen.accepted < std::max(0.3, 0.4 * usual_accepted_)) return false;
+  if (seen.accepted < std::max(0.25, 0.4 * usual_accepted_)) return false;
   const double ratio = seen.rim.semi_major_px() / usual_major_px_;
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
@@ -101,6 +108,15 @@ std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& ex
   auto seen = finder_.find(look);
   if (!seen || !plausible(*seen, guess, reach_px + 0.3 * size)) return std::nullopt;
   return seen;
+}
+
+/// The body turns so fast that predictions of its attitude mean little, or the picture speaks for
+/// this one far less than it usually does.
+bool Follower::misgiving(const Sighting& seen) const {
+  constexpr double kFast = 0.15, kLittle = 0.7;
+  if (!seen.pose) return false;
+  return forecast_.surprise_px() > kFast * usual_major_px_ ||
+         seen.pose->evidence < kLittle * usual_evidence_;
 }
 
 /// Where it should be if it goes on as before; if little of it is seen there, also where it would
@@ -161,7 +177,9 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
   for (const Candidate& candidate : candidates) {
     look.detection = candidate.detection;
     auto seen = finder_.find(look);
-    if (!seen || seen->accepted < 0.5 || clarity(*seen) < 0.5 * usual_clarity_) continue;
+    if (!seen || seen->accepted < std::min(0.5, 0.7 * usual_accepted_) ||
+        clarity(*seen) < 0.5 * usual_clarity_)
+      continue;
     if (wholeness(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
         is_other(seen->centre_px, others))
       continue;
@@ -189,6 +207,7 @@ void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predic
       shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
     usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);
     usual_accepted_ += kLearn * (seen.accepted - usual_accepted_);
+    if (seen.pose) usual_evidence_ += kLearn * (seen.pose->evidence - usual_evidence_);
     usual_.cover += kLearn * (seen.evidence.cover - usual_.cover);
     usual_.edges += kLearn * (seen.evidence.edges - usual_.edges);
     const double off = (seen.rim.shape_px - mean_shape_px_).norm();
@@ -207,7 +226,15 @@ std::optional<Sighting> Follower::follow(const Frame& frame, const Others& other
   std::optional<Sighting> seen;
   if (inside(predicted.centre_px, frame.luma.size(), 0.5 * usual_major_px_))
     seen = look_near(frame, predicted, others);
-  if (!seen) seen = look_about(frame, predicted, others);
+  if (!seen) {
+    seen = look_about(frame, predicted, others);
+  } else if (misgiving(*seen)) {
+    constexpr double kClearlyMore = 1.05;
+    auto anywhere = look_about(frame, predicted, others);
+    if (anywhere && anywhere->pose &&
+        anywhere->pose->evidence > kClearlyMore * seen->pose->evidence)
+      seen = std::move(anywhere);
+  }
   if (!seen) {
     ++lost_;
     return std::nullopt;

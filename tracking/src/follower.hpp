@@ -20,6 +20,9 @@ class Follower {
   Follower(const BodyFinder& finder, const Background& background,
            std::shared_ptr<const SpinProfile> marks);
 
+  /// What it has followed is known better now: goes on from the last sightings of these.
+  /// @param seen by time, from the oldest.
+  void resume(const std::vector<std::pair<double, Sighting>>& seen);
   /// Starts from a measured sighting.
   void start(const Frame& frame, const Sighting& seen);
   /// The body in the next frame (earlier or later than the last), if it is seen there.
@@ -34,6 +37,7 @@ class Follower {
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
   [[nodiscard]] double wholeness(const Sighting& seen) const;
+  [[nodiscard]] bool misgiving(const Sighting& seen) const;
   [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
                                double reach_px) const;
   void set_shape_knowledge(Look& look, Sighting& guess) const;
@@ -51,8 +55,9 @@ class Follower {
   double shape_scatter_px_ = 1.0;                            ///< running deviation from it
   double usual_major_px_ = 0.0;
   double usual_accepted_ = 0.0;
-  Evidence usual_{};            ///< running mean over whole sightings
-  double usual_clarity_ = 0.0;  ///< of the seed
+  Evidence usual_{};             ///< running mean over whole sightings
+  double usual_clarity_ = 0.0;   ///< of the seed
+  double usual_evidence_ = 0.0;  ///< of the pose, running mean
   int lost_ = 0;
 };
 

@@ -23,6 +23,8 @@ class Recording {
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
   [[nodiscard]] const std::vector<Frame>& held() const { return held_; }
+  /// Lets the held frames go.
+  void release() { held_.clear(); }
   /// Next frame after the held ones.
   [[nodiscard]] std::optional<Frame> next();
   /// Pictures spread over the whole recording, for the background: from the held part, and, where

@@ -1,7 +1,4 @@
 #pragma once
-#include <map>
-#include <memory>
-
 #include "body_search.hpp"
 
 namespace trochoid::tracking {
@@ -16,14 +13,5 @@ namespace trochoid::tracking {
 /// The seed or its mirror image, whichever leads on better.
 [[nodiscard]] Seed better_reading(const std::vector<Frame>& held, const Background& background,
                                   const BodyFinder& finder, Seed seed);
-
-/// Seen face on, a tilt and its mirror image are one, and what follows may go on in either. Tries
-/// the stretches between such moments, other than the seed's own, against their mirror images and
-/// follows those again that turn out wrong.
-/// @param path by held index; @param ahead replaced if the last stretch is followed again.
-using HeldPath = std::map<std::size_t, Sighting>;
-void mend_mirrored(const std::vector<Frame>& held, const Background& background,
-                   const BodyFinder& finder, std::size_t seed_index, HeldPath& path,
-                   std::unique_ptr<Follower>& ahead);
 
 }  // namespace trochoid::tracking

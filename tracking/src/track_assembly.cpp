@@ -34,7 +34,9 @@ class Unwrapper {
 
 double quality_of(const Sighting& seen) {
   const double spread = seen.rms_px / (0.3 + 0.02 * seen.rim.semi_minor_px());
-  return std::clamp(1.2 * seen.accepted / (1.0 + 0.25 * spread * spread), 0.0, 1.0);
+  constexpr double kDoubtful = 0.4;
+  return std::clamp(1.2 * seen.accepted / (1.0 + 0.25 * spread * spread), 0.0,
+                    seen.attitude_doubtful ? kDoubtful : 1.0);
 }
 
 void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {

@@ -7,6 +7,7 @@
 #include <future>
 #include <utility>
 
+#include "attitude_sequence.hpp"
 #include "body_search.hpp"
 #include "recording.hpp"
 #include "seed_trial.hpp"
@@ -64,6 +65,12 @@ class Tracking {
     explained_.resize(recording_.held().size());
     for (int object = 0; object < objects_; ++object)
       if (!follow_next_body(object)) break;
+    if (paths_.empty() && background_.restless() > kCameraMoves)
+      throw InputError(
+          fmt::format("{}: no moving body found: the camera moves ({:.0f} % of the picture changes "
+                      "all the time); put it on a stand, or track a part where it is still with "
+                      "--from and --to",
+                      video_.string(), 100.0 * background_.restless()));
     if (paths_.empty())
       throw InputError(
           fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
@@ -74,6 +81,9 @@ class Tracking {
   }
 
  private:
+  /// Share of the picture that changes most of the time, beyond which it is the camera.
+  static constexpr double kCameraMoves = 0.15;
+
   static SourceOptions source_options(const data::Scene& scene, const TrackOptions& options) {
     SourceOptions source;
     source.chroma = true;
@@ -155,7 +165,7 @@ class Tracking {
         path.frames[held[i].index] = {held[i].t_s, trimmed(std::move(*seen))};
     backward.get();
     path.frames.merge(before);
-    if (seed->seen.pose) mend(path, *seed, follower);
+    if (seed->seen.pose) decide(path, held, *follower);
     explain(path);
     const bool pointed_at = object == 0 && scene_.tracking.at_px;
     if (!pointed_at && !moves(path)) return attempts > 0 && follow_next_body(object, attempts - 1);
@@ -164,16 +174,27 @@ class Tracking {
     return true;
   }
 
-  void mend(BodyPath& path, const Seed& seed, std::unique_ptr<Follower>& ahead) const {
-    const auto& held = recording_.held();
-    HeldPath seen;
-    for (std::size_t i = 0; i < held.size(); ++i)
-      if (const auto at = path.frames.find(held[i].index); at != path.frames.end())
-        seen[i] = std::move(at->second.seen);
-    mend_mirrored(held, background_, *finder_, seed.held_index, seen, ahead);
-    path.frames.clear();
-    for (auto& [i, sighting] : seen)
-      path.frames[held[i].index] = {held[i].t_s, trimmed(std::move(sighting))};
+  /// What consecutive frames say together: attitudes, and frames their neighbours can help.
+  void decide(BodyPath& path, const std::vector<Frame>& frames, Follower& ahead) const {
+    std::vector<Glimpse> glimpses;
+    for (const Frame& frame : frames) {
+      glimpses.push_back({&frame, {}});
+      if (const auto at = path.frames.find(frame.index); at != path.frames.end())
+        glimpses.back().seen = std::move(at->second.seen);
+    }
+    decide_attitudes(background_, *finder_, glimpses);
+    mend_from_neighbours(background_, *finder_, glimpses);
+    for (Glimpse& g : glimpses) {
+      path.frames.erase(g.frame->index);
+      if (g.seen) path.frames[g.frame->index] = {g.frame->t_s, trimmed(std::move(*g.seen))};
+    }
+    // Enough for the forecast to learn how the body moves.
+    constexpr int kLast = 6;
+    std::vector<std::pair<double, Sighting>> last;
+    auto at = path.frames.end();
+    for (int k = 0; k < kLast && at != path.frames.begin(); ++k) --at;
+    for (; at != path.frames.end(); ++at) last.emplace_back(at->second.t_s, at->second.seen);
+    ahead.resume(last);
   }
 
   [[nodiscard]] std::shared_ptr<const SpinProfile> marks_of(const Frame& frame,
@@ -197,10 +218,12 @@ class Tracking {
 
   /// Streams what follows the held frames past all followers.
   void follow_the_rest() {
-    const auto& held = recording_.held();
-    frames_ = static_cast<std::int64_t>(held.size());
-    for (const Frame& frame : held) damaged_ += frame.damaged ? 1 : 0;
+    frames_ = static_cast<std::int64_t>(recording_.held().size());
+    for (const Frame& frame : recording_.held()) damaged_ += frame.damaged ? 1 : 0;
+    recording_.release();
     report_progress();
+    std::vector<Frame> window;
+    std::size_t bytes = 0;
     while (auto frame = recording_.next()) {
       Follower::Others others;
       for (std::size_t k = 0; k < followers_.size(); ++k) {
@@ -212,8 +235,24 @@ class Tracking {
       ++frames_;
       damaged_ += frame->damaged ? 1 : 0;
       if (frames_ % 16 == 0) report_progress();
+      bytes += frame->luma.total() + 2 * frame->chroma.total();
+      window.push_back(std::move(*frame));
+      if (bytes < Recording::kHeldBytes / 2) continue;
+      settle(window);
+      bytes = bytes / window.size() * kOverlap;
+      window.erase(window.begin(), window.end() - kOverlap);
     }
+    settle(window);
     report_progress();
+  }
+
+  /// The last frames of a window open the next.
+  static constexpr std::ptrdiff_t kOverlap = 12;
+  void settle(const std::vector<Frame>& window) {
+    if (window.size() <= kOverlap) return;
+    for (std::size_t k = 0; k < followers_.size(); ++k)
+      if (!paths_[k].frames.empty() && paths_[k].frames.begin()->second.seen.pose)
+        decide(paths_[k], window, *followers_[k]);
   }
 
   void report_progress() const {
