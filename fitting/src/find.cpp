@@ -69,7 +69,8 @@ Found search_path(const Problem& problem, const Quest& quest) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   for (const model::Predictor* relative : quest.relatives) {
     Problem easier = for_predictor(problem, *relative);
-    const Found rough = search(easier, quest.starter);
+    const bool rolls = relative->model_name() == "rolling";
+    const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
     if (!rough.solution.usable || rough.unexplained > kRoughly) continue;
     easier.set_base(rough.solution.u);
     const Start start = start_from(easier, rough.path);
@@ -81,6 +82,16 @@ Found search_path(const Problem& problem, const Quest& quest) {
   }
   Found found = search(problem, quest.starter);
   return better(found, best) ? found : best;
+}
+
+// Without angles a sliding body's neighbouring valleys explain its path nearly as well.
+Found look_about(const Problem& problem, Found found) {
+  constexpr int kMisses = 3;
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const bool slides = problem.predictor->model_name() == "sliding";
+  const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
+  if (seen || !rim || (found.passed && !slides)) return found;
+  return hop(problem, std::move(found), kMisses);
 }
 
 Found find_arc(const Problem& problem, const Quest& quest) {
@@ -106,7 +117,7 @@ Found find_arc(const Problem& problem, const Quest& quest) {
     throw InputError(
         fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
                     options.strategy));
-  Found best = search_path(problem, quest);
+  Found best = look_about(problem, search_path(problem, quest));
   if (best.passed || !quest.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
   return from_given.solution.usable &&

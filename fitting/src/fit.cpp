@@ -34,9 +34,10 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
   for (int round = 0; round < 6; ++round) {
     const double change = reweight(problem, solution.u, true);
     if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
-    const Solution next = solve(problem, solution.u, {.function_tolerance = 1e-7});
+    Solution next = solve(problem, solution.u, {.iterations = 20, .function_tolerance = 1e-7});
     if (!next.usable) break;
-    solution = next;
+    next.converged = next.converged || solution.converged;
+    solution = std::move(next);
   }
   return solution;
 }
@@ -47,9 +48,11 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
   double error = integration_error_sigma(problem, solution.u);
   while (fixed_tolerance <= 0.0 && error > kSilent && problem.tolerance > kFinest) {
     problem.tolerance *= 1e-2;
-    const Solution finer = solve(problem, solution.u);
+    // From a minimum of a slightly other cost; more than a few steps only follow its noise.
+    Solution finer = solve(problem, solution.u, {.iterations = 12, .function_tolerance = 1e-7});
     if (!finer.usable) break;
-    solution = finer;
+    finer.converged = finer.converged || solution.converged;
+    solution = std::move(finer);
     error = integration_error_sigma(problem, solution.u);
   }
   return error;

@@ -212,7 +212,8 @@ double excess_scatter(const ArcData& arc, Channel channel) {
   Eigen::MatrixXd curve =
       Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
   if (planar) curve = arc.positions_m();
-  return std::max(1.0, noise_about_smooth_curve(t_s, curve) / median(std::move(sigmas)));
+  const double noise = std::min(noise_about_smooth_curve(t_s, curve), white_noise(t_s, curve));
+  return std::max(1.0, noise / median(std::move(sigmas)));
 }
 
 void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,

@@ -259,7 +259,7 @@ void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen
 }
 
 bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
-              Eigen::MatrixXd* jacobian) {
+              Eigen::MatrixXd* jacobian, bool held_too) {
   const ArcData& data = problem.arcs[arc];
   Eigen::VectorXd values = problem.values(arc, u);
   if (!values.allFinite()) return false;
@@ -273,12 +273,20 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   request.tolerance = problem.tolerance;
   request.max_steps = problem.max_steps();
   if (jacobian != nullptr)
-    for (const int i : columns) request.derivatives.push_back(problem.free[i].index);
+    for (const int i : columns)
+      if (held_too || !problem.free[i].held) request.derivatives.push_back(problem.free[i].index);
   model::Prediction prediction;
   try {
     prediction = problem.predictor->predict(values, request);
   } catch (const Error&) {  // outside the model's range: a rejected step
     return false;
+  }
+  if (jacobian != nullptr && request.derivatives.size() < columns.size()) {
+    Eigen::MatrixXd all =
+        Eigen::MatrixXd::Zero(prediction.values.size(), static_cast<int>(columns.size()));
+    for (int c = 0, from = 0; c < static_cast<int>(columns.size()); ++c)
+      if (!problem.free[columns[c]].held) all.col(c) = prediction.jacobian.col(from++);
+    prediction.jacobian = std::move(all);
   }
   whiten(data, prediction.values, prediction.jacobian, residuals, jacobian);
   if (!residuals.allFinite()) return false;

@@ -74,8 +74,10 @@ struct Problem {
 
 /// Whitened, weighted residuals of one arc and their derivatives by u (columns_of order).
 /// Returns false if the model has no prediction there (never leaves NaN behind).
+/// @param held_too  false: derivatives by held parameters are not computed but zero.
 [[nodiscard]] bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u,
-                            Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian);
+                            Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian,
+                            bool held_too = true);
 
 /// Angle coordinates outside [0, pi] name the same attitude as folded ones: brings theta back and
 /// turns phi, psi and the rates accordingly. `sign` receives the derivative of each folded value.

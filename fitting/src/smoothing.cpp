@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace trochoid::fitting {
 namespace {
@@ -104,6 +105,36 @@ SmoothCurve smooth_auto(std::span<const double> t_s, const Eigen::MatrixXd& samp
     best = half_width;
   }
   return smooth(t_s, samples, best);
+}
+
+namespace {
+
+// Weights of the divided difference of t_s[first .. first + order], of unit length.
+Eigen::VectorXd difference_weights(std::span<const double> t_s, int first, int order) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(order + 1);
+  const double unit = (t_s[first + order] - t_s[first]) / order;
+  for (int i = 0; i <= order; ++i)
+    for (int k = 0; k <= order; ++k)
+      if (k != i) weights[i] *= unit / (t_s[first + i] - t_s[first + k]);
+  return weights.normalized();
+}
+
+}  // namespace
+
+double white_noise(std::span<const double> t_s, const Eigen::MatrixXd& samples) {
+  const int n = static_cast<int>(t_s.size());
+  double least = std::numeric_limits<double>::infinity();
+  if (n < 20) return least;
+  for (const int order : {6, 8}) {
+    std::vector<double> differences;
+    for (int first = 0; first + order < n; ++first) {
+      const Eigen::VectorXd weights = difference_weights(t_s, first, order);
+      for (Eigen::Index c = 0; c < samples.cols(); ++c)
+        differences.push_back(weights.dot(samples.col(c).segment(first, order + 1)));
+    }
+    least = std::min(least, robust_sigma(std::move(differences)));
+  }
+  return least;
 }
 
 }  // namespace trochoid::fitting

@@ -25,6 +25,12 @@ struct SmoothCurve {
 [[nodiscard]] double noise_about_smooth_curve(std::span<const double> t_s,
                                               const Eigen::MatrixXd& samples);
 
+/// Standard deviation of one coordinate's white noise, from divided differences of order 6 and 8,
+/// the smaller: fast motion (eight samples to a turn) adds nothing to them, noise that hangs
+/// together over several samples little. Robust to a few outliers; infinite for fewer than 20
+/// samples.
+[[nodiscard]] double white_noise(std::span<const double> t_s, const Eigen::MatrixXd& samples);
+
 /// Median; 0 for an empty list.
 [[nodiscard]] double median(std::vector<double> values);
 

@@ -27,7 +27,7 @@ class ArcCost : public ceres::CostFunction {
       u[columns_[c]] = c < shared_ ? blocks[0][c] : blocks[shared_ > 0 ? 1 : 0][c - shared_];
     Eigen::VectorXd r;
     Eigen::MatrixXd j;
-    if (!evaluate(problem_, arc_, u, r, jacobians != nullptr ? &j : nullptr)) return false;
+    if (!evaluate(problem_, arc_, u, r, jacobians != nullptr ? &j : nullptr, false)) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, r.size()) = r;
     if (jacobians == nullptr) return true;
     write(j.leftCols(shared_), shared_ > 0 ? jacobians[0] : nullptr);

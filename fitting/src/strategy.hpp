@@ -32,16 +32,30 @@ void apply(const Start& start, Problem& problem);
 /// Chi-square of knowing nothing: positions about their mean, turning angles anywhere in a turn.
 [[nodiscard]] double null_chi2(const ArcData& arc);
 
+/// A single-arc problem on its first `samples` samples, thinned to a few hundred; losses, which a
+/// short window hardly shows, are kept near their given values.
+[[nodiscard]] Problem windowed(const Problem& problem, int samples);
+
 /// Levenberg-Marquardt on a thinned window, then on windows half as long again each, then on
 /// all samples.
 /// @param first_window samples of the first window.
-[[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window);
+/// @param growth       of a window over the one before.
+[[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window,
+                         double growth = 1.5);
+
+/// Where a cost has ripples, as events that come and go with the parameters make them: steps off
+/// the best known point, as far as the misfit lets the linearised problem, and downhill again,
+/// until one passes the gate or `tries` are used up. Reproducible.
+[[nodiscard]] Found hop(const Problem& problem, Found best, int tries);
 
 /// The search for a single arc without a guess: windows of 1, 1/2, 1/4, ... of the arc, starts from
 /// each that already say something about it, grown; stops at the first solution that passes the
 /// gate, or after the window in which the path got explained but for a per cent (a track's sigmas
-/// may be too small, or the model not the whole truth); else returns the best one.
-[[nodiscard]] Found search(const Problem& problem, const Starter& starter);
+/// may be too small, or the model not the whole truth). Where nothing passes, more starts are taken
+/// downhill on short windows, which then grow more slowly. Returns the best one.
+enum class Effort { brief, full };
+[[nodiscard]] Found search(const Problem& problem, const Starter& starter,
+                           Effort effort = Effort::full);
 
 /// The best start of the whole arc, taken to its minimum and no further: what search() improves on.
 [[nodiscard]] Found from_best_start(const Problem& problem, const Starter& starter);
@@ -55,6 +69,10 @@ void start_spin(Problem& problem, int arc);
 /// which at their present value no longer change a residual, at a millionth of the given value;
 /// likewise a friction at its limit. Writes u into `base`. Returns whether anything new is held.
 bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
+
+/// Levenberg-Marquardt from problem.base to the minimum of a single-arc problem. Losses that vanish
+/// on the way are held, and let go again where a score test finds them missed.
+[[nodiscard]] Solution solve_to_the_end(Problem& problem);
 
 /// What a solution of a single-arc problem is worth.
 [[nodiscard]] Found judged(const Problem& problem, Solution solution, const std::string& path);

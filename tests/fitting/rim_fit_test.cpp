@@ -51,14 +51,14 @@ std::map<std::string, std::vector<double>> columns_of(const std::string& path) {
 }
 
 // `until_s` keeps the test short; the start and the losses the scene knows are not the truth.
-Case noisy(const std::string& name, double until_s, double sigma_m) {
+Case noisy(const std::string& name, double until_s, double sigma_m, std::size_t step = 1) {
   const std::string folder = reference_folder();
   Case made{data::read_reference_case(folder + name + ".json").scene, {}};
   made.scene.start = {};
   const auto columns = columns_of(folder + name + ".csv");
   std::mt19937_64 generator(7);
   std::normal_distribution<double> normal(0.0, sigma_m);
-  for (std::size_t i = 0; i < columns.at("t").size() && columns.at("t")[i] <= until_s; ++i) {
+  for (std::size_t i = 0; i < columns.at("t").size() && columns.at("t")[i] <= until_s; i += step) {
     data::TrackSample sample;
     sample.t_s = columns.at("t")[i];
     sample.centre_m = {columns.at("x")[i] + normal(generator),
@@ -108,6 +108,31 @@ TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(pull(fit, "friction", 0.3), kFar);
   EXPECT_LT(fit.find("friction")->sigma, 0.02);
+}
+
+// Two turns of the node line in a dozen samples: starts have to be found on windows shorter than
+// what the quick search looks at.
+TEST_F(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
+  Case c = noisy("s09_ring_retrograde_drag", 9.0, 1e-4, 2);
+  c.scene.model.air_linear_N_m_s = Eigen::Vector3d(7.5e-6, 7.5e-6, 4.5e-5);
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "air_linear_N_m_s[1]", 2.5e-6), kFar);
+  EXPECT_LT(pull(fit, "air_linear_N_m_s[3]", 1.5e-5), kFar);
+}
+
+// With friction that sets in and stops, neighbouring valleys leave several times the noise.
+TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
+  Case c = noisy("s08_slide_disc", 2.0, 1e-4, 4);
+  c.scene.model.friction = 0.2;  // 0.3 in truth; the losses are three times theirs
+  c.scene.model.air_linear_N_m_s = Eigen::Vector3d(3e-6, 3e-6, 6e-7);
+  c.scene.model.rolling_friction_m = 1.5e-4;
+  c.scene.model.pivoting_friction_m = 9e-4;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(fit.chi2 / fit.dof, 1.4);
+  EXPECT_LT(pull(fit, "friction", 0.3), kFar);
+  EXPECT_LT(pull(fit, "pivoting_friction_m", 3e-4), kFar);
 }
 
 TEST_F(RimFit, BoundsALossThatIsNotThere) {

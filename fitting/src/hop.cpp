@@ -1,0 +1,69 @@
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "strategy.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// How far a parameter may be thrown in u where the data say nothing.
+double leap(const Problem& problem, const FreeParameter& parameter, double u) {
+  if (parameter.transform.is_over_decades()) return 0.5;
+  const std::string& unit = problem.predictor->parameters()[parameter.index].unit;
+  return (unit == "rad" ? 0.2 : 0.0) + 0.1 * std::abs(u);
+}
+
+// A factor L of the covariance L L^T of the linearised problem at u, for residuals of the size they
+// have; empty where there is no prediction.
+Eigen::MatrixXd reach(const Problem& problem, const Eigen::VectorXd& u, double reduced_chi2) {
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd jacobian;
+  if (!evaluate(problem, 0, u, residuals, &jacobian, false)) return {};
+  Eigen::MatrixXd information = jacobian.transpose() * jacobian / std::max(1.0, reduced_chi2);
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    const double far = leap(problem, problem.free[i], u[i]) + 1e-9;
+    information(i, i) += 1.0 / (far * far);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(information);
+  if (cholesky.info() != Eigen::Success) return {};
+  return cholesky.matrixU().solve(Eigen::MatrixXd::Identity(u.size(), u.size()));
+}
+
+}  // namespace
+
+Found hop(const Problem& problem, Found best, int misses) {
+  if (!best.solution.usable) return best;
+  constexpr double kSteps[] = {0.5, 1.0, 2.0, 4.0, 10.0};
+  constexpr int kLooks = 40, kMostRounds = 12;  // values are far cheaper than derivatives
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
+  for (int round = 0, missed = 0; round < kMostRounds && missed < misses && L.size() > 0; ++round) {
+    double least = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd from;
+    for (int look = 0; look < kLooks; ++look) {
+      Eigen::VectorXd z(L.cols()), residuals;
+      for (double& entry : z) entry = normal(generator);
+      Eigen::VectorXd u = best.solution.u + kSteps[look % 5] * (L * z);
+      for (Eigen::Index k = 0; k < u.size(); ++k)
+        if (problem.free[k].held) u[k] = best.solution.u[k];
+      if (!evaluate(problem, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
+        continue;
+      least = residuals.squaredNorm();
+      from = u;
+    }
+    if (from.size() == 0) break;
+    Found found = judged(problem, solve(problem, from, {.iterations = 20}), best.path);
+    // Less than a tenth of chi-square is the same valley.
+    const double gain = best.solution.chi2 - found.solution.chi2;
+    missed = found.solution.usable && gain > 0.1 ? 0 : missed + 1;
+    if (!better(found, best)) continue;
+    best = std::move(found);
+    L = reach(problem, best.solution.u, best.reduced_chi2);
+  }
+  return best;
+}
+
+}  // namespace trochoid::fitting

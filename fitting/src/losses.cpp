@@ -1,0 +1,126 @@
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "strategy.hpp"
+
+// Losses are fitted by their logarithm, where nothing pulls one that has vanished back.
+namespace trochoid::fitting {
+
+bool hold_vanished(Problem& problem, const Eigen::VectorXd& u) {
+  constexpr double kUnseen = 0.05;  // change of all residuals together, in sigma, if it doubled
+  problem.set_base(u);
+  const int count = static_cast<int>(problem.free.size());
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd residuals;
+    Eigen::MatrixXd jacobian;
+    if (!evaluate(problem, arc, problem.start(), residuals, &jacobian)) return false;
+    const std::vector<int> columns = problem.columns_of(arc);
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      squares[columns[c]] += jacobian.col(static_cast<int>(c)).squaredNorm();
+  }
+  bool any = false;
+  for (int i = 0; i < count; ++i) {
+    FreeParameter& parameter = problem.free[i];
+    if (!parameter.transform.is_over_decades() || parameter.held) continue;
+    const double value = problem.base[std::max(0, parameter.arc)][parameter.index];
+    const bool vanished = value < 1e-2 * parameter.given && std::sqrt(squares[i]) < kUnseen;
+    const bool at_limit = parameter.transform.kind == Transform::Kind::limited &&
+                          value > 0.99 * parameter.transform.upper;
+    if (!vanished && !at_limit) continue;
+    parameter.held = any = true;
+    for (Eigen::VectorXd& base : problem.base)
+      base[parameter.index] = at_limit ? 0.99 * parameter.transform.upper : 1e-6 * parameter.given;
+  }
+  return any;
+}
+
+namespace {
+
+// To the minimum; what vanishes on the way is held, else it would take all the iterations.
+Solution descend(Problem& problem) {
+  const bool losses = std::any_of(problem.free.begin(), problem.free.end(),
+                                  [&](const FreeParameter& p) { return is_loss(problem, p); });
+  if (!losses) return solve(problem, problem.start());
+  // Far below one sigma of anything, also where residuals are larger than the noise.
+  const auto nothing = [](double chi2) { return std::max(0.1, 1e-4 * chi2); };
+  double before = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 6; ++round) {
+    const Solution solution = solve(problem, problem.start(), {.iterations = 15});
+    const bool stands_still = before - solution.chi2 < nothing(solution.chi2);
+    if (!solution.usable || solution.converged || stands_still) return solution;
+    before = solution.chi2;
+    hold_vanished(problem, solution.u);
+  }
+  return solve(problem, problem.start());
+}
+
+// A vanished loss and what a little of it would do.
+struct Probe {
+  int free = 0;
+  double value = 0.0;  ///< at which chi-square, linearised, is least
+  double gain = 0.0;   ///< of chi-square
+};
+
+// Score test: residuals and derivatives with a little of the vanished losses; each is then varied
+// together with all that is not held. The most rewarding one, gain 0 if there is none.
+Probe most_missed(Problem probed, const std::vector<int>& vanished) {
+  constexpr double kLittle = 0.02;  // of the given value
+  for (const int i : vanished)
+    for (Eigen::VectorXd& base : probed.base)
+      base[probed.free[i].index] = kLittle * probed.free[i].given;
+  Eigen::VectorXd r;
+  Eigen::MatrixXd j;
+  Probe best;
+  if (!evaluate(probed, 0, probed.start(), r, &j)) return best;
+  std::vector<int> others;
+  for (int i = 0; i < static_cast<int>(probed.free.size()); ++i)
+    if (!probed.free[i].held && std::find(vanished.begin(), vanished.end(), i) == vanished.end())
+      others.push_back(i);
+  const Eigen::MatrixXd active = j(Eigen::all, others);
+  const auto qr = active.colPivHouseholderQr();
+  for (const int i : vanished) {
+    // The derivative by the logarithm is what the probe itself did.
+    const Eigen::VectorXd alone = j.col(i) - active * qr.solve(j.col(i));
+    const double size2 = alone.squaredNorm();
+    const double times = size2 > 0.0 ? -r.dot(alone) / size2 : 0.0;
+    const double gain = times * times * size2;
+    const double value = kLittle * probed.free[i].given * (1.0 + times);
+    if (times > 0.0 && gain > best.gain) best = {i, value, gain};
+  }
+  return best;
+}
+
+}  // namespace
+
+Solution solve_to_the_end(Problem& problem) {
+  constexpr double kWorth = 2.0;  // of chi-square
+  Solution best = descend(problem);
+  const int rounds = static_cast<int>(problem.free.size());
+  for (int round = 0; round < rounds && best.usable; ++round) {
+    problem.set_base(best.u);
+    std::vector<int> vanished;
+    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+      const FreeParameter& parameter = problem.free[i];
+      if (parameter.transform.is_over_decades() && is_loss(problem, parameter) &&
+          problem.base[0][parameter.index] < 1e-2 * parameter.given)
+        vanished.push_back(i);
+    }
+    const Probe probe = vanished.empty() ? Probe{} : most_missed(problem, vanished);
+    if (probe.gain < kWorth) break;
+    Problem trial = problem;
+    const FreeParameter& missed = trial.free[probe.free];
+    trial.free[probe.free].held = false;
+    for (Eigen::VectorXd& base : trial.base)
+      base[missed.index] = std::min(probe.value, 10.0 * missed.given);
+    Solution again = descend(trial);
+    if (!again.usable || again.chi2 > best.chi2 - 0.1) break;
+    best = std::move(again);
+    problem = std::move(trial);
+  }
+  return best;
+}
+
+}  // namespace trochoid::fitting

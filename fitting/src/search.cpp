@@ -1,0 +1,152 @@
+#include <algorithm>
+#include <limits>
+
+#include "strategy.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+constexpr int kShortestWindow = 24, kFewestSamples = 16;
+
+double chi2_at(const Problem& problem) {
+  Eigen::VectorXd residuals;
+  if (!evaluate(problem, 0, problem.start(), residuals, nullptr))
+    return std::numeric_limits<double>::infinity();
+  return residuals.squaredNorm();
+}
+
+// Starts of one window in the order of their chi-square there; those without a prediction drop out,
+// and so do those that are no better than knowing nothing although the angles were seen: the window
+// is too long for a start from its first samples.
+std::vector<Start> screened(const Problem& window, const Starter& starter) {
+  constexpr double kTellsSomething = 0.3;
+  const bool seen = window.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const double most =
+      seen ? kTellsSomething * null_chi2(window.arcs[0]) : std::numeric_limits<double>::max();
+  std::vector<std::pair<double, Start>> scored;
+  for (Start& start : starter(window.arcs[0])) {
+    Problem trial = window;
+    apply(start, trial);
+    const double chi2 = chi2_at(trial);
+    if (chi2 < most) scored.emplace_back(chi2, std::move(start));
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Start> starts;
+  for (auto& [chi2, start] : scored) starts.push_back(std::move(start));
+  return starts;
+}
+
+// Where starts come from integrals over the window, long windows serve best; where they are the
+// state at its first sample (bodies on their rim), it has to be grown from a short one.
+std::vector<int> window_sizes(const Problem& problem) {
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  std::vector<int> sizes;
+  for (int window = all; window >= std::min(kShortestWindow, all); window /= 2)
+    sizes.push_back(window);
+  if (problem.predictor->index_of("w1_rad_s") >= 0) std::reverse(sizes.begin(), sizes.end());
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  // Unseen, a state at the first sample hardly ever leads straight to the last one.
+  if (problem.predictor->index_of("w1_rad_s") >= 0 && !seen && sizes.size() > 1) sizes.pop_back();
+  return sizes;
+}
+
+}  // namespace
+
+namespace {
+
+// A few quick tries: most tracks need no more.
+Found search_briefly(const Problem& problem, const Starter& starter) {
+  // Where the angles were seen, starts differ little and a good one is known by its result.
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const std::size_t tried = seen ? 2 : 5;
+  // From positions alone a neighbouring valley can pass the gate as well: above half a standard
+  // deviation of the chi-square distribution the other starts of the window get their turn.
+  const double sure = 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
+  Found best;
+  for (const int window : window_sizes(problem)) {
+    const std::vector<Start> starts = screened(windowed(problem, window), starter);
+    for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
+      Found found = grow(problem, starts[i], window);
+      if (better(found, best)) best = std::move(found);
+      if (best.passed && (seen || best.reduced_chi2 < sure)) return best;
+      if (seen && best.unexplained < kExplained) return best;
+    }
+    if (best.unexplained < kExplained) return best;
+  }
+  return best;
+}
+
+Start start_at(const Problem& problem, const Eigen::VectorXd& u, const std::string& path) {
+  Problem at = problem;
+  at.set_base(u);
+  Start start{path, {}};
+  for (const FreeParameter& parameter : at.free)
+    start.values[problem.predictor->parameters()[parameter.index].name] =
+        at.base[0][parameter.index];
+  return start;
+}
+
+// Many starts, each taken downhill on the window with the losses held; best first, and of those
+// that end in the same valley one.
+std::vector<Start> settled(const Problem& window, const Starter& starter) {
+  constexpr std::size_t kSettled = 40;
+  constexpr double kSameValley = 1e-2;  // of chi-square
+  Problem plain = window;
+  for (FreeParameter& parameter : plain.free) parameter.held |= is_loss(plain, parameter);
+  std::vector<std::pair<double, Start>> ends;
+  const std::vector<Start> starts = screened(window, starter);
+  for (std::size_t i = 0; i < std::min(kSettled, starts.size()); ++i) {
+    Problem trial = plain;
+    apply(starts[i], trial);
+    const Solution end =
+        solve(trial, trial.start(), {.iterations = 20, .function_tolerance = 1e-4});
+    if (end.usable) ends.emplace_back(end.chi2, start_at(trial, end.u, starts[i].path));
+  }
+  std::stable_sort(ends.begin(), ends.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Start> best;
+  double last = -1.0;
+  for (auto& [chi2, start] : ends) {
+    if (chi2 > last * (1.0 + kSameValley)) best.push_back(std::move(start));
+    last = chi2;
+  }
+  return best;
+}
+
+Found search_widely(const Problem& problem, const Starter& starter, Found best) {
+  constexpr std::size_t kGrown = 6;
+  constexpr double kSlowly = 1.2;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  for (int window = std::min(kFewestSamples, all); window <= all; window *= 2) {
+    const std::vector<Start> starts = settled(windowed(problem, window), starter);
+    for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
+      Found found = grow(problem, starts[i], window, kSlowly);
+      if (better(found, best)) best = std::move(found);
+      if (best.passed || best.unexplained < kExplained) return best;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+Found search(const Problem& problem, const Starter& starter, Effort effort) {
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
+  const bool slides = problem.predictor->model_name() == "sliding";
+  Found best;
+  // A sliding body's derivatives are dear, and few of its starts lead anywhere.
+  const bool brief = seen || !slides || effort == Effort::brief;
+  if (brief) best = search_briefly(problem, starter);
+  if (best.passed || !rim || effort == Effort::brief || best.unexplained < kExplained) return best;
+  return search_widely(problem, starter, std::move(best));
+}
+
+Found from_best_start(const Problem& problem, const Starter& starter) {
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const std::vector<Start> starts = screened(windowed(problem, all), starter);
+  return starts.empty() ? Found{} : grow(problem, starts.front(), all);
+}
+
+}  // namespace trochoid::fitting
