@@ -11,7 +11,8 @@ struct ProfileEdge {
   double contrast = 0.0;              ///< outer minus inner level at the edge
   double mean_level = 0.0;            ///< of both levels at the edge
   double inner_slope = 0.0, outer_slope = 0.0;  ///< of the levels at the edge [1/px]
-  double gain = 0.0;                            ///< log-likelihood over "no edge here"
+  double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
+  double gain = 0.0;      ///< log-likelihood over "no edge here"
 };
 
 /// Fits one level on either side (outside a multiple of the background plate, if `plate`) and the

@@ -13,13 +13,13 @@ namespace {
 constexpr double kLeastNoise2 = 0.05;  // [8-bit levels squared]
 
 // Unknowns of the linear model: inner level, outer level and offset; slope inside and outside, bend
-// inside and outside; blur.
-constexpr int kOwn = 3, kShading = 4, kAll = kOwn + kShading + 1;
-using Vector4 = Eigen::Vector4d;
-using Matrix4 = Eigen::Matrix4d;
+// inside and outside, by how much a strip at the edge differs from the rest of the body; blur.
+constexpr int kOwn = 3, kShading = 5, kAll = kOwn + kShading + 1;
+using Shading = Eigen::Matrix<double, kShading, 1>;
+using ShadingMatrix = Eigen::Matrix<double, kShading, kShading>;
 
 struct Columns {
-  std::array<float, Profile::kMost> share, density, ground;
+  std::array<float, Profile::kMost> share, density, ground, strip;
 };
 
 struct Noise {
@@ -33,8 +33,8 @@ struct Working {
   std::array<std::array<float, kAll>, kAll> normal{};
   std::array<float, kAll> right{};
   float square = 0.0f;
-  Vector4 shading = Vector4::Zero();  // slopes and bends
-  Matrix4 shading_covariance = Matrix4::Zero();
+  Shading shading = Shading::Zero();
+  ShadingMatrix shading_covariance = ShadingMatrix::Zero();
   double blur_step = 0.0, blur_information = 0.0;
   Noise noise;
 };
@@ -42,6 +42,7 @@ struct Working {
 void columns_of(const StretchProfile& p, Columns& c) {
   const NormalTable& table = NormalTable::instance();
   const float inverse = 1.0f / static_cast<float>(p.blur_px);
+  const auto strip = static_cast<float>(p.strip_px);
   float mean = 0.0f;
   for (int j = 0; j < p.profile.count; ++j) mean += p.profile.background[static_cast<size_t>(j)];
   // Of mean one, so that levels and slopes compare with those of neighbours without a plate.
@@ -51,6 +52,9 @@ void columns_of(const StretchProfile& p, Columns& c) {
     const auto step = table.at(p.profile.s_px(j) * inverse);
     c.share[k] = step.share;
     c.density[k] = step.density * inverse;
+    c.strip[k] = p.strip_px > 0.0
+                     ? table.at((p.profile.s_px(j) + strip) * inverse).share - step.share
+                     : 0.0f;
     c.ground[k] = p.plate ? scale * p.profile.background[k] : 1.0f;
   }
 }
@@ -77,8 +81,8 @@ void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
     const float s = p.profile.s_px(j), ground = c.ground[k];
     const float a = 1.0f - c.share[k], b = c.share[k] * ground;
     const float d = (w.inner - w.outer * ground) * c.density[k];
-    const std::array<float, kAll> row{a,     b,         d,         s * a,
-                                      s * b, s * s * a, s * s * b, d * s * inverse_blur};
+    const std::array<float, kAll> row{
+        a, b, d, s * a, s * b, s * s * a, s * s * b, c.strip[k], d * s * inverse_blur};
     const float rest = p.profile.light[k] - w.inner * a - w.outer * b;
     for (size_t m = 0; m < kAll; ++m) {
       for (size_t n = 0; n <= m; ++n) w.normal[m][n] += row[m] * row[n];
@@ -89,11 +93,11 @@ void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
 }
 
 // Largest slopes [per px] and bends [per px^2] of the light, as shares of it.
-Vector4 largest_shading(const Working& w) {
-  constexpr double kSlope = 0.06, kBend = 0.02;
+Shading largest_shading(const Working& w) {
+  constexpr double kSlope = 0.06, kBend = 0.02, kStrip = 0.3;
   const double brightest = std::max(
       {2.0, std::abs(static_cast<double>(w.inner)), std::abs(static_cast<double>(w.outer))});
-  return {kSlope * brightest, kSlope * brightest, kBend * brightest, kBend * brightest};
+  return brightest * (Shading() << kSlope, kSlope, kBend, kBend, kStrip).finished();
 }
 
 // Slopes and bends with levels and offset free, then the blur with all of them free.
@@ -117,8 +121,8 @@ void find_shading(const StretchProfile& p, Working& w) {
     }
   };
   for (size_t k = 0; k < kOwn; ++k) eliminate(k);
-  Matrix4 normal;
-  Vector4 right, cross;
+  ShadingMatrix normal;
+  Shading right, cross;
   for (size_t i = 0; i < kShading; ++i) {
     for (size_t j = 0; j <= i; ++j)
       normal(static_cast<int>(i), static_cast<int>(j)) =
@@ -127,7 +131,7 @@ void find_shading(const StretchProfile& p, Working& w) {
     cross[static_cast<int>(i)] = m[kAll - 1][kOwn + i];
   }
   const double blur = m[kAll - 1][kAll - 1], blur_right = r[kAll - 1];
-  const Vector4 prior = largest_shading(w).cwiseAbs2().cwiseInverse();
+  const Shading prior = largest_shading(w).cwiseAbs2().cwiseInverse();
   for (size_t k = kOwn; k < kOwn + kShading; ++k) {
     m[k][k] += prior[static_cast<int>(k) - kOwn];
     eliminate(k);
@@ -136,8 +140,8 @@ void find_shading(const StretchProfile& p, Working& w) {
   const double noise2 = kSamplesPerIndependent *
                         (kLeastNoise2 + std::max(0.0, square) / kSamplesPerIndependent / freedom);
   normal.diagonal() += noise2 * prior;
-  const Eigen::LLT<Matrix4> factor(normal);
-  const Matrix4 inverse = factor.solve(Matrix4::Identity());
+  const Eigen::LLT<ShadingMatrix> factor(normal);
+  const ShadingMatrix inverse = factor.solve(ShadingMatrix::Identity());
   w.shading = inverse * right;
   w.shading_covariance = noise2 * inverse;
   const double own = blur - cross.dot(inverse * cross);
@@ -179,7 +183,7 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   }
   m(2, 2) += 1.0;
   const Eigen::Vector3f own = m.ldlt().solve(r).cast<float>();
-  const Eigen::Vector4f v = w.shading.cast<float>();
+  const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float inner = w.inner + own[0], outer = w.outer + own[1];
   constexpr auto kShare = static_cast<float>(1.0 / kSamplesPerIndependent);
   float inner_square = 0, outer_square = 0, inner_count = 0, outer_count = 0;
@@ -187,7 +191,7 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px(j), a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
     const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
-                       shaded(outer, v[1], v[3], s) * b -
+                       shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] -
                        own[2] * (w.inner - w.outer * c.ground[k]) * c.density[k];
     const float square = kShare * rest * rest;
     inner_square += a * square, outer_square += c.share[k] * square;
@@ -230,16 +234,17 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   std::array<float, 6> n{};  // lower triangle of a, b, d
   std::array<float, kOwn> r{};
   std::array<std::array<float, kShading>, kOwn> cross{};
-  const Eigen::Vector4f v = w.shading.cast<float>();
+  const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
+  const float beside = p.strip_px > 0.0 ? v[4] : 0.0f;  // of the edge the strip's level counts
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px(j), ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
     const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
     const float weight = 1.0f / (noise[0] + share * (noise[1] - noise[0]));
-    const float rest = p.profile.light[k] - inner * a - outer * b;
-    const std::array<float, kOwn> row{a, b, (inner - outer * ground) * c.density[k]};
-    const std::array<float, kShading> shading{s * a, s * b, s * s * a, s * s * b};
+    const float rest = p.profile.light[k] - inner * a - outer * b - v[4] * c.strip[k];
+    const std::array<float, kOwn> row{a, b, (inner + beside - outer * ground) * c.density[k]};
+    const std::array<float, kShading> shading{s * a, s * b, s * s * a, s * s * b, c.strip[k]};
     size_t at = 0;
     for (size_t i = 0; i < kOwn; ++i) {
       const float wr = weight * row[i];
@@ -258,7 +263,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   if (!(information > 1e-4f)) return;
   const double offset = (r[2] - in * r[0] - out * r[1]) / information;
   if (!(std::abs(offset) <= p.reach_px)) return;
-  Vector4 pull;
+  Shading pull;
   for (size_t l = 0; l < kShading; ++l)
     pull[static_cast<int>(l)] = (cross[2][l] - in * cross[0][l] - out * cross[1][l]) / information;
   ProfileEdge& e = p.edge;
@@ -268,7 +273,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   const float s = std::clamp(static_cast<float>(offset), p.profile.first_px, -p.profile.first_px);
   const float ground = c.ground[static_cast<size_t>(std::clamp(
       (s - p.profile.first_px) / Profile::kStepPx, 0.0f, static_cast<float>(p.profile.count - 1)))];
-  const double inner = shaded(w.inner, v[0], v[2], s);
+  const double inner = shaded(w.inner, v[0], v[2], s) + beside;
   e.contrast = shaded(w.outer, v[1], v[3], s) * ground - inner;
   e.mean_level = inner + 0.5 * e.contrast;
   e.inner_slope = v[0] + 2.0f * s * v[2];
@@ -301,7 +306,14 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
     profiles[i].found = false;
     if (all[i].usable) fit_offset(profiles[i], columns[i], noise[i], all[i]);
   }
-  return blur_step(all);
+  const double usual = blur_step(all);
+  for (size_t i = 0; i < profiles.size(); ++i) {
+    constexpr double kScatter_px = 0.1;
+    const double seen =
+        1.0 / (1.0 + 1.0 / (kScatter_px * kScatter_px * std::max(all[i].blur_information, 1e-9)));
+    profiles[i].edge.wider_px = seen * (all[i].blur_step - usual);
+  }
+  return usual;
 }
 
 }  // namespace trochoid::tracking

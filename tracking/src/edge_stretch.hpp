@@ -8,9 +8,12 @@ namespace trochoid::tracking {
 /// A profile across a predicted edge at s = 0.
 struct StretchProfile {
   Profile profile;
-  double blur_px = 0.7;   ///< of its edge
-  bool plate = false;     ///< the outer level is a multiple of the background plate
-  int curve = 0;          ///< neighbours are profiles of the same curve
+  double blur_px = 0.7;  ///< of its edge
+  bool plate = false;    ///< the outer level is a multiple of the background plate
+  int curve = 0;         ///< neighbours are profiles of the same curve
+  /// Distance inwards to an edge of the body itself, too near to look between: a strip of unknown
+  /// level; 0: none.
+  double strip_px = 0.0;
   double reach_px = 2.0;  ///< largest offset believed
   bool found = false;     ///< out: an edge within reach
   ProfileEdge edge{};     ///< out

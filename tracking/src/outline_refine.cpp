@@ -35,7 +35,13 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Search& 
   look.blur_px = blur_along(scenery, sample, own_blur);
   const double widen = look.blur_px - search.blur_px;
   const double extent = search.extent_px + 2.0 * widen;
-  const double inside = clear_of_next(sample.inside_px, extent, look.blur_px);
+  double inside = clear_of_next(sample.inside_px, extent, look.blur_px);
+  // A wall too narrow to look past: a strip of its own beside the face.
+  look.strip_px = 0.0;
+  if (search.exact && sample.edge == Edge::lower_rim && inside < extent) {
+    look.strip_px = sample.inside_px;
+    inside = extent;
+  }
   const double outside = clear_of_next(sample.outside_px, extent, look.blur_px);
   if (inside < kLeastInsidePx || outside < kLeastInsidePx) return false;
   static const LightWindow kNoPlate;
@@ -50,14 +56,19 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Search& 
   return true;
 }
 
-// How steeply the levels change beside a stretch of the outline, over its contrast [1/px]. Single
-// profiles are too noisy for this, and their errors would go with those of their edges.
-std::vector<double> steepness_of(const std::vector<StretchProfile>& looks) {
+// What stretches of the outline look like; single profiles are too noisy for this, and their errors
+// would go with those of their edges.
+struct Surroundings {
+  double steepness = 0.0;  // of the levels beside the edge, over its contrast [1/px]
+  double wider_px = 0.0;
+};
+
+std::vector<Surroundings> surroundings_of(const std::vector<StretchProfile>& looks) {
   constexpr int kNeighbours = 4;
   const int n = static_cast<int>(looks.size());
-  std::vector<double> steepness(looks.size());
+  std::vector<Surroundings> out(looks.size());
   for (int i = 0; i < n; ++i) {
-    double inner = 0.0, outer = 0.0, contrast = 1e-3;
+    double inner = 0.0, outer = 0.0, contrast = 1e-3, wider = 0.0, count = 1e-3;
     for (int j = std::max(0, i - kNeighbours); j <= std::min(n - 1, i + kNeighbours); ++j) {
       const StretchProfile& look = looks[static_cast<size_t>(j)];
       if (!look.found || look.curve != looks[static_cast<size_t>(i)].curve) continue;
@@ -66,23 +77,29 @@ std::vector<double> steepness_of(const std::vector<StretchProfile>& looks) {
       inner += weight * e.inner_slope;
       outer += weight * e.outer_slope;
       contrast += weight * e.contrast;
+      wider += e.wider_px, count += 1.0;
     }
-    steepness[static_cast<size_t>(i)] = (std::abs(inner) + std::abs(outer)) / std::abs(contrast);
+    out[static_cast<size_t>(i)] = {(std::abs(inner) + std::abs(outer)) / std::abs(contrast),
+                                   std::abs(wider) / count};
   }
-  return steepness;
+  return out;
 }
 
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, rounded rims, levels beyond the range of the
 // picture.
-double model_sd_px(const StretchProfile& look, double steepness, bool silhouette) {
+double model_sd_px(const StretchProfile& look, const Surroundings& around, bool silhouette) {
   constexpr double kShapePx = 0.03, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
   constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
   const double shape_px = silhouette ? kShapePx : kOwnShapePx;
-  const double steep_px = std::min(kMostPx, kUnderBlurPx * steepness);
+  const double steep_px = std::min(kMostPx, kUnderBlurPx * around.steepness);
   const double clipped_px = look.profile.clipped() ? kClippedPx : 0.0;
-  return std::sqrt(steep_px * steep_px + shape_px * shape_px + clipped_px * clipped_px +
+  // An edge wider than the picture's blur is not that of the body alone.
+  constexpr double kPerWiderPx = 1.0;
+  const double wide_px = std::min(kMostPx, kPerWiderPx * around.wider_px);
+  return std::sqrt(wide_px * wide_px + steep_px * steep_px + shape_px * shape_px +
+                   clipped_px * clipped_px +
                    kAlongShare * kAlongShare * look.edge.shading_variance_px2);
 }
 
@@ -144,12 +161,12 @@ double collect_exactly(const Scenery& scenery, const std::vector<OutlineSample>&
       places.push_back(i), ++count;
   looks.resize(count);
   const double wider = fit_stretches(looks);
-  const std::vector<double> steepness = steepness_of(looks);
+  const std::vector<Surroundings> around = surroundings_of(looks);
   for (size_t i = 0; i < count; ++i) {
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i].edge, colour);
-    equation.model_px = model_sd_px(looks[i], steepness[i], sample.silhouette);
+    equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
     keep(sample, looks[i].edge, equation, out);
     // A plain step or nothing: slopes can make an edge of any penumbra.
     ProfileEdge plain;
