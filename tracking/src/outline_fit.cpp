@@ -88,6 +88,21 @@ std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start
                  : std::nullopt;
 }
 
+// Seen nearly face on, the attitude mirrored at the line of sight is so near that a prediction may
+// lead to either.
+std::optional<Fitted> of_both_tilts(const Scenery& scenery, std::optional<Fitted> fitted) {
+  constexpr double kNearly_rad = 0.25;
+  constexpr double kNoticeably = 1.04;
+  if (!fitted || scenery.motion.rotation() < 0 || scenery.motion.pivoted()) return fitted;
+  const data::Pose<>& pose = fitted->refined.pose;
+  const double facing =
+      axis_towards(scenery.camera, pose).dot(direction_to(scenery.camera, pose.centre_m));
+  if (facing < std::cos(kNearly_rad)) return fitted;
+  auto other = fit_exactly(scenery, mirrored(scenery.camera, scenery.motion, pose),
+                           fitted->refined.outline_px, fitted->blur_px);
+  return other && other->evidence > kNoticeably * fitted->evidence ? other : fitted;
+}
+
 // A prediction is often right to the blur already; the wider look is easily misled by shadows.
 std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
                                           std::optional<double> blur_px) {
@@ -95,8 +110,9 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
   std::optional<Fitted> fitted;
   if (const auto drawn = refine(scenery, predicted, kDraw))
     fitted = fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px);
-  if (fitted && fitted->score >= kSure) return fitted;
-  return better(std::move(fitted), fit_from(scenery, predicted));
+  if (!fitted || fitted->score < kSure)
+    fitted = better(std::move(fitted), fit_from(scenery, predicted));
+  return of_both_tilts(scenery, std::move(fitted));
 }
 
 // From afar: each start is drawn towards edges, those that then lie on edges are fitted.

@@ -24,6 +24,8 @@ class PoseMotion {
   /// Index of the rotation about the node line; the one about e2 follows. -1: the attitude is
   /// fixed.
   [[nodiscard]] int rotation() const { return rotation_; }
+  /// The axis goes through a pivot.
+  [[nodiscard]] bool pivoted() const { return support_.kind == data::SupportKind::pivot; }
   /// Standard deviation [m or rad] of what a parameter could be at most; keeps the fit regular
   /// where the picture says nothing.
   [[nodiscard]] double scale(int parameter) const;
