@@ -1,4 +1,5 @@
 # The install tree: libraries, public headers, the program, and a package other projects can find.
+# Component `program` is what users run (with the Python package), `development` what others link.
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
@@ -8,13 +9,16 @@ if(TROCHOID_TRACKING)
   list(APPEND TROCHOID_COMPONENTS tracking)
 endif()
 foreach(component IN LISTS TROCHOID_COMPONENTS)
-  install(TARGETS trochoid_${component} EXPORT trochoid FILE_SET HEADERS)
+  install(TARGETS trochoid_${component} EXPORT trochoid
+    ARCHIVE COMPONENT development FILE_SET HEADERS COMPONENT development)
 endforeach()
-install(TARGETS trochoid)
-install(EXPORT trochoid NAMESPACE trochoid:: FILE trochoidTargets.cmake DESTINATION ${package_dir})
+install(TARGETS trochoid COMPONENT program)
+install(EXPORT trochoid NAMESPACE trochoid:: FILE trochoidTargets.cmake
+  DESTINATION ${package_dir} COMPONENT development)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/trochoidConfig.cmake.in
   ${CMAKE_BINARY_DIR}/trochoidConfig.cmake INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/trochoidConfig.cmake
-              ${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake DESTINATION ${package_dir})
+              ${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake
+        DESTINATION ${package_dir} COMPONENT development)
