@@ -1,17 +1,18 @@
 #include "child_process.hpp"
 
 #include <fcntl.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
-#include <filesystem>
+#include <csignal>
 
 namespace trochoid::tools {
 
-ChildRun run_child(const std::vector<std::string>& arguments) {
+ChildRun run_child(const std::vector<std::string>& arguments, const std::filesystem::path& output) {
   ChildRun run;
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -19,11 +20,15 @@ ChildRun run_child(const std::vector<std::string>& arguments) {
   std::array<int, 2> pipe_ends{};
   if (pipe2(pipe_ends.data(), O_CLOEXEC) != 0) return run;
   const auto start = std::chrono::steady_clock::now();
+  const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) _exit(127);  // it ended before it could be asked for a signal
     const int nothing = open("/dev/null", O_RDWR);
+    const int written = open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
     dup2(nothing, STDIN_FILENO);
-    dup2(nothing, STDOUT_FILENO);
+    dup2(written, STDOUT_FILENO);
     dup2(pipe_ends[1], STDERR_FILENO);
     execvp(argv[0], argv.data());
     _exit(127);

@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,10 @@ struct ChildRun {
   std::string error_output;  ///< what it wrote to stderr
 };
 
-/// Runs a program (found on PATH) to its end with stdin and stdout closed.
-[[nodiscard]] ChildRun run_child(const std::vector<std::string>& arguments);
+/// Runs a program (found on PATH) to its end with nothing on stdin and stdout going to a file
+/// (nowhere by default). The child is told to end when the calling thread does.
+[[nodiscard]] ChildRun run_child(const std::vector<std::string>& arguments,
+                                 const std::filesystem::path& output = "/dev/null");
 
 /// Path of the running program.
 [[nodiscard]] std::string own_path();

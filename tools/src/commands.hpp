@@ -29,6 +29,7 @@ void add_study_tracking_sweep(CLI::App& study);
 void add_init_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
+void add_campaign_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_calibrate_command(CLI::App& app);
 #endif

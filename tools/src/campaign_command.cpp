@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "campaign.hpp"
+#include "commands.hpp"
+#include "outputs.hpp"
+#include "progress.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/fitting/parallel.hpp"
+#include "validators.hpp"
+
+// trochoid campaign: many recordings, one process each; what is done is not done again.
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string manifest, part;
+  int jobs = 0;
+  bool summary_only = false, again = false;
+};
+
+/// "3/10": the third tenth of the items, for one job of an array on a cluster.
+struct Part {
+  std::size_t number = 1, of = 1;
+  [[nodiscard]] bool has(std::size_t index) const { return index % of == number - 1; }
+};
+
+Part parse_part(const std::string& text) {
+  Part part;
+  char rest = 0;
+  if (text.empty()) return part;
+  if (std::sscanf(text.c_str(), "%zu/%zu%c", &part.number, &part.of, &rest) != 2 ||
+      part.number < 1 || part.number > part.of || text.find('-') != std::string::npos)
+    throw InputError(fmt::format("--part {}: give K/N with K in 1..N, e.g. 3/10", text));
+  return part;
+}
+
+std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Options& options) {
+  const Part part = parse_part(options.part);
+  std::vector<const CampaignItem*> open;
+  for (std::size_t i = 0; i < campaign.items.size(); ++i) {
+    if (!part.has(i)) continue;
+    const auto record = current_record(campaign, campaign.items[i]);
+    if (!record || options.again || !record->done) open.push_back(&campaign.items[i]);
+  }
+  return open;
+}
+
+void run_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items, int jobs) {
+  Progress progress("campaign", "recordings");
+  std::atomic<std::int64_t> done{0};
+  const auto count = static_cast<int>(items.size());
+  fitting::in_parallel(count, jobs, [&](int i) {
+    const CampaignRecord record = run_item(campaign, *items[static_cast<std::size_t>(i)]);
+    detail(fmt::format("{}: exit status {} after {:.2f} s {}", record.name, record.exit_status,
+                       record.seconds, record.message));
+    progress.update(++done, count);
+  });
+}
+
+void summarise(const Campaign& campaign, bool whole) {
+  const std::vector<CampaignLine> lines = collect(campaign);
+  data::write_text(summary_csv(lines), campaign.folder / "summary.csv");
+  data::write_text(summary_html(campaign, lines), campaign.folder / "summary.html");
+  int good = 0, not_good = 0, failed = 0, open = 0;
+  for (const CampaignLine& line : lines) {
+    if (!line.known)
+      ++open;
+    else if (!line.record.done)
+      ++failed;
+    else
+      ++(line.record.exit_status == 0 ? good : not_good);
+  }
+  for (const CampaignLine& line : lines)
+    if (line.known && !line.record.done)
+      fmt::print("failed: {}: {}\n", line.record.name, line.record.message);
+  fmt::print("{} recordings: {} good, {} not good, {} failed, {} not run; see {} and summary.csv\n",
+             lines.size(), good, not_good, failed, open,
+             (campaign.folder / "summary.html").string());
+  if (whole && failed > 0)
+    throw NotGood(fmt::format("{} of {} recordings failed", failed, lines.size()));
+}
+
+void run(const Options& options) {
+  const Campaign campaign = read_campaign(options.manifest);
+  std::error_code code;
+  fs::create_directories(campaign.folder / "records", code);
+  if (code)
+    throw InputError(
+        fmt::format("{}: cannot be made: {}", campaign.folder.string(), code.message()));
+  if (!options.summary_only) {
+    const std::vector<const CampaignItem*> items = items_to_run(campaign, options);
+    note(fmt::format("{} of {} recordings to run", items.size(), campaign.items.size()));
+    run_items(campaign, items, options.jobs);
+  }
+  // One job of an array does not know what the others have left; the summary is made at the end.
+  if (options.part.empty()) summarise(campaign, true);
+}
+
+}  // namespace
+
+void add_campaign_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("campaign", "Run many recordings; resume where it was interrupted");
+  command->add_option("manifest", options->manifest, "Recordings and scenes (docs/campaigns.md)")
+      ->required();
+  command->add_option("-j,--jobs", options->jobs, "Recordings at a time; 0: one per core")
+      ->check(non_negative_number());
+  command->add_option(
+      "--part", options->part,
+      "Only the K-th of N equal shares, K/N, and no summary: for a cluster's array");
+  command->add_flag("--summary", options->summary_only, "Run nothing, write the summary");
+  command->add_flag("--again", options->again, "Run also what is done");
+  command->footer(
+      "Example:\n  trochoid campaign lab.toml\nwrites lab.campaign/: open summary.html");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools
