@@ -1,11 +1,18 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstdio>
 #include <fstream>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <vector>
 
 #include "trochoid/data/error.hpp"
@@ -22,12 +29,39 @@ bool is_special(const fs::path& target) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
-fs::path neighbour_of(const fs::path& target) {
-  static std::atomic<int> counter{0};
-  // The extension stays last: video encoders choose the container by it.
-  const std::string name = fmt::format(".{}.{}-{}.partial{}", target.stem().string(), ::getpid(),
-                                       counter++, target.extension().string());
-  return (is_special(target) ? fs::temp_directory_path() : target.parent_path()) / name;
+/// Temporary paths of this process. Whoever turns one into its target or removes it holds the lock,
+/// so that remove_pending() never meets a half-made change.
+struct Pending {
+  std::mutex mutex;
+  std::set<fs::path> paths;
+};
+Pending& pending() {
+  static Pending all;
+  return all;
+}
+
+bool is_alive(long process) {
+  return ::kill(static_cast<pid_t>(process), 0) == 0 || errno != ESRCH;
+}
+
+// What a killed process left beside the target: ".STEM.PID-N.partial.EXT" of no living process.
+void sweep(const fs::path& target, const fs::path& folder) {
+  const std::string head = fmt::format(".{}.", target.stem().string());
+  const std::string tail = ".partial" + target.extension().string();
+  std::error_code code;
+  for (fs::directory_iterator entry(folder, code), end; !code && entry != end;
+       entry.increment(code)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(head) || !name.ends_with(tail) ||
+        name.size() <= head.size() + tail.size())
+      continue;
+    long process = 0;
+    const char* last = name.data() + name.size() - tail.size();
+    const auto [rest, error] = std::from_chars(name.data() + head.size(), last, process);
+    std::error_code ignored;
+    if (error == std::errc() && *rest == '-' && process > 0 && !is_alive(process))
+      fs::remove_all(entry->path(), ignored);
+  }
 }
 
 void check_target(const fs::path& target) {
@@ -53,29 +87,75 @@ fs::path resolved(const fs::path& target) {
 
 }  // namespace
 
+fs::path pending_neighbour(const fs::path& target) {
+  static std::atomic<int> counter{0};
+  const fs::path folder = is_special(target)         ? fs::temp_directory_path()
+                          : target.has_parent_path() ? target.parent_path()
+                                                     : fs::path(".");
+  sweep(target, folder);
+  // The extension stays last: video encoders choose the container by it.
+  const fs::path path = folder / fmt::format(".{}.{}-{}.partial{}", target.stem().string(),
+                                             ::getpid(), counter++, target.extension().string());
+  const std::lock_guard lock(pending().mutex);
+  pending().paths.insert(path);
+  return path;
+}
+
+void discard_pending(const fs::path& path) noexcept {
+  const std::lock_guard lock(pending().mutex);
+  std::error_code ignored;
+  fs::remove_all(path, ignored);
+  pending().paths.erase(path);
+}
+
+std::error_code rename_pending(const fs::path& path, const fs::path& target) {
+  const std::lock_guard lock(pending().mutex);
+  std::error_code code;
+  // A folder cannot be renamed over another; exchanged in one step, neither is ever missing.
+  if (fs::is_directory(target, code) && fs::is_directory(path, code) &&
+      !fs::is_empty(target, code)) {
+    if (::renameat2(AT_FDCWD, path.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+      fs::remove_all(path, code);
+      code.clear();  // what is left of the old folder is no fault of the new one
+    } else {         // a file system that cannot: the old one goes first
+      fs::remove_all(target, code);
+      if (!code) fs::rename(path, target, code);
+    }
+  } else {
+    fs::rename(path, target, code);
+  }
+  if (!code) pending().paths.erase(path);
+  return code;
+}
+
+void remove_pending_and_stop() {
+  pending().mutex.lock();
+  constexpr int kTries = 20;  // a writer may put a file into a folder while it is being emptied
+  for (const fs::path& path : pending().paths) {
+    std::error_code code;
+    for (int i = 0; i < kTries && fs::exists(path, code); ++i) fs::remove_all(path, code);
+  }
+}
+
 PendingFile::PendingFile(fs::path target) : target_(std::move(target)) {
   if (!is_special(target_)) target_ = resolved(target_);
   check_target(target_);
-  temporary_ = neighbour_of(target_);
+  temporary_ = pending_neighbour(target_);
 }
 
 PendingFile::~PendingFile() {
-  std::error_code ignored;
-  if (!temporary_.empty()) fs::remove(temporary_, ignored);
+  if (!temporary_.empty()) discard_pending(temporary_);
 }
 
 void PendingFile::commit() {
-  std::error_code code;
   if (is_special(target_)) {
     std::ifstream in(temporary_, std::ios::binary);
     std::ofstream out(target_, std::ios::binary);
     out << in.rdbuf() << std::flush;
     if (!out) throw InputError(fmt::format("{}: cannot be written", target_.string()));
-    fs::remove(temporary_, code);
-  } else {
-    fs::rename(temporary_, target_, code);
-    if (code)
-      throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
+    discard_pending(temporary_);
+  } else if (const std::error_code code = rename_pending(temporary_, target_)) {
+    throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
   }
   temporary_.clear();
 }

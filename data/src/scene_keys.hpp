@@ -25,7 +25,7 @@ constexpr Range kAny{-kLargest, kLargest, true, "a finite number"};
 constexpr Range kPositive{0.0, kLargest, false, "greater than 0"};
 constexpr Range kNonNegative{0.0, kLargest, true, "0 or greater"};
 constexpr Range kTilt{0.0, kPi, true, "between 0 (lying flat) and pi"};
-constexpr Range kTolerance{0.0, 0.1, false, "greater than 0 and at most 0.1"};
+constexpr Range kTolerance{1e-15, 0.1, true, "between 1e-15 (finer is below rounding) and 0.1"};
 constexpr Range kObjects{1.0, 64.0, true, "a whole number in 1..64"};
 
 /// A word out of a list; the index in the list is the value of an enum.

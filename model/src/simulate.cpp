@@ -20,7 +20,7 @@ std::vector<double> output_times_s(const data::RunSettings& run) {
   const double last = std::floor(run.until_s * run.rate_hz * (1.0 + 1e-12) + 1e-9);
   if (last > kMostRows) {
     throw InputError(
-        fmt::format("run.until_s = {} at run.rate_hz = {} asks for {:.0f} rows; lower one",
+        fmt::format("run.until_s = {} at run.rate_hz = {} asks for {:.3g} rows; lower one",
                     run.until_s, run.rate_hz, last + 1.0));
   }
   std::vector<double> t_s(static_cast<std::size_t>(last) + 1);

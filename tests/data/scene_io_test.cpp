@@ -277,7 +277,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"ScalarDrag", "[model]\nair_linear_N_m_s = 1e-6", ":2:", "three numbers"},
         Refusal{"BothRates", "[start]\nw2_rad_s = 1\ndphi_rad_s = 2", ":3:", "same thing"},
         Refusal{"TiltBeyondPi", "[start]\ntheta_rad = 4", ":2:", "pi"},
-        Refusal{"LooseTolerance", "[run]\ntolerance = 1", ":2:", "at most 0.1"},
+        Refusal{"LooseTolerance", "[run]\ntolerance = 1", ":2:", "1e-15"},
         Refusal{"EndlessRun", "[run]\nuntil_s = 1e300", ":2:", "rows"},
         Refusal{"UnknownIntegrator", "[run]\nintegrator = 'rk4'", ":2:", "dop853"},
         Refusal{"PriorWithoutSigma", "[fit]\nprior = { mass_kg = 0.03 }",

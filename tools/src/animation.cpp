@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -40,11 +41,17 @@ class View {
 
 }  // namespace
 
+void check_animation_name(const std::filesystem::path& path) {
+  if (path.extension() != ".mp4")
+    throw InputError(fmt::format("{}: an animation is an mp4 file; name it .mp4", path.string()));
+}
+
 void write_animation(const data::Table& trajectory, const std::filesystem::path& path) {
   const Eigen::VectorXd t = trajectory.column("t_s");
   const Eigen::VectorXd x = trajectory.column("x_m"), y = trajectory.column("y_m");
   if (t.size() < 2 || (x.isZero(0.0) && y.isZero(0.0)))
     throw InputError(fmt::format("{}: the run has no path to draw", path.string()));
+  check_animation_name(path);
   const double span_s = t[t.size() - 1] - t[0];
   const double speed = std::max(1.0, span_s / kLongest_s);
   const int frames = std::max(2, static_cast<int>(span_s / speed * kFrameRate_hz));
@@ -55,7 +62,7 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
                         cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kFrameRate_hz,
                         {kSize_px, kSize_px});
   if (!video.isOpened())
-    throw InputError(fmt::format("{}: no encoder for this ending; use .mp4", path.string()));
+    throw InputError(fmt::format("{}: cannot be written as H.264 in mp4", path.string()));
   Progress progress("animate");
   cv::Mat trace(kSize_px, kSize_px, CV_8UC3, cv::Scalar::all(255));
   Eigen::Index row = 0, tail = 0;
@@ -76,6 +83,7 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
     progress.update(frame + 1, frames);
   }
   video.release();
+  check_written_video(pending.path(), frames, path);
   pending.commit();
 }
 

@@ -8,12 +8,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "canvas.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/calibration.hpp"
 #include "trochoid/tracking/frame_source.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -164,10 +166,7 @@ void draw_check(const Options& options, const Views& views, data::Camera camera)
   }
   cv::putText(picture, "residuals x 20", {12, picture.rows - 14}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
               vermillion, 1, cv::LINE_AA);
-  data::PendingFile pending(options.picture);
-  if (!cv::imwrite(pending.path().string(), picture))
-    throw InputError(fmt::format("{}: cannot be written; use .png", options.picture.string()));
-  pending.commit();
+  write_picture(picture, options.picture);
 }
 
 void run(const Options& options) {
@@ -210,11 +209,11 @@ void add_calibrate_command(CLI::App& app) {
                       "Inner corners of a chessboard, squares of a ChArUco board [9x6]");
   command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--marker-mm", options->marker_mm,
                    "Side of a marker [mm]: the board is a ChArUco board")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]");
   command->add_option("--floor", options->floor,
                       "Picture in which the board lies on the floor [the first]");
@@ -229,7 +228,7 @@ void add_calibrate_command(CLI::App& app) {
                    "CSV with x_px, y_px of points on the rim of a body at rest on its face")
       ->check(CLI::ExistingFile);
   command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   command->callback([options] { run(*options); });

@@ -12,6 +12,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "validators.hpp"
 
 // trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
 namespace trochoid::tools {
@@ -21,7 +22,7 @@ struct FitCommand {
   std::vector<std::string> tracks;
   std::string scene, output;
   std::optional<int> object;
-  bool compare = false, verbose = false;
+  bool compare = false;
   fitting::FitOptions options;
 };
 
@@ -99,8 +100,7 @@ void run(const FitCommand& command) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
   fitting::FitOptions options = command.options;
-  if (command.verbose)
-    options.log = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
+  if (talk() == Talk::verbose) options.log = detail;
   data::Fit fit = fit_job(tracks, scene, options, command.compare);
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
@@ -138,8 +138,7 @@ void add_fit_command(CLI::App& app) {
                   "Fits to resampled residuals, for error bars without assumptions; 0: none")
       ->check(CLI::Range(0, 100000));
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
-      ->check(CLI::NonNegativeNumber);
-  fit->add_flag("--verbose,-v", command->verbose, "Every minimisation as a line on stderr");
+      ->check(non_negative_number());
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
   fit->callback([command] { run(*command); });
 }

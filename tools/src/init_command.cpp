@@ -15,6 +15,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/inspect.hpp"
+#include "validators.hpp"
 
 // init: a scene file from a first look at the recording, to be read and corrected.
 namespace trochoid::tools {
@@ -152,7 +153,7 @@ void add_init_command(CLI::App& app) {
   command->add_option("video", options->video, "Recording")->required();
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
   command->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_flag("--force", options->force, "Replace the scene if it exists");
   command->footer("Example: trochoid init ring.mp4 --radius-mm 30 -o ring.toml");
   command->callback([options] { run(*options); });

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "commands.hpp"
+#include "interruption.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -37,6 +38,7 @@ int run(int argc, char** argv) {
   add_track_command(app);
   add_overlay_command(app);
   add_run_command(app);
+  add_campaign_command(app);
   add_render_command(app);
   add_calibrate_command(app);
   add_init_command(app);
@@ -54,6 +56,7 @@ int run(int argc, char** argv) {
 
 // The only place that catches: libraries throw, commands do not print errors.
 int main(int argc, char** argv) try {
+  trochoid::tools::clean_up_when_interrupted();
   return run(argc, argv);
 } catch (const trochoid::tools::NotGood& answer) {
   fmt::print(stderr, "trochoid: {}\n", answer.what());

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include "trochoid/data/error.hpp"
+#ifdef TROCHOID_HAS_TRACKING
+#include "trochoid/tracking/frame_source.hpp"
+#endif
 
 namespace trochoid::tools {
 
@@ -22,5 +25,21 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
       throw InputError(fmt::format(
           "{}: is read by this command and would be lost; name another output", output.string()));
 }
+
+#ifdef TROCHOID_HAS_TRACKING
+void check_written_video(const fs::path& written, std::int64_t frames, const fs::path& target) {
+  std::int64_t promised = -1;
+  try {
+    const auto source = tracking::open_video(written);
+    promised = source->info().frames;
+    if (promised == 0)  // a container that does not count: Matroska
+      while (source->next()) ++promised;
+  } catch (const InputError&) {  // told below, with the name the user knows
+  }
+  if (promised != frames)
+    throw InputError(
+        fmt::format("{}: cannot be written whole (is the disk full?)", target.string()));
+}
+#endif
 
 }  // namespace trochoid::tools

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -9,5 +10,12 @@ namespace trochoid::tools {
 /// @throws InputError naming the output.
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);
+
+#ifdef TROCHOID_HAS_TRACKING
+/// The encoder behind cv::VideoWriter tells nobody when the disk is full: looks at the file again.
+/// @throws InputError naming `target` unless `written` opens and promises so many frames.
+void check_written_video(const std::filesystem::path& written, std::int64_t frames,
+                         const std::filesystem::path& target);
+#endif
 
 }  // namespace trochoid::tools

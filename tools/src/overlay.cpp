@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "outputs.hpp"
 #include "overlay_drawing.hpp"
 #include "progress.hpp"
 #include "residual_strip.hpp"
@@ -224,6 +225,7 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   writer.release();
   if (written.frame.empty())
     throw InputError(fmt::format("{}: no frame between --from and --to", input.video.string()));
+  check_written_video(pending.path(), static_cast<std::int64_t>(written.frame.size()), path);
   pending.commit();
   return written;
 }

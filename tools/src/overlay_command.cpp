@@ -14,6 +14,7 @@
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -91,7 +92,7 @@ void add_overlay_command(CLI::App& app) {
   command
       ->add_option("--fit-track", options->fit_track,
                    "Place of this track among those fitted together (0 = first)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(non_negative_number());
   command->add_flag("--json", options->json, "Print a summary as JSON");
   command->footer(
       "Example:\n  trochoid overlay ring.mp4 --track ring.track.csv --fit ring.fit.json "

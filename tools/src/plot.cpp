@@ -19,11 +19,15 @@ constexpr std::array<const char*, 7> kColours{"#0072B2", "#D55E00", "#009E73", "
 constexpr std::array<int, 5> kMarks{5, 7, 9, 13, 11};  // gnuplot's filled ones
 constexpr int kWidth_px = 900, kPanelHeight_px = 420, kSquareHeight_px = 760;
 
+/// A string of gnuplot's. Quotes end it, backslashes escape, backquotes would run a command.
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c == '\n' ? ' ' : c;
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\' || c == '`' || byte < 0x20)
+      result += fmt::format("\\{:03o}", byte);
+    else
+      result += c;
   }
   return result + '"';
 }

@@ -11,12 +11,14 @@
 #include <numbers>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "render_picture.hpp"
 #include "scene_library.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -114,14 +116,35 @@ data::Camera camera_of(const Options& options, const data::Scene& scene, const M
   return camera_over(motion, *scene.body, options.width_px, options.height_px);
 }
 
+/// A folder for what another process writes. Once it is gone, by its end or by Ctrl-C, a process
+/// that was only just starting can leave nothing behind.
+class Workshop {
+ public:
+  explicit Workshop(const fs::path& target) : folder_(data::pending_neighbour(target)) {
+    std::error_code code;
+    if (fs::create_directory(folder_, code)) return;
+    data::discard_pending(folder_);
+    throw InputError(fmt::format("{}: cannot be written: {}", target.string(), code.message()));
+  }
+  ~Workshop() { data::discard_pending(folder_); }
+  Workshop(const Workshop&) = delete;
+  Workshop& operator=(const Workshop&) = delete;
+  [[nodiscard]] fs::path file(const fs::path& name) const { return folder_ / name; }
+
+ private:
+  fs::path folder_;
+};
+
 // Frames to an encoder process; libavcodec's own would tie us to one version of its options.
 class Encoder {
  public:
-  Encoder(const fs::path& target, const data::Camera& camera, double rate_hz, int quality,
-          bool lossless)
+  /// Writes into `file`; messages name `target`, which it is to become.
+  Encoder(const fs::path& file, const fs::path& target, const data::Camera& camera, double rate_hz,
+          int quality, bool lossless)
       : target_(target.string()) {
     std::string quoted;
-    for (const char c : target_) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    for (const char c : file.string())
+      quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
     const std::string coding = lossless
                                    ? "-c:v ffv1 -pix_fmt bgr0"
                                    : fmt::format("-c:v libx264 -crf {} -pix_fmt yuv420p", quality);
@@ -151,7 +174,8 @@ class Encoder {
  private:
   [[noreturn]] void fail() const {
     throw InputError(fmt::format(
-        "{}: cannot be encoded; ffmpeg must be installed and the ending one it knows (.mp4, .mkv)",
+        "{}: cannot be encoded; is the disk full? ffmpeg must be installed and the ending one it "
+        "knows (.mp4, .mkv)",
         target_));
   }
   std::string target_;
@@ -251,7 +275,9 @@ void run(const Options& options) {
   const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
   const Targets targets = targets_of(options.output, options.lossless);
   data::PendingFile video(targets.video);
-  Encoder encoder(video.path(), camera, rate_hz, options.quality, options.lossless);
+  const Workshop workshop(targets.video);
+  const fs::path encoded = workshop.file(targets.video.filename());
+  Encoder encoder(encoded, targets.video, camera, rate_hz, options.quality, options.lossless);
   std::string truth =
       "frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac\n";
   Progress progress("render");
@@ -267,10 +293,12 @@ void run(const Options& options) {
     progress.update(frame + 1, frames);
   }
   encoder.finish();
-  video.commit();
+  check_written_video(encoded, frames, targets.video);
+  fs::rename(encoded, video.path());
   data::write_text(truth, targets.truth);
   data::write_camera(camera, targets.camera);
   data::write_text(object_of(scene, trajectory.model).dump(1) + "\n", targets.object);
+  video.commit();
   fmt::print("{}: {} frames of {} x {} at {:.6g} Hz, truth in {}\n", targets.video.string(), frames,
              camera.width_px, camera.height_px, rate_hz, targets.truth.string());
 }
@@ -322,8 +350,8 @@ void add_render_command(CLI::App& app) {
   command->add_option("--height", options->height_px, "Of the picture [px, 480]")
       ->check(CLI::Range(32, 8192));
   command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--until", options->until_s, "End time [s]")->check(CLI::PositiveNumber);
+      ->check(positive_number());
+  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
       ->check(CLI::Range(0, 51));
   command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)");

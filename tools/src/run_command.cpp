@@ -18,6 +18,7 @@
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/tracking/tracker.hpp"
+#include "validators.hpp"
 
 // trochoid run: recording in, folder with track, fit, overlay and report out. Each stage calls what
 // its own command calls; nothing is computed here.
@@ -276,12 +277,8 @@ void tell(const Run& run, const Verdict& verdict, const Options& options) {
              run.fit ? ", " + (folder / "residuals.png").string() : "");
 }
 
-void run(const Options& options) {
-  Run run = prepared(options);
-  PendingFolder pending(folder_of(options));
-  const fs::path& folder = pending.path();
-  run.timed("track", [&] { track(run, options); });
-  run.timed("fit", [&] { fit(run, options); });
+/// All files of the folder.
+Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
   write_data(run, options, folder);
   run.timed("overlay", [&] { show(run, options, folder); });
   write_run_file(run, options, folder);
@@ -294,6 +291,16 @@ void run(const Options& options) {
     data::write_text(make_path_svg(input), folder / "path.svg");
   });
   write_times(run, options, folder);
+  return verdict;
+}
+
+void run(const Options& options) {
+  Run run = prepared(options);
+  PendingFolder pending(folder_of(options));
+  run.timed("track", [&] { track(run, options); });
+  run.timed("fit", [&] { fit(run, options); });
+  const Verdict verdict =
+      pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();
   tell(run, verdict, options);
   const auto wanted = static_cast<std::size_t>(run.scene.tracking.objects);
@@ -325,7 +332,7 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz], where the file's is not (slow motion)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--effort", options->effort,
                    "quick: one model; normal: compare models; thorough: also profile likelihoods "

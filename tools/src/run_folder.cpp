@@ -78,30 +78,30 @@ PendingFolder::PendingFolder(fs::path target) : target_(std::move(target)) {
     throw InputError(
         fmt::format("{}: exists and is not the folder of an earlier run; name another with -o",
                     target_.string()));
-  temporary_ = parent / fmt::format(".{}.{}.partial", target_.filename().string(), ::getpid());
-  if (!fs::create_directory(temporary_, code))
-    throw InputError(fmt::format("{}: cannot be made: {}", temporary_.string(),
-                                 code ? code.message() : "it exists"));
+  temporary_ = data::pending_neighbour(target_);
+  if (!fs::create_directory(temporary_, code)) {
+    data::discard_pending(temporary_);
+    throw InputError(fmt::format("{}: cannot be made: {}", target_.string(),
+                                 code ? code.message() : "its neighbour exists"));
+  }
 }
 
 PendingFolder::~PendingFolder() {
-  std::error_code ignored;
-  if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+  if (!temporary_.empty()) data::discard_pending(temporary_);
+}
+
+std::string PendingFolder::with_own_name(std::string message) const {
+  const std::string temporary = temporary_.string(), own = target_.string();
+  for (std::size_t at = 0; (at = message.find(temporary, at)) != std::string::npos;
+       at += own.size())
+    message.replace(at, temporary.size(), own);
+  return message;
 }
 
 void PendingFolder::commit() {
-  std::error_code code;
-  const fs::path old = temporary_.string() + ".old";
-  const bool replaces = fs::exists(target_, code);
-  if (replaces) fs::rename(target_, old, code);
-  if (!code) fs::rename(temporary_, target_, code);
-  if (code) {
-    std::error_code ignored;
-    if (replaces && !fs::exists(target_, ignored)) fs::rename(old, target_, ignored);
+  if (const std::error_code code = data::rename_pending(temporary_, target_))
     throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
-  }
   temporary_.clear();
-  if (replaces) fs::remove_all(old, code);
 }
 
 ReportInput read_run_folder(const fs::path& folder) {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "report.hpp"
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {
 
@@ -17,8 +18,18 @@ class PendingFolder {
   PendingFolder& operator=(const PendingFolder&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
   void commit();
+  /// Runs `write`; what it complains about names the folder as the user knows it.
+  template <class Write>
+  auto told_by_its_name(const Write& write) const {
+    try {
+      return write();
+    } catch (const InputError& error) {
+      throw InputError(with_own_name(error.what()));
+    }
+  }
 
  private:
+  [[nodiscard]] std::string with_own_name(std::string message) const;
   std::filesystem::path target_, temporary_;
 };
 

@@ -20,6 +20,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/steady.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -85,11 +86,17 @@ void simulate_scene(const Options& options) {
   const fs::path output =
       options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
   for (const fs::path& file : {output, options.animation}) check_output(file, {named});
+#ifdef TROCHOID_HAS_TRACKING
+  if (!options.animation.empty()) check_animation_name(options.animation);
+#endif
   data::Scene scene = options.fit.empty() ? load_scene(options.scene)
                                           : fitted_scene(data::read_fit(options.fit), options.arc);
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene);
   const model::Trajectory run = model::simulate(scene);
+  if (run.values.rows() == 0)
+    throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
+                                 options.scene, model::sentence(run.outcome)));
   data::Table table = trajectory_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
@@ -130,10 +137,10 @@ void add_simulate_command(CLI::App& app) {
       "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
   command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
-  command->add_option("--until", options->until_s, "End time [s]")->check(CLI::PositiveNumber);
-  command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(CLI::PositiveNumber);
+  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
+  command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(positive_number());
   command->add_option("--tolerance", options->tolerance, "Integration tolerance")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-15, 0.1));
   command->add_option("--model", options->model, "Model, instead of the scene's");
   command->add_option("--integrator", options->integrator,
                       "auto, dop853, taylor, cvode-adams, cvode-bdf or arkode");

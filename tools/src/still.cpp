@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "canvas.hpp"
 #include "overlay.hpp"
 #include "overlay_drawing.hpp"
 #include "residual_strip.hpp"
@@ -149,16 +149,6 @@ std::string figures(const OverlayContent& content, const ObjectPaths& paths) {
   return words;
 }
 
-void save(const cv::Mat& picture, const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg")
-    throw InputError(fmt::format("{}: a picture is a .png or .jpg file", path.string()));
-  data::PendingFile pending(path);
-  if (!cv::imwrite(pending.path().string(), picture))
-    throw InputError(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-  pending.commit();
-}
-
 }  // namespace
 
 void write_still(const OverlayInput& input, const OverlayOptions& options,
@@ -186,7 +176,7 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
     base += 2.0 * text_px;
     draw_text(page, figures(content, paths), {1.2 * text_px, base}, text_px, palette::white);
   }
-  save(page, path);
+  write_picture(page, path);
 }
 
 bool write_residual_picture(const OverlayInput& input, const std::filesystem::path& path) {
@@ -197,7 +187,7 @@ bool write_residual_picture(const OverlayInput& input, const std::filesystem::pa
   const ResidualStrip strip(content, content.first_s(), content.last_s(), kWidthPx, kTextPx);
   cv::Mat page(strip.height_px(), kWidthPx, CV_8UC3);
   strip.draw(page, std::numeric_limits<double>::quiet_NaN());
-  save(page, path);
+  write_picture(page, path);
   return true;
 }
 

@@ -12,6 +12,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "validators.hpp"
 
 // study fits: how often, how exactly and how fast each strategy finds planted parameters, and
 // whether the error bars hold what they promise.
@@ -148,28 +149,28 @@ void add_study_fits(CLI::App& study) {
       ->capture_default_str();
   command->add_option("--count", options->count, "Scenes, one fit per strategy each")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--draws", options->draws,
                    "Further fits without a guess that test the error bars; 0: none")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(non_negative_number());
   command
       ->add_option("--noise", options->tracks.noise,
                    "Standard deviation of a position over the body's length (l or radius)")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--duration", options->tracks.duration_s,
                    "Length of the tracks [s]; default: by the scene, 2.5 nutations of a top")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--rate", options->tracks.rate_hz, "Samples per second with --duration")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--seed", options->seed, "Seed of scenes, noise and starts")
       ->capture_default_str();
   command->add_option("--threads", options->threads, "Fits at a time; 0: all cores")
-      ->check(CLI::NonNegativeNumber);
+      ->check(non_negative_number());
   command->add_option("--out", options->out, "Folder for the table and the diagram")
       ->capture_default_str();
   command->footer("Example: trochoid study fits --count 100 --noise 0.05 --draws 4000");

@@ -15,6 +15,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/simulate.hpp"
+#include "validators.hpp"
 
 // study reference: simulate every case of a folder of reference trajectories and compare.
 namespace trochoid::tools {
@@ -208,7 +209,7 @@ void add_study_reference(CLI::App& study) {
   command->add_option("--out", options->out, "Write our trajectories here, one CSV per case");
   command->add_option("--tolerance", options->tolerance, "Integration tolerance")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->footer("Example: trochoid study reference cases/ --out runs/");
   command->callback([options] { run(*options); });
 }

@@ -11,6 +11,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/tracker.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -105,7 +106,7 @@ void add_track_command(CLI::App& app) {
   track
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz], where the file's is not (slow motion)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   track->add_option("-o,--output", options->output, "Track CSV to write")->required();
   track->callback([options] { run(*options); });
 }

@@ -209,6 +209,7 @@ class LibavSource final : public FrameSource {
       return static_cast<double>(index) / info_.frame_rate_hz;
     }
     if (first_stamp_ == AV_NOPTS_VALUE) first_stamp_ = stamp;
+    last_stamp_ = stamp;
     return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
   }
 
@@ -238,6 +239,25 @@ class LibavSource final : public FrameSource {
       fail(fmt::format(
           "breaks off after frame {} of {}{}; copy the whole file, or stop earlier with --to",
           frames_read_ - 1, info_.frames, read_error_.empty() ? "" : " (" + read_error_ + ")"));
+    check_length();
+  }
+
+  /// Containers that do not count frames may promise a length (Matroska); with sound beside the
+  /// pictures it may be the sound's.
+  void check_length() const {
+    const bool promised = info_.frames == 0 && container_->nb_streams == 1 &&
+                          container_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM &&
+                          container_->duration != AV_NOPTS_VALUE && !options_.frame_rate_hz &&
+                          first_stamp_ != AV_NOPTS_VALUE && info_.frame_rate_hz > 0.0;
+    if (!promised) return;
+    const double length_s = static_cast<double>(container_->duration) / AV_TIME_BASE;
+    const double read_s =
+        static_cast<double>(last_stamp_ - first_stamp_) * av_q2d(stream_->time_base);
+    const double forgiven_s = std::max(3.0 / info_.frame_rate_hz, 0.02 * length_s);
+    if (length_s - read_s > forgiven_s)
+      fail(fmt::format(
+          "breaks off at {:.3f} s of {:.3f} s; copy the whole file, or stop earlier with --to",
+          read_s, length_s));
   }
 
   std::string name_;
@@ -252,7 +272,7 @@ class LibavSource final : public FrameSource {
   VideoInfo info_;
   int quarters_ = 0;
   std::int64_t frames_read_ = 0;
-  std::int64_t first_stamp_ = AV_NOPTS_VALUE;
+  std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   std::int64_t decode_errors_ = 0;
   std::string read_error_;
   bool flushing_ = false, finished_ = false;

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "trochoid/data/camera.hpp"
 #include "trochoid/data/fit.hpp"
@@ -37,6 +38,18 @@ void write_table(const Table& table, const std::filesystem::path& path);
 void write_text(const std::string& text, const std::filesystem::path& path);
 /// Hex SHA-256 of a file's bytes.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+
+/// A name beside `target`, hidden and this process' own, for a file or folder that is to become it.
+/// What killed processes left beside the same target is swept away. Ends in exactly one of
+/// discard_pending() and rename_pending(), the latter only when it returns no error.
+[[nodiscard]] std::filesystem::path pending_neighbour(const std::filesystem::path& target);
+void discard_pending(const std::filesystem::path& path) noexcept;
+/// A folder takes the place of an existing one in one step (where the file system can exchange).
+[[nodiscard]] std::error_code rename_pending(const std::filesystem::path& path,
+                                             const std::filesystem::path& target);
+/// Removes whatever this process has pending and lets nothing become its target any more: for a
+/// program that is about to end by a signal. Any other use of pending files waits for ever after.
+void remove_pending_and_stop();
 
 /// A temporary file beside `target` that becomes `target` on commit() and vanishes otherwise; for
 /// writers that need a path (video encoders).
