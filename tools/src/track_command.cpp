@@ -10,6 +10,7 @@
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/tracking/smooth.hpp"
 #include "trochoid/tracking/tracker.hpp"
 #include "validators.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  fs::path video, scene, camera, edges, output;
+  fs::path video, scene, camera, edges, smooth, output;
   int objects = 0;
   std::string from, to, at;
   double rate_hz = 0.0;
@@ -57,6 +58,7 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   check_output(options.output, {options.video, options.scene, options.camera});
   check_output(options.edges, {options.video, options.scene, options.camera, options.output});
+  check_output(options.smooth, {options.video, options.scene, options.camera, options.output});
   const data::Scene scene = scene_of(options);
   std::optional<data::Camera> camera;
   if (!options.camera.empty()) camera = data::read_camera(options.camera);
@@ -73,13 +75,19 @@ void run(const Options& options) {
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   data::write_track(result.file, options.output);
+  std::string interpolated;
+  if (!options.smooth.empty()) {
+    const tracking::SmoothTrack smoothed = tracking::smooth_track(result.file);
+    data::write_table(smoothed.table, options.smooth);
+    interpolated = fmt::format(" {} interpolated,", smoothed.interpolated);
+  }
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   write_timing(options.output, elapsed.count(), result.summary);
   const tracking::TrackSummary& s = result.summary;
   note(fmt::format(
-      "{}: {} bodies in {} frames: {} found, {} lost, {} doubtful, {} frames damaged; metres: {}",
+      "{}: {} bodies in {} frames: {} found, {} lost, {} doubtful,{} {} frames damaged; metres: {}",
       options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost, s.doubtful,
-      s.damaged, s.camera_words));
+      interpolated, s.damaged, s.camera_words));
   const auto wanted = static_cast<std::size_t>(scene.tracking.objects);
   if (result.file.tracks.size() < wanted)
     throw NotGood(
@@ -103,6 +111,8 @@ void add_track_command(CLI::App& app) {
   track->add_option("--to", options->to, "Last frame to use: seconds or frame");
   track->add_option("--at", options->at, "A point x,y [px] on the body in the first frame used");
   track->add_option("--edges", options->edges, "Also write the accepted edge points (CSV)");
+  track->add_option("--smooth", options->smooth,
+                    "Also write smoothed positions and velocities (CSV); never fit these");
   track
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz], where the file's is not (slow motion)")

@@ -36,6 +36,28 @@ float median_of(const float* begin, int count) {
   return copy[static_cast<std::size_t>(count / 2)];
 }
 
+/// Takes the level out of a ring, and the shading: it stays with the lamp while the marks turn.
+/// What changes over more than a quarter of the turn counts as shading, its marks cut off.
+void flatten(float* row) {
+  constexpr int kReach = kSpokes / 8;
+  const float level = median_of(row, kSpokes);
+  std::array<float, kSpokes> size;
+  for (int i = 0; i < kSpokes; ++i) {
+    row[i] -= level;
+    size[static_cast<std::size_t>(i)] = std::abs(row[i]);
+  }
+  const float most = 2.0F * median_of(size.data(), kSpokes);
+  std::array<float, kSpokes> shade;
+  float sum = 0.0F;
+  const auto cut = [&](int i) { return std::clamp(row[(i + kSpokes) % kSpokes], -most, most); };
+  for (int i = -kReach; i <= kReach; ++i) sum += cut(i);
+  for (int i = 0; i < kSpokes; ++i) {
+    shade[static_cast<std::size_t>(i)] = sum / (2 * kReach + 1);
+    sum += cut(i + kReach + 1) - cut(i - kReach);
+  }
+  for (int i = 0; i < kSpokes; ++i) row[i] -= shade[static_cast<std::size_t>(i)];
+}
+
 }  // namespace
 
 SpinProfile::Polar SpinProfile::unroll(const cv::Mat& luma, const Ellipse& rim) {
@@ -47,14 +69,19 @@ SpinProfile::Polar SpinProfile::unroll(const cv::Mat& luma, const Ellipse& rim) 
     return d;
   }();
   for (int ring = 0; ring < kRings; ++ring) {
-    const Eigen::Matrix2d shape = ring_radius(ring) * rim.shape_px;
     float* row = polar.data() + ring * kSpokes;
-    for (std::size_t i = 0; i < kSpokes; ++i) {
-      const Eigen::Vector2d p = rim.centre_px + shape * kDirections[i];
-      row[i] = sample(luma, p.x(), p.y());
+    // All of the ring's width: a mark smaller than that must not fall between two.
+    constexpr int kAcross = 3;
+    for (int k = 0; k < kAcross; ++k) {
+      const double part = (k + 0.5) / kAcross - 0.5;
+      const Eigen::Matrix2d shape =
+          (ring_radius(ring) + part * (kOutermost - kInnermost) / (kRings - 1)) * rim.shape_px;
+      for (std::size_t i = 0; i < kSpokes; ++i) {
+        const Eigen::Vector2d p = rim.centre_px + shape * kDirections[i];
+        row[i] += sample(luma, p.x(), p.y()) / kAcross;
+      }
     }
-    const float level = median_of(row, kSpokes);
-    for (int i = 0; i < kSpokes; ++i) row[i] -= level;
+    flatten(row);
   }
   return polar;
 }
@@ -74,8 +101,9 @@ std::optional<SpinProfile> SpinProfile::from_face(const cv::Mat& luma, const Ell
   std::vector<float> size;
   for (const float v : profile.reference_) size.push_back(std::abs(v));
   std::sort(size.begin(), size.end());
-  // A mark covers at least a hundredth of the face; brighter or darker single samples are noise.
-  const float strongest = size[size.size() * 99 / 100];
+  // Even a small mark holds a few samples; brighter or darker single ones are noise.
+  constexpr std::size_t kFew = 6;
+  const float strongest = size[size.size() - kFew];
   if (strongest < std::max(15.0, 6.0 * noise_levels)) return std::nullopt;
   profile.threshold_ = 0.35F * strongest;  // shading moves with the light, not with the face
   profile.cut(profile.reference_);
