@@ -131,17 +131,6 @@ class CylinderFinder final : public BodyFinder {
     if (motion_.rotation() < 0 || pivoted_) return std::nullopt;
     return tracking::mirrored(camera_, motion_, pose);
   }
-  [[nodiscard]] std::optional<Sighting> mirrored(const Look& look,
-                                                 const Sighting& seen) const override {
-    const auto image = seen.pose ? mirror_image(seen.pose->pose) : std::nullopt;
-    if (!image) return std::nullopt;
-    Sighting guess = seen;
-    guess.pose->pose = *image;
-    Look there = look;
-    there.predicted = &guess;
-    return find(there);
-  }
-
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
     try {
       const Eigen::Vector3d at = camera_.table_from_image(at_px, body_.half_thickness_m());

@@ -45,12 +45,6 @@ class BodyFinder {
   [[nodiscard]] virtual std::optional<Sighting> find(const Look& look) const = 0;
   /// Puts centre and rim of a guessed sighting where its pose, if it has one, would be seen.
   virtual void place(Sighting& guess) const = 0;
-  /// Measures the other tilt with nearly the same silhouette, mirrored at the line of sight;
-  /// nothing where there is none.
-  [[nodiscard]] virtual std::optional<Sighting> mirrored(const Look& /*look*/,
-                                                         const Sighting& /*seen*/) const {
-    return std::nullopt;
-  }
   /// The other tilt with nearly the same silhouette, nothing where there is none.
   [[nodiscard]] virtual std::optional<data::Pose<>> mirror_image(
       const data::Pose<>& /*pose*/) const {

@@ -172,6 +172,7 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   constexpr std::size_t kMostTries = 3;
+  constexpr double kLeastEvidence = 0.55;
   if (candidates.size() > kMostTries) candidates.resize(kMostTries);
   std::optional<Sighting> best;
   for (const Candidate& candidate : candidates) {
@@ -180,6 +181,7 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
     if (!seen || seen->accepted < std::min(0.5, 0.7 * usual_accepted_) ||
         clarity(*seen) < 0.5 * usual_clarity_)
       continue;
+    if (seen->pose && seen->pose->evidence < kLeastEvidence * usual_evidence_) continue;
     if (wholeness(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
         is_other(seen->centre_px, others))
       continue;
@@ -227,13 +229,18 @@ std::optional<Sighting> Follower::follow(const Frame& frame, const Others& other
   if (inside(predicted.centre_px, frame.luma.size(), 0.5 * usual_major_px_))
     seen = look_near(frame, predicted, others);
   if (!seen) {
-    seen = look_about(frame, predicted, others);
-  } else if (misgiving(*seen)) {
+    constexpr int kAwhile = 12, kEvery = 3;
+    if (lost_ < kAwhile || lost_ % kEvery == 0) seen = look_about(frame, predicted, others);
+  } else if (misgiving(*seen) && --patience_ <= 0) {
     constexpr double kClearlyMore = 1.05;
+    constexpr int kLongest = 16;
     auto anywhere = look_about(frame, predicted, others);
-    if (anywhere && anywhere->pose &&
-        anywhere->pose->evidence > kClearlyMore * seen->pose->evidence)
-      seen = std::move(anywhere);
+    const bool helps = anywhere && anywhere->pose &&
+                       anywhere->pose->evidence > kClearlyMore * seen->pose->evidence;
+    if (helps) seen = std::move(anywhere);
+    // Searches that keep finding nothing better are made ever more rarely.
+    futile_ = helps ? 0 : std::min(kLongest, 2 * futile_ + 1);
+    patience_ = futile_;
   }
   if (!seen) {
     ++lost_;

@@ -59,6 +59,7 @@ class Follower {
   double usual_clarity_ = 0.0;   ///< of the seed
   double usual_evidence_ = 0.0;  ///< of the pose, running mean
   int lost_ = 0;
+  int futile_ = 0, patience_ = 0;  ///< frames to wait before searching in spite of a sighting
 };
 
 }  // namespace trochoid::tracking

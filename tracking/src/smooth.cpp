@@ -130,8 +130,8 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
   const Filtered f = filter(s, likeliest_density(s, free_scale));
   const double scale = free_scale ? std::sqrt(f.square / std::max(1, f.counted)) : 1.0;
   std::vector<SmoothState> result(t_s.size());
-  State x;
-  Square P;
+  State x = State::Zero();
+  Square P = Square::Zero();
   for (std::size_t i = t_s.size(); i-- > 0;) {
     const Moment& m = f.moments[i];
     if (i + 1 == t_s.size()) {

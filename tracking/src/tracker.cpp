@@ -10,7 +10,6 @@
 #include "attitude_sequence.hpp"
 #include "body_search.hpp"
 #include "recording.hpp"
-#include "seed_trial.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -145,7 +144,6 @@ class Tracking {
         seed = find_seed(held, background_, *finder_, explained_);
     }
     if (!seed) return false;
-    seed = better_reading(held, background_, *finder_, std::move(*seed));
     BodyPath path;
     if (!seed->seen.pose) path.marks = marks_of(held[seed->held_index], seed->seen);
     if (path.marks) seed->seen.turned_rad = 0.0, seed->seen.turned_sigma_rad = 0.01;
