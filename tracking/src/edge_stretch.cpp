@@ -29,9 +29,9 @@ struct Noise {
 // One profile with the sums over its model columns and what they say.
 struct Working {
   bool usable = false;
-  float inner = 0.0f, outer = 0.0f;  // levels of the plain step
-  std::array<std::array<float, kAll>, kAll> normal{};
-  std::array<float, kAll> right{};
+  float inner = 0.0f, outer = 0.0f;                  // levels of the plain step
+  std::array<std::array<float, kAll>, kAll> normal;  // lower triangle
+  std::array<float, kAll> right;
   float square = 0.0f;
   Shading shading = Shading::Zero();
   ShadingMatrix shading_covariance = ShadingMatrix::Zero();
@@ -75,21 +75,31 @@ bool plain_levels(const StretchProfile& p, const Columns& c, Working& w) {
 
 // Sums of all columns; the right side is what the plain step leaves.
 void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
+  // Samples along the first index, so that the sums are dot products of whole vectors.
+  Eigen::Matrix<float, Profile::kMost, kAll + 1> rows;
   const auto inverse_blur = static_cast<float>(1.0 / p.blur_px);
-  for (int j = 0; j < p.profile.count; ++j) {
+  const int count = p.profile.count, whole = (count + 3) / 4 * 4;
+  for (int j = 0; j < count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px(j), ground = c.ground[k];
     const float a = 1.0f - c.share[k], b = c.share[k] * ground;
     const float d = (w.inner - w.outer * ground) * c.density[k];
-    const std::array<float, kAll> row{
-        a, b, d, s * a, s * b, s * s * a, s * s * b, c.strip[k], d * s * inverse_blur};
-    const float rest = p.profile.light[k] - w.inner * a - w.outer * b;
-    for (size_t m = 0; m < kAll; ++m) {
-      for (size_t n = 0; n <= m; ++n) w.normal[m][n] += row[m] * row[n];
-      w.right[m] += row[m] * rest;
-    }
-    w.square += rest * rest;
+    const float sa = s * a, sb = s * b;
+    rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
+    rows(j, 3) = sa, rows(j, 4) = sb, rows(j, 5) = s * sa, rows(j, 6) = s * sb;
+    rows(j, 7) = c.strip[k], rows(j, 8) = d * s * inverse_blur;
+    rows(j, kAll) = p.profile.light[k] - w.inner * a - w.outer * b;
   }
+  rows.middleRows(count, whole - count).setZero();
+  const auto sum = [&](int m, int n) {
+    return rows.col(m).head(whole).dot(rows.col(n).head(whole));
+  };
+  for (int m = 0; m < kAll; ++m) {
+    for (int n = 0; n <= m; ++n)
+      w.normal[static_cast<size_t>(m)][static_cast<size_t>(n)] = sum(m, n);
+    w.right[static_cast<size_t>(m)] = sum(m, kAll);
+  }
+  w.square = sum(kAll, kAll);
 }
 
 // Largest slopes [per px] and bends [per px^2] of the light, as shares of it.
@@ -231,28 +241,32 @@ std::vector<std::array<float, 2>> noise_of_neighbours(const std::vector<Working>
 // The offset with slopes given, samples weighed by the noise of their side.
 void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>& noise,
                 const Working& w) {
-  std::array<float, 6> n{};  // lower triangle of a, b, d
-  std::array<float, kOwn> r{};
-  std::array<std::array<float, kShading>, kOwn> cross{};
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float beside = p.strip_px > 0.0 ? v[4] : 0.0f;  // of the edge the strip's level counts
-  for (int j = 0; j < p.profile.count; ++j) {
+  // a, b, d and the residual, the first three with their weights beside; then the shading.
+  Eigen::Matrix<float, Profile::kMost, 4 + kOwn + kShading> rows;
+  const int count = p.profile.count, whole = (count + 3) / 4 * 4;
+  for (int j = 0; j < count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px(j), ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
     const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
     const float weight = 1.0f / (noise[0] + share * (noise[1] - noise[0]));
-    const float rest = p.profile.light[k] - inner * a - outer * b - v[4] * c.strip[k];
-    const std::array<float, kOwn> row{a, b, (inner + beside - outer * ground) * c.density[k]};
-    const std::array<float, kShading> shading{s * a, s * b, s * s * a, s * s * b, c.strip[k]};
-    size_t at = 0;
-    for (size_t i = 0; i < kOwn; ++i) {
-      const float wr = weight * row[i];
-      for (size_t l = 0; l <= i; ++l) n[at++] += wr * row[l];
-      r[i] += wr * rest;
-      for (size_t l = 0; l < kShading; ++l) cross[i][l] += wr * shading[l];
-    }
+    const float d = (inner + beside - outer * ground) * c.density[k];
+    const float sa = s * a, sb = s * b;
+    rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
+    rows(j, 3) = p.profile.light[k] - inner * a - outer * b - v[4] * c.strip[k];
+    rows(j, 4) = weight * a, rows(j, 5) = weight * b, rows(j, 6) = weight * d;
+    rows(j, 7) = sa, rows(j, 8) = sb, rows(j, 9) = s * sa, rows(j, 10) = s * sb;
+    rows(j, 11) = c.strip[k];
   }
+  rows.middleRows(count, whole - count).setZero();
+  const auto sum = [&](int m, int l) {
+    return rows.col(m).head(whole).dot(rows.col(l).head(whole));
+  };
+  // Lower triangle of a, b, d; their right side; the shading they go with.
+  const std::array<float, 6> n{sum(4, 0), sum(5, 0), sum(5, 1), sum(6, 0), sum(6, 1), sum(6, 2)};
+  const std::array<float, kOwn> r{sum(4, 3), sum(5, 3), sum(6, 3)};
   const float determinant = n[0] * n[2] - n[1] * n[1];
   p.found = false;
   if (!(determinant > 1e-4f * n[0] * n[2])) return;
@@ -264,8 +278,8 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   const double offset = (r[2] - in * r[0] - out * r[1]) / information;
   if (!(std::abs(offset) <= p.reach_px)) return;
   Shading pull;
-  for (size_t l = 0; l < kShading; ++l)
-    pull[static_cast<int>(l)] = (cross[2][l] - in * cross[0][l] - out * cross[1][l]) / information;
+  for (int l = 0; l < kShading; ++l)
+    pull[l] = (sum(6, 7 + l) - in * sum(4, 7 + l) - out * sum(5, 7 + l)) / information;
   ProfileEdge& e = p.edge;
   e.offset_px = offset;
   e.noise_variance_px2 = 1.0 / static_cast<double>(information);

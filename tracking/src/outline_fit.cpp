@@ -23,7 +23,7 @@ constexpr double kFarBlurPx = 2.5, kNearBlurPx = 1.0;
 constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, 0.1, false};
 constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
 // From a prediction: where the last sharp look then starts.
-constexpr Search kDraw{1.3, 4.5, 3.5, 4.0, 2, 0.5, false};
+constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 2, 0.5, false};
 // Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
 Search exact(double blur_px, double outline_px) {
   constexpr double kLeastStepPx = 1.25, kPoints = 200.0;
@@ -31,7 +31,7 @@ Search exact(double blur_px, double outline_px) {
           2.0 + 2.5 * blur_px,
           0.5 + 2.0 * blur_px,
           std::max(kLeastStepPx, outline_px / kPoints),
-          4,
+          5,
           0.06,
           true};
 }

@@ -140,65 +140,93 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
 
 // Edges of the silhouette, each by itself.
 void collect_roughly(const Scenery& scenery, const std::vector<OutlineSample>& all,
-                     const Search& search, bool colour, Refined& out, std::vector<double>& seen) {
+                     const Search& search, bool colour, Refined& out) {
   StretchProfile look;
   for (size_t i = 0; i < all.size(); ++i)
     if (all[i].silhouette && look_at(scenery, all[i], search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
       keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
-      seen[i] = std::max(seen[i], certainty(look.edge, look.edge.offset_px, kSeenWithinPx));
+      out.places.push_back(i);
     }
 }
 
+// What one round looked at.
+struct Round {
+  std::vector<OutlineSample> outline;
+  std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
+  std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
+};
+
 // All edges, also those between two surfaces of the body; returns what the blur should grow by.
-double collect_exactly(const Scenery& scenery, const std::vector<OutlineSample>& all,
-                       const Search& search, bool colour, Refined& out, std::vector<double>& seen) {
-  std::vector<size_t> places;
-  std::vector<StretchProfile> looks(all.size());
-  size_t count = 0;
+double collect_exactly(const Scenery& scenery, const Search& search, bool colour, Round& round,
+                       Refined& out) {
+  const std::vector<OutlineSample>& all = round.outline;
+  std::vector<StretchProfile>& looks = round.looks[colour ? 1 : 0];
+  std::vector<size_t>& places = round.places[colour ? 1 : 0];
+  places.clear();
+  looks.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i)
-    if ((all[i].silhouette || !colour) && look_at(scenery, all[i], search, colour, looks[count]))
-      places.push_back(i), ++count;
-  looks.resize(count);
+    if ((all[i].silhouette || !colour) &&
+        look_at(scenery, all[i], search, colour, looks[places.size()]))
+      places.push_back(i);
+  looks.resize(places.size());
   const double wider = fit_stretches(looks);
   const std::vector<Surroundings> around = surroundings_of(looks);
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i].edge, colour);
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
     keep(sample, looks[i].edge, equation, out);
-    // A plain step or nothing: slopes can make an edge of any penumbra.
-    ProfileEdge plain;
-    if (sample.silhouette &&
-        fit_edge(looks[i].profile, looks[i].blur_px, looks[i].plate, kSeenReachPx, plain))
-      seen[places[i]] = std::max(seen[places[i]], certainty(plain, plain.offset_px, kSeenWithinPx));
+    out.places.push_back(places[i]);
   }
   return wider;
 }
 
-bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, Refined& out) {
-  const auto all =
-      outline_samples(scenery.body, pose, scenery.camera, scenery.motion, search.step_px);
+bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, double step_px,
+             Round& round, Refined& out) {
+  round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion, step_px);
   out.outline_px = 0.0;
-  for (const OutlineSample& sample : all)
+  for (const OutlineSample& sample : round.outline)
     if (sample.silhouette) out.outline_px += sample.arc_px;
   out.samples.clear();
   out.edges.clear();
   out.equations.clear();
-  std::vector<double> seen(all.size(), 0.0);
+  out.places.clear();
   for (const bool colour : {false, true}) {
     if (colour && scenery.colour.empty()) continue;
     if (!search.exact) {
-      collect_roughly(scenery, all, search, colour, out, seen);
-    } else {
-      const double wider = collect_exactly(scenery, all, search, colour, out, seen);
-      if (!colour) out.wider_px = wider;
+      collect_roughly(scenery, round.outline, search, colour, out);
+      continue;
     }
+    const double wider = collect_exactly(scenery, search, colour, round, out);
+    if (!colour) out.wider_px = wider;
   }
-  out.seen_px = 0.0;
-  for (size_t i = 0; i < all.size(); ++i) out.seen_px += seen[i] * all[i].arc_px;
-  return !all.empty();
+  return !round.outline.empty();
+}
+
+// Length of the silhouette with an edge exactly there; a place seen in luma and in colour counts
+// once, by the better of the two.
+double seen_px(const Search& search, const Round& round, const Refined& refined) {
+  std::vector<double> seen(round.outline.size(), 0.0);
+  const auto count = [&](size_t place, const ProfileEdge& edge) {
+    seen[place] = std::max(seen[place], certainty(edge, edge.offset_px, kSeenWithinPx));
+  };
+  if (!search.exact)
+    for (size_t i = 0; i < refined.edges.size(); ++i) count(refined.places[i], refined.edges[i]);
+  // A plain step or nothing: slopes can make an edge of any penumbra.
+  for (size_t channel = 0; search.exact && channel < 2; ++channel)
+    for (size_t i = 0; i < round.places[channel].size(); ++i) {
+      const size_t place = round.places[channel][i];
+      const StretchProfile& look = round.looks[channel][i];
+      ProfileEdge plain;
+      if (look.found && round.outline[place].silhouette &&
+          fit_edge(look.profile, look.blur_px, look.plate, kSeenReachPx, plain))
+        count(place, plain);
+    }
+  double sum = 0.0;
+  for (size_t i = 0; i < seen.size(); ++i) sum += seen[i] * round.outline[i].arc_px;
+  return sum;
 }
 
 }  // namespace
@@ -210,16 +238,30 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   const int n = scenery.motion.count();
   PoseMotion::Step prior(n);
   for (int i = 0; i < n; ++i) prior[i] = scenery.motion.scale(i);
+  const double least_scale_px = 0.15 * search.blur_px;
+  Round round;
+  // The first exact rounds only lead to where the last one looks: every second point does.
+  constexpr double kSparse = 2.0;
+  bool last = !search.exact;
   for (int i = 0; i < search.iterations; ++i) {
-    if (!collect(scenery, out.pose, search, out)) return std::nullopt;
-    if (!solve_robustly(out.equations, prior, 0.15 * search.blur_px, search.exact, out.solution))
+    const double step_px = last ? search.step_px : kSparse * search.step_px;
+    if (!collect(scenery, out.pose, search, step_px, round, out)) return std::nullopt;
+    const bool uncertainty = last && search.exact;
+    if (!solve_robustly(out.equations, prior, least_scale_px,
+                        {.directions = search.exact, .uncertainty = uncertainty}, out.solution))
       return std::nullopt;
     out.pose = scenery.motion.moved(out.pose, out.solution.step);
     double moved2 = 0.0;
     for (const auto& e : out.equations) moved2 += std::pow(e.motion.dot(out.solution.step), 2);
-    if (moved2 < search.settled_px * search.settled_px * static_cast<double>(out.equations.size()))
-      break;
+    const double settled2 =
+        search.settled_px * search.settled_px * static_cast<double>(out.equations.size());
+    const bool settled = moved2 < settled2;
+    // Linear sums about a predicted edge bear a small step at most.
+    constexpr double kLinear = 2.5;
+    if (last && (settled || (search.exact && moved2 < kLinear * kLinear * settled2))) break;
+    last = last || settled || i + 2 >= search.iterations;
   }
+  out.seen_px = seen_px(search, round, out);
   double accepted_px = 0.0;
   for (size_t i = 0; i < out.equations.size(); ++i)
     if (out.samples[i].silhouette && out.equations[i].weight > 0.5)

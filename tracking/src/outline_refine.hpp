@@ -51,10 +51,11 @@ struct Refined {
   std::vector<OutlineSample> samples;  ///< those with an edge
   std::vector<ProfileEdge> edges;
   std::vector<EdgeEquation> equations;
-  double outline_px = 0.0;  ///< length of the predicted silhouette
-  double seen_px = 0.0;     ///< of it, with an edge exactly there
-  double covered = 0.0;     ///< share of the predicted outline with an accepted edge
-  double wider_px = 0.0;    ///< exact: by how much the edges are wider than the model's
+  std::vector<size_t> places;  ///< along the outline of all samples
+  double outline_px = 0.0;     ///< length of the predicted silhouette
+  double seen_px = 0.0;        ///< of it, with an edge exactly there
+  double covered = 0.0;        ///< share of the predicted outline with an accepted edge
+  double wider_px = 0.0;       ///< exact: by how much the edges are wider than the model's
 };
 
 /// Iterates edges and pose; nothing if too few edges are found.

@@ -252,7 +252,8 @@ struct Solving {
 }  // namespace
 
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, bool directions, RobustSolution& out) {
+                    double least_scale_px, const RobustOptions& options, RobustSolution& out) {
+  const bool directions = options.directions;
   constexpr size_t kFewest = 8;
   if (equations.size() < kFewest) return false;
   const auto n = static_cast<int>(prior_sd.size());
@@ -265,7 +266,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   if (!solving.run()) return false;
   Eigen::MatrixXd inverse;
   Vector variances{};
-  if (directions) variances = solving.variances(inverse);
+  if (options.uncertainty) variances = solving.variances(inverse);
   const double scale = solving.scale;
   double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0, z2 = 0.0;
   for (size_t i = 0; i < equations.size(); ++i) {
@@ -286,7 +287,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   out.colour_shift_px = {of(n + 3), of(n + 4)};
   out.rms_px = std::sqrt(square / weight);
   out.accepted = accepted / arc;
-  if (!directions) return true;
+  if (!options.uncertainty) return true;
   const double scale2 = std::max(z2 / weight, 1.0);
   // Of each unknown the share that the edges determine and not the prior.
   double fitted = 0.0;

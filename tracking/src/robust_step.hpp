@@ -42,11 +42,14 @@ struct RobustSolution {
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
 };
 
+struct RobustOptions {
+  bool directions;   ///< allow for what the edge models may be wrong by in every direction
+  bool uncertainty;  ///< give covariance and correlation; needs `directions`
+};
+
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
 /// `prior_sd` per parameter. False if fewer than 8 equations.
-/// @param directions also allow for what the edge models may be wrong by in every direction, and
-/// give the covariance; without, the step alone: enough for drawing a pose towards edges.
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, bool directions, RobustSolution& out);
+                    double least_scale_px, const RobustOptions& options, RobustSolution& out);
 
 }  // namespace trochoid::tracking

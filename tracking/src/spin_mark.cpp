@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -15,6 +16,22 @@ namespace {
 constexpr int kRings = 12, kSpokes = 256;
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kSpoke_rad = kTurn / kSpokes;
+
+// Cosine and sine of every spoke.
+struct Spokes {
+  std::array<float, kSpokes> cosine, sine;
+  Spokes() {
+    for (size_t i = 0; i < kSpokes; ++i) {
+      const double angle = kSpoke_rad * static_cast<double>(i);
+      cosine[i] = static_cast<float>(std::cos(angle));
+      sine[i] = static_cast<float>(std::sin(angle));
+    }
+  }
+};
+const Spokes& spokes() {
+  static const Spokes table;
+  return table;
+}
 
 using Face = Eigen::Matrix<float, kRings, kSpokes, Eigen::RowMajor>;
 
@@ -63,8 +80,9 @@ Face unroll(const cv::Mat& luma, const Band& band, const data::Body& body,
   const Eigen::Vector3d along = node_line(pose), across = axis.cross(along);
   Face face;
   for (int i = 0; i < kSpokes; ++i) {
-    const Eigen::Vector3d out =
-        std::cos(kSpoke_rad * i) * along + std::sin(kSpoke_rad * i) * across;
+    const auto k = static_cast<size_t>(i);
+    const Eigen::Vector3d out = static_cast<double>(spokes().cosine[k]) * along +
+                                static_cast<double>(spokes().sine[k]) * across;
     for (int ring = 0; ring < kRings; ++ring)
       face(ring, i) =
           sample(luma, camera.image_from_table<double>(centre + band.radius_m(ring) * out));
@@ -74,17 +92,22 @@ Face unroll(const cv::Mat& luma, const Band& band, const data::Body& body,
 
 // How much of each sample the marks cover at psi = 0, blurred by `blur_m`.
 Face coverage(const Band& band, double blur_m) {
+  constexpr double kFar = 5.0;  // blurs from the mark there is none of it
   Face cover = Face::Zero();
   for (const data::SpinMark& mark : band.marks)
-    for (int ring = 0; ring < kRings; ++ring)
-      for (int i = 0; i < kSpokes; ++i) {
-        const double radius = band.radius_m(ring), angle = kSpoke_rad * i - mark.angle_rad;
-        const double apart =
-            std::sqrt(std::max(0.0, radius * radius + mark.distance_m * mark.distance_m -
-                                        2.0 * radius * mark.distance_m * std::cos(angle)));
-        cover(ring, i) += static_cast<float>(
-            0.5 * std::erfc((apart - mark.size_m) / (std::numbers::sqrt2 * blur_m)));
+    for (int i = 0; i < kSpokes; ++i) {
+      const double cosine = std::cos(kSpoke_rad * i - mark.angle_rad);
+      for (int ring = 0; ring < kRings; ++ring) {
+        const double radius = band.radius_m(ring);
+        const double apart2 = radius * radius + mark.distance_m * mark.distance_m -
+                              2.0 * radius * mark.distance_m * cosine;
+        const double far = mark.size_m + kFar * blur_m;
+        if (apart2 > far * far) continue;
+        const double beyond = std::sqrt(std::max(0.0, apart2)) - mark.size_m;
+        cover(ring, i) +=
+            static_cast<float>(0.5 * std::erfc(beyond / (std::numbers::sqrt2 * blur_m)));
       }
+    }
   return cover;
 }
 
@@ -96,8 +119,8 @@ void level(const Band& band, Face& face) {
     face.row(ring).array() -= face.row(ring).mean();
     const auto radius = static_cast<float>(band.radius_m(ring));
     for (int i = 0; i < kSpokes; ++i) {
-      const auto angle = static_cast<float>(kSpoke_rad * i);
-      const Eigen::Vector2f slope(radius * std::cos(angle), radius * std::sin(angle));
+      const auto k = static_cast<size_t>(i);
+      const Eigen::Vector2f slope(radius * spokes().cosine[k], radius * spokes().sine[k]);
       normal += slope * slope.transpose();
       right += face(ring, i) * slope;
     }
@@ -106,8 +129,8 @@ void level(const Band& band, Face& face) {
   for (int ring = 0; ring < kRings; ++ring) {
     const auto radius = static_cast<float>(band.radius_m(ring));
     for (int i = 0; i < kSpokes; ++i) {
-      const auto angle = static_cast<float>(kSpoke_rad * i);
-      face(ring, i) -= radius * (slope[0] * std::cos(angle) + slope[1] * std::sin(angle));
+      const auto k = static_cast<size_t>(i);
+      face(ring, i) -= radius * (slope[0] * spokes().cosine[k] + slope[1] * spokes().sine[k]);
     }
   }
 }
@@ -120,24 +143,26 @@ void weigh(const Band& band, Face& face) {
 
 std::vector<float> correlations(const Face& face, const Face& marks) {
   std::vector<float> sums(kSpokes, 0.0F);
-  for (int ring = 0; ring < kRings; ++ring)
-    for (int i = 0; i < kSpokes; ++i) {
-      const float m = marks(ring, i);
-      if (std::abs(m) < 1e-3F) continue;
-      for (int s = 0; s < kSpokes; ++s)
-        sums[static_cast<size_t>(s)] += m * face(ring, (i + s) % kSpokes);
+  std::array<float, 2 * kSpokes> twice;  // a turn and the next: no index wraps
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (size_t i = 0; i < twice.size(); ++i) twice[i] = face(ring, static_cast<int>(i % kSpokes));
+    for (size_t i = 0; i < kSpokes; ++i) {
+      const float m = marks(ring, static_cast<int>(i));
+      for (size_t s = 0; s < kSpokes; ++s) sums[s] += m * twice[i + s];
     }
+  }
   return sums;
 }
 
 double turn_power(const Face& marks) {
   double power = 0.0;
   for (int ring = 0; ring < kRings; ++ring)
-    for (int i = 0; i < kSpokes; ++i)
-      power +=
-          std::pow((marks(ring, (i + 1) % kSpokes) - marks(ring, (i + kSpokes - 1) % kSpokes)) /
-                       (2.0 * kSpoke_rad),
-                   2);
+    for (int i = 0; i < kSpokes; ++i) {
+      const double slope =
+          (marks(ring, (i + 1) % kSpokes) - marks(ring, (i + kSpokes - 1) % kSpokes)) /
+          (2.0 * kSpoke_rad);
+      power += slope * slope;
+    }
   return power;
 }
 
