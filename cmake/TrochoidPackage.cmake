@@ -31,11 +31,11 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME trochoid)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "track, simulate and fit spinning and rolling discs and rings
- Follows the centre of mass of a coin, disc or ring in a top-view recording,
- tells which rigid-body model explains its path, with which parameters and
- error bars, and draws prediction and observation into the video. With a
- Python package of the same functions.")
+# The first line of a Debian description, the synopsis, is the project's.
+set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Follows the centre of mass of a coin, disc or ring in a top-view recording,
+tells which rigid-body model explains its path, with which parameters and
+error bars, and draws prediction and observation into the video. With a
+Python package of the same functions.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "ffmpeg")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "gnuplot-nox, libtrochoid-dev")
@@ -48,9 +48,8 @@ endif()
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libtrochoid-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "libraries of trochoid: headers and static libraries
- Models of spinning and rolling bodies, their integrators, the tracker and the
- fit, for find_package(trochoid COMPONENTS data model fitting tracking).")
+set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "Headers and static libraries: models of spinning and rolling bodies, their integrators, the tracker and the
+fit, for find_package(trochoid COMPONENTS data model fitting tracking).")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "libeigen3-dev, libfmt-dev, nlohmann-json3-dev, libtomlplusplus-dev, libssl-dev, libsundials-dev, libceres-dev")
 if(TROCHOID_TRACKING)
