@@ -14,6 +14,7 @@ void add_simulate_command(CLI::App& app);
 void add_manual_command(CLI::App& app);
 void add_fit_command(CLI::App& app);
 void add_study_command(CLI::App& app);
+void add_study_chain(CLI::App& study);
 void add_study_fits(CLI::App& study);
 void add_study_reference(CLI::App& study);
 void add_report_command(CLI::App& app);
