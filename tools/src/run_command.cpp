@@ -13,6 +13,7 @@
 #include "report.hpp"
 #include "report_parts.hpp"
 #include "run_folder.hpp"
+#include "track_effort.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/compare.hpp"
@@ -29,7 +30,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string video, scene, camera, output, model, from, to, effort = "normal";
+  std::string video, scene, camera, output, model, from, to;
+  tracking::Effort effort = tracking::Effort::normal;
   int objects = 0;
   double rate_hz = 0.0, slow = 0.0;
   std::uint64_t seed = 1;
@@ -85,6 +87,7 @@ void track(Run& run, const Options& options) {
   how.objects = run.scene.tracking.objects;
   how.from = options.from;
   how.to = options.to;
+  how.effort = options.effort;
   how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
   run.tracked = tracking::track_video(options.video, run.scene, run.camera, how);
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
@@ -101,7 +104,7 @@ fitting::FitOptions fit_options(const Options& options, Progress& progress) {
   fitting::FitOptions how;
   how.free_pivot = options.free_pivot;
   how.seed = options.seed;
-  if (options.effort == "thorough") {
+  if (options.effort == tracking::Effort::exact) {
     how.profile = true;
     how.bootstrap = 200;
   }
@@ -123,7 +126,7 @@ void fit(Run& run, const Options& options) {
   fitting::FitOptions how = fit_options(options, progress);
   try {
     // The quick way takes the model the support suggests, the others compare what could apply.
-    if (named || options.effort == "quick") {
+    if (named || options.effort == tracking::Effort::quick) {
       run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
     } else {
       fitting::Comparison comparison = fitting::compare(run.tracked.file.tracks, run.scene, how);
@@ -216,7 +219,7 @@ std::string command_line(const Options& options) {
   add("--to", options.to);
   if (options.objects > 0) add("--objects", std::to_string(options.objects));
   if (options.rate_hz > 0.0) add("--rate", fmt::format("{:g}", options.rate_hz));
-  if (options.effort != "normal") add("--effort", options.effort);
+  if (options.effort != tracking::Effort::normal) add("--effort", effort_name(options.effort));
   if (options.free_pivot) line += " --free-pivot";
   if (options.slow > 0.0) add("--slow", fmt::format("{:g}", options.slow));
   if (options.seed != 1) add("--seed", std::to_string(options.seed));
@@ -333,11 +336,10 @@ void add_run_command(CLI::App& app) {
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz], where the file's is not (slow motion)")
       ->check(positive_number());
-  command
-      ->add_option("--effort", options->effort,
-                   "quick: one model; normal: compare models; thorough: also profile likelihoods "
-                   "and bootstrap")
-      ->check(CLI::IsMember({"quick", "normal", "thorough"}));
+  add_effort(
+      *command, options->effort,
+      "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
+      "likelihoods and bootstrap");
   command->add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
   command
       ->add_option("--slow", options->slow,

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
+#include "track_effort.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/smooth.hpp"
@@ -24,6 +25,7 @@ struct Options {
   int objects = 0;
   std::string from, to, at;
   double rate_hz = 0.0;
+  tracking::Effort effort = tracking::Effort::normal;
 };
 
 Eigen::Vector2d parse_point(const std::string& text) {
@@ -66,6 +68,7 @@ void run(const Options& options) {
   how.objects = scene.tracking.objects;
   how.from = options.from;
   how.to = options.to;
+  how.effort = options.effort;
   if (!options.edges.empty()) how.edges = options.edges;
   tracking::TrackResult result;
   {
@@ -117,6 +120,9 @@ void add_track_command(CLI::App& app) {
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz], where the file's is not (slow motion)")
       ->check(positive_number());
+  add_effort(
+      *track, options->effort,
+      "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
   track->add_option("-o,--output", options->output, "Track CSV to write")->required();
   track->callback([options] { run(*options); });
 }

@@ -81,14 +81,14 @@ class RimFinder final : public BodyFinder {
 class CylinderFinder final : public BodyFinder {
  public:
   CylinderFinder(const data::Body& body, const data::Support& support, const data::Camera& camera,
-                 double exposure_fraction)
+                 double exposure_fraction, Effort effort)
       : body_(body),
         camera_(camera),
         exposure_fraction_(exposure_fraction),
         alike_(body.faces_look_alike() && support.kind != data::SupportKind::pivot),
         pivoted_(support.kind == data::SupportKind::pivot),
         motion_(body, support, camera),
-        fitter_(body, support, camera) {}
+        fitter_(body, support, camera, effort) {}
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     const OutlineEvidence evidence{
@@ -201,8 +201,8 @@ std::unique_ptr<BodyFinder> make_rim_finder(bool circle) {
 std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,
                                                  const data::Support& support,
                                                  const data::Camera& camera,
-                                                 double exposure_fraction) {
-  return std::make_unique<CylinderFinder>(body, support, camera, exposure_fraction);
+                                                 double exposure_fraction, Effort effort) {
+  return std::make_unique<CylinderFinder>(body, support, camera, exposure_fraction, effort);
 }
 
 }  // namespace trochoid::tracking

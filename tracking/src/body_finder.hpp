@@ -69,6 +69,7 @@ class BodyFinder {
 [[nodiscard]] std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,
                                                                const data::Support& support,
                                                                const data::Camera& camera,
-                                                               double exposure_fraction);
+                                                               double exposure_fraction,
+                                                               Effort effort = Effort::normal);
 
 }  // namespace trochoid::tracking

@@ -25,12 +25,11 @@ constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
 // From a prediction: where the last sharp look then starts.
 constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 2, 0.5, false};
 // Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
-Search exact(double blur_px, double outline_px) {
-  constexpr double kLeastStepPx = 1.25, kPoints = 200.0;
+Search exact(const Sampling& sampling, double blur_px, double outline_px) {
   return {blur_px,
           2.0 + 2.5 * blur_px,
           0.5 + 2.0 * blur_px,
-          std::max(kLeastStepPx, outline_px / kPoints),
+          std::max(sampling.least_step_px, outline_px / sampling.points),
           5,
           0.06,
           true};
@@ -64,7 +63,7 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
   double blur_px = known_blur_px.value_or(kUsualBlurPx);
   data::Pose<> pose = start;
   for (int round = 0; round < 3; ++round) {
-    auto refined = refine(scenery, pose, exact(blur_px, outline_px));
+    auto refined = refine(scenery, pose, exact(scenery.sampling, blur_px, outline_px));
     if (!refined) return std::nullopt;
     out.refined = std::move(*refined);
     out.blur_px = std::clamp(blur_px + out.refined.wider_px, kSharpestPx, kWidestPx);
@@ -206,8 +205,12 @@ double spin_sigma_rad(const PoseMeasurement& m, const MarkReading& marks) {
 
 }  // namespace
 
-OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camera camera)
-    : body_(std::move(body)), support_(std::move(support)), camera_(std::move(camera)) {
+OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camera camera,
+                             Effort effort)
+    : body_(std::move(body)),
+      support_(std::move(support)),
+      camera_(std::move(camera)),
+      sampling_(sampling_of(effort)) {
   if (!(body_.radius_m > 0.0))
     throw InputError(fmt::format(
         "body: radius_m = {} gives no outline to look for; give the radius of the rim in metres",
@@ -234,6 +237,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       LightWindow(evidence.luma, window),
       evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
       colour_window(evidence.chroma, window, body_, camera_, starts.front()),
+      sampling_,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))

@@ -5,6 +5,7 @@
 #include "edge_stretch.hpp"
 #include "outline_samples.hpp"
 #include "robust_step.hpp"
+#include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tracking {
 
@@ -17,7 +18,8 @@ struct Scenery {
   const data::Camera& camera;
   const PoseMotion& motion;
   LightWindow picture, plate;
-  LightWindow colour;        ///< colour_window, or empty
+  LightWindow colour;  ///< colour_window, or empty
+  Sampling sampling;
   PoseMotion::Step smear{};  ///< the body's motion during the exposure; empty: not known
 
   /// The same with both windows blurred.
@@ -28,6 +30,7 @@ struct Scenery {
             picture.blurred(sigma_px),
             plate.blurred(sigma_px),
             colour.blurred(sigma_px),
+            sampling,
             smear};
   }
 };

@@ -94,7 +94,8 @@ class Tracking {
 
   void choose_finder() {
     if (has_shape(scene_) && camera_) {
-      finder_ = make_cylinder_finder(*scene_.body, scene_.support, *camera_, exposure_fraction());
+      finder_ = make_cylinder_finder(*scene_.body, scene_.support, *camera_, exposure_fraction(),
+                                     options_.effort);
       return;
     }
     finder_ = make_rim_finder(false);

@@ -9,6 +9,7 @@
 #include "trochoid/data/pose.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/tracking/detector.hpp"
+#include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tracking {
 
@@ -60,7 +61,8 @@ struct OutlineEvidence {
 class OutlineFitter {
  public:
   /// @throws InputError if body has no shape, or support is pivot without pivot_m.
-  OutlineFitter(data::Body body, data::Support support, data::Camera camera);
+  OutlineFitter(data::Body body, data::Support support, data::Camera camera,
+                Effort effort = Effort::normal);
   /// Nothing if the image does not hold the body there; never a guess.
   [[nodiscard]] std::optional<PoseMeasurement> measure(const OutlineEvidence& evidence) const;
 
@@ -68,6 +70,7 @@ class OutlineFitter {
   data::Body body_;
   data::Support support_;
   data::Camera camera_;
+  Sampling sampling_;
 };
 
 }  // namespace trochoid::tracking

@@ -6,12 +6,14 @@
 
 #include "trochoid/data/scene.hpp"
 #include "trochoid/data/track.hpp"
+#include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tracking {
 
 struct TrackOptions {
   int objects = 1;
   std::string from, to;
+  Effort effort = Effort::normal;
   std::optional<std::filesystem::path> edges;  ///< CSV of accepted edge points per frame
   /// Called with frames done and frames promised (0 = unknown); may be empty.
   std::function<void(std::int64_t done, std::int64_t total)> progress;
