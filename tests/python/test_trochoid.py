@@ -4,6 +4,7 @@ import _thread
 import inspect
 import os
 import pathlib
+import signal
 import tempfile
 import threading
 import time
@@ -12,6 +13,9 @@ import unittest
 import numpy as np
 
 import trochoid
+
+# Started in the background, Python inherits an ignored SIGINT.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SAMPLE = pathlib.Path(os.environ["TROCHOID_SAMPLES"]) / "s1_disc_paper"
 HAS_TRACKING = hasattr(trochoid._core, "track")
