@@ -1,0 +1,195 @@
+#include "trochoid/tracking/outline_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <numbers>
+#include <random>
+
+#include "arrow_system.hpp"
+#include "drawn_clip.hpp"
+#include "edge_stretch.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+// A profile of a step at `offset` blurred by a Gaussian, with slopes outside and a dark strip.
+StretchProfile profile_of(double offset_px, double blur_px, double outer_slope, double strip_px,
+                          double noise, std::mt19937& random) {
+  std::normal_distribution<double> normal(0.0, noise);
+  StretchProfile p;
+  constexpr double kReach_px = 4.0;
+  p.profile.count = static_cast<int>(2.0 * kReach_px / Profile::kStepPx) + 1;
+  p.profile.first_px = static_cast<float>(-kReach_px);
+  const auto beyond = [&](double s) {
+    return 0.5 * std::erfc(-s / (blur_px * std::numbers::sqrt2));
+  };
+  for (int j = 0; j < p.profile.count; ++j) {
+    const double s = static_cast<double>(p.profile.s_px(j)) - offset_px;
+    double light = 30.0 + (70.0 + outer_slope * s) * beyond(s);
+    if (strip_px > 0.0) light -= 15.0 * (beyond(s + strip_px) - beyond(s));
+    p.profile.light[static_cast<size_t>(j)] = static_cast<float>(light + normal(random));
+    p.profile.background[static_cast<size_t>(j)] = 0.0f;
+  }
+  p.blur_px = blur_px;
+  p.strip_px = strip_px;
+  return p;
+}
+
+double mean_offset_px(std::vector<StretchProfile>& profiles) {
+  double sum = 0.0;
+  for (const StretchProfile& p : profiles) sum += p.found ? p.edge.offset_px : 1e3;
+  return sum / static_cast<double>(profiles.size());
+}
+
+constexpr int kProfiles = 60;
+
+// A soft shadow beside an edge is a slope of the outer level: it must not pull the edge. A linear
+// estimate falls short of an offset of a seventh of the blur by a fifth of it.
+TEST(EdgeStretch, ASlopeBesideTheEdgeDoesNotPullIt) {
+  std::mt19937 random(1);
+  std::vector<StretchProfile> profiles;
+  for (int i = 0; i < kProfiles; ++i)
+    profiles.push_back(profile_of(0.1, 0.7, 6.0, 0.0, 0.5, random));
+  fit_stretches(profiles);
+  constexpr double kTolerance_px = 0.03;
+  EXPECT_NEAR(mean_offset_px(profiles), 0.1, kTolerance_px);
+}
+
+// A wall two pixels wide between face and floor.
+TEST(EdgeStretch, ANarrowStripIsNotTheEdge) {
+  std::mt19937 random(2);
+  std::vector<StretchProfile> profiles;
+  for (int i = 0; i < kProfiles; ++i)
+    profiles.push_back(profile_of(0.1, 0.7, 0.0, 2.0, 0.5, random));
+  fit_stretches(profiles);
+  constexpr double kTolerance_px = 0.03;
+  EXPECT_NEAR(mean_offset_px(profiles), 0.1, kTolerance_px);
+}
+
+// The errors of single profiles are as large as they say.
+TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSay) {
+  std::mt19937 random(3);
+  std::vector<StretchProfile> profiles;
+  constexpr int kMany = 400;
+  for (int i = 0; i < kMany; ++i) profiles.push_back(profile_of(0.0, 0.7, 0.0, 0.0, 2.0, random));
+  fit_stretches(profiles);
+  double square = 0.0;
+  for (const StretchProfile& p : profiles)
+    square += p.edge.offset_px * p.edge.offset_px /
+              (p.edge.noise_variance_px2 + p.edge.shading_variance_px2);
+  // Samples count for a half each (a bilinear picture), which these independent ones do not, and
+  // slopes are allowed for that are not there: below one half, but of its order.
+  EXPECT_GT(square / kMany, 0.1);
+  EXPECT_LT(square / kMany, 0.9);
+}
+
+TEST(EdgeStretch, TellsThatEdgesAreWiderThanTheModel) {
+  std::mt19937 random(4);
+  std::vector<StretchProfile> profiles;
+  for (int i = 0; i < kProfiles; ++i) {
+    profiles.push_back(profile_of(0.0, 0.9, 0.0, 0.0, 0.5, random));
+    profiles.back().blur_px = 0.75;
+  }
+  // The first step of an iteration in the right direction.
+  const double wider_px = fit_stretches(profiles);
+  EXPECT_GT(wider_px, 0.07);
+  EXPECT_LT(wider_px, 0.25);
+}
+
+// Two rings of four unknowns and three common ones against a dense solver.
+TEST(ArrowSystem, SolvesLikeADenseSolver) {
+  constexpr int kRings = 2, kKnots = 4, kCommon = 3, kSize = kRings * kKnots + kCommon;
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  ArrowSystem system(kRings, kKnots, kCommon);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Identity(kSize, kSize);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(kSize);
+  for (int i = 0; i < kSize; ++i) system(i, i) = 1.0;
+  for (int equation = 0; equation < 50; ++equation) {
+    const int ring = equation % kRings, knot = equation % kKnots;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(kSize);
+    row[ring * kKnots + knot] = normal(random);
+    row[ring * kKnots + (knot + 1) % kKnots] = normal(random);
+    for (int k = 0; k < kCommon; ++k) row[kRings * kKnots + k] = normal(random);
+    const double offset = normal(random);
+    dense += row * row.transpose();
+    right += offset * row;
+    for (int i = 0; i < kSize; ++i) {
+      if (row[i] != 0.0) system.right(i) += row[i] * offset;
+      for (int j = 0; j <= i; ++j)
+        if (row[i] * row[j] != 0.0) system(i, j) += row[i] * row[j];
+    }
+  }
+  ASSERT_TRUE(system.factorise());
+  const ArrowSystem::Vector solved = system.solved_right();
+  const Eigen::VectorXd expected = dense.ldlt().solve(right);
+  for (int i = 0; i < kSize; ++i)
+    EXPECT_NEAR(solved[static_cast<size_t>(i)], expected[i], 1e-10) << "unknown " << i;
+}
+
+// A disc lying flat under a camera of 1000 px/m, drawn on a mottled floor, measured from a
+// prediction half a pixel off.
+struct FlatDisc {
+  data::Body body;
+  data::Camera camera = data::Camera::from_scale(160, 140, 1000.0);
+
+  FlatDisc() { body.radius_m = 0.03, body.thickness_m = 0.002; }
+  [[nodiscard]] std::optional<PoseMeasurement> measure(const Eigen::Vector2d& centre_px,
+                                                       std::mt19937& random,
+                                                       Effort effort = Effort::normal) const {
+    const cv::Mat floor = drawn_floor(160, 140, 150.0);
+    cv::Mat picture = floor.clone(), plate;
+    draw_disc(picture, centre_px.x(), centre_px.y(), 30.0, 30.0, 0.0, 60.0);
+    floor.convertTo(plate, CV_8U);
+    const cv::Mat luma = developed(picture, 2.0, random);
+    data::Pose<> predicted;
+    predicted.centre_m = camera.table_from_image(centre_px + Eigen::Vector2d(0.4, -0.3), 0.001);
+    const OutlineFitter fitter(body, {data::SupportKind::flat, {}}, camera, effort);
+    return fitter.measure(
+        {.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
+  }
+};
+
+TEST(OutlineFitter, ErrorsOfAFlatDiscAreSmallAndAsLargeAsStated) {
+  const FlatDisc disc;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> within(-0.5, 0.5);
+  constexpr int kDraws = 30;
+  double square = 0.0, normalised = 0.0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::Vector2d centre(80.0 + within(random), 70.0 + within(random));
+    const auto seen = disc.measure(centre, random);
+    ASSERT_TRUE(seen);
+    const Eigen::Vector2d off = seen->centre_px - centre;
+    square += 0.5 * off.squaredNorm();
+    normalised += 0.5 * off.dot(seen->covariance_px2.ldlt().solve(off));
+  }
+  // Three times the 0.007 px that the noise of 2 levels leaves (step of 90 levels, 190 px of rim).
+  EXPECT_LT(std::sqrt(square / kDraws), 0.02);
+  // Never too small a sigma; a floor for what edge models may be wrong by makes it cautious here.
+  EXPECT_LT(normalised / kDraws, 1.5);
+  EXPECT_GT(normalised / kDraws, 0.03);
+}
+
+TEST(OutlineFitter, TellsTheBlurForTheNextFrame) {
+  const FlatDisc disc;
+  std::mt19937 random(7);
+  const auto seen = disc.measure({80.2, 70.4}, random);
+  ASSERT_TRUE(seen);
+  // 0.7 px as drawn; reading between pixels adds about a sixth of a pixel squared at most.
+  EXPECT_GT(seen->blur_px, 0.6);
+  EXPECT_LT(seen->blur_px, 0.95);
+}
+
+TEST(OutlineFitter, EffortChoosesHowManyEdgesAreRead) {
+  const FlatDisc disc;
+  std::mt19937 random(8);
+  const auto quick = disc.measure({80.0, 70.0}, random, Effort::quick);
+  const auto exact = disc.measure({80.0, 70.0}, random, Effort::exact);
+  ASSERT_TRUE(quick && exact);
+  EXPECT_GT(2 * exact->edges.size(), 3 * quick->edges.size());
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
