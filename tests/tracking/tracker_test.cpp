@@ -112,6 +112,57 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   EXPECT_NEAR(length_m, 1.5 * (kFrames - 1) / 2000.0, 0.002 * length_m + 1e-4);
 }
 
+/// A disc that moves down and to the right.
+void draw_mover(cv::Mat& picture, int i) {
+  draw_disc(picture, 30.0 + 1.5 * i, 30.0 + 0.8 * i, 14.0, 14.0, 0.0, 60.0);
+}
+
+TEST(TrackVideo, ARollingShutterGivesEverySampleTheTimeOfItsRow) {
+  const ScratchFolder folder("rows");
+  constexpr int kHeight = 120;
+  constexpr double kReadout_s = 0.008;
+  write_clip(folder / "clip.mkv", drawn_floor(200, kHeight, 150.0), 60, 2.0, draw_mover);
+  data::Scene scene;
+  const auto global = track_video(folder / "clip.mkv", scene, std::nullopt).file.tracks.at(0);
+  scene.camera.readout_s = kReadout_s;
+  const auto rolling = track_video(folder / "clip.mkv", scene, std::nullopt).file.tracks.at(0);
+  ASSERT_EQ(rolling.samples.size(), global.samples.size());
+  for (std::size_t i = 0; i < global.samples.size(); ++i) {
+    const double row = global.samples[i].centre_px.y() / (kHeight - 1);
+    EXPECT_NEAR(rolling.samples[i].t_s - global.samples[i].t_s, kReadout_s * row, 1e-9);
+  }
+}
+
+TEST(TrackVideo, KeepsToTheFramesAskedForAndCountsTheRest) {
+  const ScratchFolder folder("window");
+  write_clip(folder / "clip.mkv", drawn_floor(200, 120, 150.0), 60, 2.0, draw_mover);
+  TrackOptions options;
+  options.from = "f20";
+  options.to = "f49";
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt, options);
+  const auto& samples = result.file.tracks.at(0).samples;
+  EXPECT_EQ(samples.front().frame, 20);
+  EXPECT_EQ(samples.back().frame, 49);
+  EXPECT_EQ(result.summary.frames, 30);
+  EXPECT_EQ(result.summary.found, static_cast<std::int64_t>(samples.size()));
+  EXPECT_EQ(result.summary.lost, 30 - result.summary.found);
+}
+
+TEST(TrackVideo, FollowsTheBodyPointedAt) {
+  const ScratchFolder folder("pointed");
+  const auto slow = [](int i) { return Eigen::Vector2d(60.0 + 0.5 * i, 95.0); };
+  write_clip(folder / "clip.mkv", drawn_floor(240, 130, 150.0), 60, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_mover(picture, 0);
+               draw_disc(picture, 60.0 + 2.5 * i, 30.0, 18.0, 18.0, 0.0, 50.0);
+               draw_disc(picture, slow(i).x(), slow(i).y(), 14.0, 14.0, 0.0, 60.0);
+             });
+  data::Scene scene;
+  scene.tracking.at_px = slow(0);
+  const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
+  EXPECT_LT(largest_error_px(result.file.tracks.at(0), slow), 0.5);
+}
+
 TEST(TrackVideo, AWallWithoutABodyIsAnErrorThatHelps) {
   const ScratchFolder folder("empty");
   write_clip(folder / "clip.mkv", drawn_floor(120, 90, 120.0), 20, 2.0, [](cv::Mat&, int) {});

@@ -272,11 +272,11 @@ class Chain {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       auto& seen = glimpses_[node.at].seen;
-      std::optional<Sighting> other = std::move(node.other);
+      std::optional<Sighting>& other = node.other;
       if (margin_[i] < 0.0) {
         if (!other) other = measured_mirrored(measure, i);
         if (other) other->turned_rad = seen->turned_rad;
-        std::swap(seen, other);
+        seen.swap(other);
       }
       if (!seen || !seen->pose || std::abs(margin_[i]) >= kDoubtful) return;
       seen->attitude_doubtful = true;

@@ -285,6 +285,13 @@ void Background::estimate_chroma(const std::vector<cv::Mat>& samples,
   cv::bitwise_or(active_, full, active_);
 }
 
+bool Background::camera_moves() const {
+  constexpr double kMostRestless = 0.15, kMostNoise = 8.0, kMostActive = 0.4;
+  if (restless_ > kMostRestless) return true;
+  return plate_.noise_levels > kMostNoise &&
+         cv::countNonZero(active_) > kMostActive * static_cast<double>(active_.total());
+}
+
 double Background::gain(const cv::Mat& luma) const {
   return median_ratio(luma, plate_.luma);
 }

@@ -39,6 +39,8 @@ class Background {
   [[nodiscard]] const cv::Mat& active() const { return active_; }
   /// Share of the picture that changes most of the time: near 0 for a camera on a stand.
   [[nodiscard]] double restless() const { return restless_; }
+  /// Nearly all of the picture changes, and by far more than noise: the camera is not on a stand.
+  [[nodiscard]] bool camera_moves() const;
 
   /// Brightness of a frame relative to the plate: the median ratio over a coarse grid, so that a
   /// body, a hand or a shadow on less than half of the picture does not count.

@@ -64,12 +64,12 @@ class Tracking {
     explained_.resize(recording_.held().size());
     for (int object = 0; object < objects_; ++object)
       if (!follow_next_body(object)) break;
-    if (paths_.empty() && background_.restless() > kCameraMoves)
+    if (paths_.empty() && background_.camera_moves())
       throw InputError(
-          fmt::format("{}: no moving body found: the camera moves ({:.0f} % of the picture changes "
-                      "all the time); put it on a stand, or track a part where it is still with "
-                      "--from and --to",
-                      video_.string(), 100.0 * background_.restless()));
+          fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
+                      "changes: put it on a stand, or track a "
+                      "part where it is still with --from and --to",
+                      video_.string()));
     if (paths_.empty())
       throw InputError(
           fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
@@ -80,9 +80,6 @@ class Tracking {
   }
 
  private:
-  /// Share of the picture that changes most of the time, beyond which it is the camera.
-  static constexpr double kCameraMoves = 0.15;
-
   static SourceOptions source_options(const data::Scene& scene, const TrackOptions& options) {
     SourceOptions source;
     source.chroma = true;
