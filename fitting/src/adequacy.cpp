@@ -44,26 +44,52 @@ bool explains_path(const Squares& sum) {
   return sum.ok && (sum.residual <= 0.03 * sum.motion || sum.residual <= 4.0 * sum.scatter);
 }
 
-// Residuals over noise of the worst channel; the noise is the larger one of the track's own sigmas
-// and the scatter of its samples about a smooth curve.
-double misfit(const Problem& problem, const Squares& sum) {
-  double worst = 0.0;
+struct Misfit {
+  double times = 0.0;  // residuals over noise
+  Channel channel = Channel::position;
+};
+
+bool seen(const Problem& problem, Channel channel) {
+  return std::any_of(problem.arcs.begin(), problem.arcs.end(), [&](const ArcData& arc) {
+    return std::any_of(arc.readings.begin(), arc.readings.end(),
+                       [&](const Reading& reading) { return reading.channel == channel; });
+  });
+}
+
+double typical_sigma(const Problem& problem, Channel channel) {
+  std::vector<double> sigmas;
+  for (const ArcData& arc : problem.arcs)
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == channel) sigmas.push_back(1.0 / reading.whitener(0, 0));
+  return median(std::move(sigmas));
+}
+
+// Of the worst channel, of those that are not even followed: trackers know little of their common
+// errors. The noise is the larger one of the track's own sigmas and the scatter of
+// its samples about a smooth curve.
+Misfit misfit(const Problem& problem, const Squares& sum) {
+  constexpr double kFollowed_rad = 0.2;
+  constexpr double kFollowed = 1e-5;  // of the positions' variance: 0.3 % of the amplitude
+  const bool path_followed = sum.ok && sum.residual < kFollowed * sum.motion;
+  Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
+    const auto channel = static_cast<Channel>(c);
     double scatter = 1.0;
-    bool seen = false;
-    for (const ArcData& arc : problem.arcs) {
-      scatter = std::max(scatter, excess_scatter(arc, static_cast<Channel>(c)));
-      for (const Reading& reading : arc.readings)
-        seen |= reading.channel == static_cast<Channel>(c);
-    }
-    if (seen) worst = std::max(worst, problem.noise_scale[c] / scatter);
+    for (const ArcData& arc : problem.arcs)
+      scatter = std::max(scatter, excess_scatter(arc, channel));
+    const double times = problem.noise_scale[c] / scatter;
+    if (channel == Channel::position && path_followed) continue;
+    if (channel != Channel::position &&
+        problem.noise_scale[c] * typical_sigma(problem, channel) < kFollowed_rad)
+      continue;
+    if (seen(problem, channel) && times > worst.times) worst = {times, channel};
   }
   int rows = 0;
   for (const ArcData& arc : problem.arcs)
     for (const Reading& reading : arc.readings)
       rows += reading.channel == Channel::position ? 2 : 0;
-  if (rows > 0 && sum.ok)
-    worst = std::max(worst, std::sqrt(sum.residual / std::max<double>(rows, sum.scatter)));
+  const double times = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
+  if (sum.ok && !path_followed && times > worst.times) worst = {times, Channel::position};
   return worst;
 }
 
@@ -185,19 +211,19 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
            data::Fit& fit) {
   const Squares sum = squares(problem, solution);
   warn_unexplained(sum, fit);
-  const double times = misfit(problem, sum);
+  const Misfit worst = misfit(problem, sum);
+  const char* const kChannelWords[] = {"positions", "tilt", "azimuth", "spin angle"};
   const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
   if (!solution.converged) return refuse("no_convergence", "unexplained", solution.message, fit);
   if (!explains_path(sum))
     return refuse("unexplained", "unexplained",
                   "the best path found leaves most of the motion unexplained", fit);
-  if (times > kHopeless)
-    return refuse(
-        "unexplained", "unexplained",
-        fmt::format("the model does not explain the track: the residuals are {:.2g} times "
-                    "its noise",
-                    times),
-        fit);
+  if (worst.times > kHopeless)
+    return refuse("unexplained", "unexplained",
+                  fmt::format("the model does not explain the track: the residuals of its {} are "
+                              "{:.2g} times their noise",
+                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                  fit);
   if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)
     return refuse("not_identifiable", "no_feature",
                   fmt::format("{} in time explains the path as well: nothing in it asks for the "

@@ -12,6 +12,7 @@
 
 #include "arcs.hpp"
 #include "ladder.hpp"
+#include "retrograde.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/parallel.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -325,6 +326,32 @@ std::string listed(const std::vector<const Rung*>& rungs, double bic) {
   return words;
 }
 
+// Which losses turn the mean path round, and whether others alone would do it as well.
+std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chosen,
+                                const Ladder& ladder) {
+  const std::optional<double> from_s = retrograde_from_s(chosen.fit, chosen.scene);
+  if (!from_s) return "";
+  const auto term = [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].name; };
+  std::string acting, alike, out, nowhere;
+  for (const int index : chosen.terms) acting += (acting.empty() ? "" : " and ") + term(index);
+  for (const Rung& rung : rungs) {
+    if (rung.terms.size() != 1 || &rung == &chosen) continue;
+    if (!rung.fitted) {
+      nowhere += (nowhere.empty() ? "" : ", ") + term(*rung.terms.begin());
+      continue;
+    }
+    std::string& list = rung.bic - chosen.bic < kVeryStrong ? alike : out;
+    list += fmt::format("{}{} (BIC {:+.0f})", list.empty() ? "" : ", ", term(*rung.terms.begin()),
+                        rung.bic - chosen.bic);
+  }
+  std::string words = fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explains it",
+                                  *from_s, acting.empty() ? "rolling without losses" : acting);
+  if (!alike.empty()) words += ", but this track cannot tell that from " + alike;
+  if (!out.empty()) words += "; ruled out as the only loss: " + out;
+  if (!nowhere.empty()) words += "; no fit at all with nothing but " + nowhere;
+  return words + ".";
+}
+
 std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const Ladder& ladder) {
   std::string words = fmt::format(
       "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
@@ -343,7 +370,7 @@ std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const L
   else if (!worse.empty())
     words += fmt::format("; the next best, {}, is ruled out", listed({worse.front()}, chosen.bic));
   for (const std::string& term : ladder.left_out) words += fmt::format("; not tried: {}", term);
-  return words + ".";
+  return words + "." + retrograde_sentence(rungs, chosen, ladder);
 }
 
 data::ModelScore table_row(const Rung& rung, bool recommended) {

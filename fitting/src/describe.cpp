@@ -9,6 +9,7 @@
 
 #include "derived.hpp"
 #include "observed.hpp"
+#include "one_friction.hpp"
 #include "steady_top.hpp"
 
 namespace trochoid::fitting {
@@ -122,6 +123,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   report_parameters(problem, error, fit);
   describe_arcs(problem, fit);
   warn(problem, error, fit);
+  tell_whether_one_friction(problem, fit);
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);
   warn_short_top(problem, fit);

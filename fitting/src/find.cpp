@@ -10,20 +10,6 @@
 namespace trochoid::fitting {
 namespace {
 
-Problem single_arc(const Problem& problem, int arc) {
-  Problem part = problem;
-  part.arcs = {problem.arcs[arc]};
-  part.base = {problem.base[arc]};
-  part.row_weights = {Eigen::VectorXd()};
-  part.free.clear();
-  for (FreeParameter parameter : problem.free)
-    if (parameter.arc < 0 || parameter.arc == arc) {
-      parameter.arc = std::min(parameter.arc, 0);
-      part.free.push_back(parameter);
-    }
-  return part;
-}
-
 bool is_spin(const Problem& problem, int free_index) {
   const std::string& name = problem.predictor->parameters()[problem.free[free_index].index].name;
   return name == "psi_rad" || name == "omega_s_rad_s";

@@ -39,14 +39,21 @@ ModelSettings without_losses(const ModelSettings& model, const std::string& law)
 void add_floor_terms(const Scene& scene, Ladder& ladder) {
   const model::CentralInertia inertia = model::central_inertia(*scene.body);
   const double R = scene.body->radius_m;
+  const double rate_rad_s = std::sqrt(scene.model.gravity_m_s2 / R);
   const double unit_N_m_s = inertia.mass_kg * std::sqrt(scene.model.gravity_m_s2 * R * R * R);
   // Losses that end a spin within seconds: thousandths of the natural units.
   constexpr double kTypical = 2e-3;
-  if (inertia.mass_known)
+  if (inertia.mass_known) {
     ladder.terms.push_back(
         air_couple("air couple", &ModelSettings::air_linear_N_m_s, scene, kTypical * unit_N_m_s));
-  else
-    ladder.left_out.push_back("air couple (needs body.mass_kg)");
+    ladder.terms.push_back(air_couple("quadratic air couple", &ModelSettings::air_quadratic_N_m_s2,
+                                      scene, kTypical * unit_N_m_s / rate_rad_s));
+    constexpr double kAir_Pa_s = 1.8e-5;
+    ladder.terms.push_back(
+        single("gap layer", &ModelSettings::gap_viscosity_Pa_s, scene, kAir_Pa_s));
+  } else {
+    ladder.left_out.push_back("air couples and the gap layer (need body.mass_kg)");
+  }
   const auto friction = [&](const char* name, std::optional<double> ModelSettings::*field) {
     ladder.terms.push_back(single(name, field, scene, kTypical * R));
   };

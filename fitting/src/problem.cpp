@@ -132,6 +132,20 @@ int Problem::rows() const {
   return rows;
 }
 
+Problem single_arc(const Problem& problem, int arc) {
+  Problem part = problem;
+  part.arcs = {problem.arcs[arc]};
+  part.base = {problem.base[arc]};
+  part.row_weights = {Eigen::VectorXd()};
+  part.free.clear();
+  for (FreeParameter parameter : problem.free)
+    if (parameter.arc < 0 || parameter.arc == arc) {
+      parameter.arc = std::min(parameter.arc, 0);
+      part.free.push_back(parameter);
+    }
+  return part;
+}
+
 bool is_loss(const Problem& problem, const FreeParameter& parameter) {
   const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
   return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&

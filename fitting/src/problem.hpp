@@ -61,6 +61,9 @@ struct Problem {
   [[nodiscard]] int max_steps() const;  ///< of one integration; 0 = the model's own limit
 };
 
+/// One arc of a problem with the parameters it sees.
+[[nodiscard]] Problem single_arc(const Problem& problem, int arc);
+
 /// Whether a free parameter is the strength of a loss: short windows do not see it, and it may be
 /// absent altogether. The friction of a sliding body and a top's a, b and l are not.
 [[nodiscard]] bool is_loss(const Problem& problem, const FreeParameter& parameter);

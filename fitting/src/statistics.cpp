@@ -20,7 +20,7 @@ double chi2_upper_tail(double chi2, double dof) {
   return 0.5 * std::erfc(z / std::sqrt(2.0));
 }
 
-Whiteness whiteness(const Eigen::MatrixXd& series, double step_s) {
+Whiteness whiteness(const Eigen::MatrixXd& series, double step_s, double taken) {
   Whiteness result;
   const Eigen::Index n = series.rows();
   const double power = series.squaredNorm();
@@ -45,6 +45,14 @@ Whiteness whiteness(const Eigen::MatrixXd& series, double step_s) {
     if (rho < noise) break;
     sum += rho;
   }
+  // Each fitted parameter follows the slow part of the residuals and lowers the first correlation
+  // by about (1 + rho)/n (Kendall, Biometrika 41, 403, 1954, for a mean and a trend); what that
+  // does to the sum is taken from an autoregressive process of first order.
+  const double seen = std::clamp(correlation(1), 0.0, 0.98), samples = static_cast<double>(n);
+  const double true_rho =
+      std::min((seen + (2.0 * seen + taken * (1.0 + seen)) / samples), 0.5 * (1.0 + seen));
+  const auto growth = [](double rho) { return (1.0 + rho) / (1.0 - rho); };
+  sum = std::min(sum * growth(true_rho) / growth(seen), samples);
   result.inflation = 1.0 + 2.0 * sum;
   result.correlation_time_s = sum * step_s;
   return result;
@@ -126,8 +134,11 @@ Whiteness channel_whiteness(const Problem& problem, const Linearised& all, Chann
     const Eigen::Index n = static_cast<Eigen::Index>(values.size()) / width;
     if (n < 2) continue;
     const Eigen::MatrixXd series = Eigen::Map<Eigen::MatrixXd>(values.data(), width, n).transpose();
+    // Parameters share themselves out among the coordinates.
+    const double taken = static_cast<double>(problem.columns_of(arc).size()) /
+                         static_cast<double>(problem.arcs[arc].observables.size());
     const Whiteness one =
-        whiteness(series, problem.arcs[arc].duration_s() / static_cast<double>(n - 1));
+        whiteness(series, problem.arcs[arc].duration_s() / static_cast<double>(n - 1), taken);
     if (one.p_value < worst.p_value) worst.p_value = one.p_value;
     if (one.inflation > worst.inflation) {
       worst.inflation = one.inflation;
@@ -159,6 +170,50 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
   return typical > 0.0 ? Eigen::VectorXd(0.5 / typical * rows) : rows;
 }
 
+// How far the valley bends: when the solution is moved by one standard deviation along a singular
+// direction k to either side, the mean of the two residual vectors leaves the tangent plane, and
+// the other directions follow by w(., k), in their own standard deviations. One column per
+// direction; zero where the data see too little of it, or the model ends.
+Eigen::MatrixXd bends(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
+                      const Eigen::MatrixXd& scaled_directions, const Eigen::MatrixXd& size_v,
+                      const Eigen::VectorXd& sd) {
+  constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
+  const Eigen::Index count = sd.size();
+  Eigen::MatrixXd w = Eigen::MatrixXd::Zero(count, count);
+  const auto moved = [&](const Eigen::VectorXd& step, Eigen::VectorXd& residuals) {
+    Eigen::VectorXd at = u;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Transform& transform = problem.free[i].transform;
+      const double value = transform.value(u[i]) + step[i];
+      at[i] = transform.inverse(value);
+      // Out of its range: the valley ends before it bends.
+      if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + 1e-12))
+        return false;
+    }
+    Eigen::Index first = 0;
+    residuals = Eigen::VectorXd::Zero(all.residuals.size());
+    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+      Eigen::VectorXd r;
+      if (!evaluate(problem, arc, at, r, nullptr)) return false;
+      residuals.segment(first, r.size()) = r;
+      first += r.size();
+    }
+    return true;
+  };
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
+    const Eigen::VectorXd step = sd[k] * size_v.col(k);
+    Eigen::VectorXd ahead, behind;
+    if (!moved(step, ahead) || !moved(-step, behind)) continue;
+    Eigen::VectorXd bend = 0.5 * (ahead + behind) - all.residuals;
+    // Turning angles jump by whole turns of residual; priors do not bend.
+    if (!bend.allFinite()) continue;
+    w.col(k) = sd.asDiagonal() * (scaled_directions.transpose() * bend);
+    w(k, k) = 0.0;
+  }
+  return w;
+}
+
 data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
   data::NullVector vector;
   std::string list;
@@ -173,6 +228,22 @@ data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& dire
       "size",
       list, sd);
   return vector;
+}
+
+}  // namespace
+
+namespace {
+
+// What was known beforehand stays known, however the data's share was widened.
+void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    if (!problem.free[i].prior) continue;
+    const double known = problem.free[i].prior->sigma * problem.free[i].prior->sigma;
+    if (!(covariance(i, i) > known)) continue;
+    const Eigen::VectorXd column = covariance.col(i);
+    covariance -= (covariance(i, i) - known) / (covariance(i, i) * covariance(i, i)) * column *
+                  column.transpose();
+  }
 }
 
 }  // namespace
@@ -237,6 +308,12 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   }
   Eigen::MatrixXd covariance = bread;
   if (correlated) {
+    // What the parameters take from few independent samples makes the residuals too small.
+    const double rows = problem.rows(), taken = static_cast<double>(count);
+    const double left = std::max(rows - taken * result.whiteness.inflation, 0.1 * rows);
+    const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
+    for (std::size_t row = 0; row < all.arc.size(); ++row)
+      if (all.arc[row] >= 0) row_scale[row] *= wider;
     const Eigen::MatrixXd filling = row_scale.asDiagonal() * scaled * bread;
     covariance = filling.transpose() * filling;
     for (const Eigen::VectorXd& offset : offsets) {
@@ -244,8 +321,24 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
       covariance += shift * shift.transpose();
     }
   }
+  // A displacement w t^2 with a standard normal t has the second moment 3 w w^T.
+  const Eigen::MatrixXd w =
+      bends(problem, u, all, scaled * svd.matrixV(), size.asDiagonal() * svd.matrixV(), inverse);
+  // Correlated residuals let the solution move further along a direction, by the root of `further`.
+  Eigen::MatrixXd follow = svd.matrixV() * inverse.asDiagonal() * w;
+  constexpr double kMostBend = 2.0;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (!(inverse[k] > 0.0)) continue;
+    const Eigen::VectorXd direction = svd.matrixV().col(k);
+    const double further = direction.dot(covariance * direction) / (inverse[k] * inverse[k]);
+    const double bend = further * w.col(k).norm();
+    follow.col(k) *=
+        further * std::min(1.0, kMostBend * std::sqrt(further) / std::max(bend, 1e-300));
+  }
+  covariance += 3.0 * follow * follow.transpose();
   covariance += blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
+  heed_priors(problem, result.covariance);
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   return result;

@@ -18,7 +18,8 @@ struct Whiteness {
   double correlation_time_s = 0.0;
 };
 /// @param series one column per coordinate, rows in time order with mean spacing step_s.
-[[nodiscard]] Whiteness whiteness(const Eigen::MatrixXd& series, double step_s);
+/// @param taken  parameters fitted to each column, which hide part of the correlation.
+[[nodiscard]] Whiteness whiteness(const Eigen::MatrixXd& series, double step_s, double taken = 0.0);
 
 /// What the data say about the free parameters at a solution.
 struct Uncertainty {
@@ -33,7 +34,8 @@ struct Uncertainty {
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank;
 /// correlated residuals widen the covariance by their effective sample size, channel by channel
 /// (a sandwich of the channels' information matrices), and a constant offset of half a sample's
-/// sigma is allowed for in every filmed channel whose residuals hang together.
+/// sigma is allowed for in every filmed channel whose residuals hang together. Where the valley of
+/// chi-square bends within a standard deviation, the second moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer.

@@ -135,5 +135,14 @@ TEST(Compare, TellsWhichFrictionSlowsARing) {
     }
 }
 
+TEST(Compare, SaysWhatTurnsARingRetrograde) {
+  data::Scene truth = ring();
+  truth.model.pivoting_friction_m = 5e-4;
+  const Values start{{"theta_rad", 1.2}, {"w1_rad_s", 0.0}, {"w2_rad_s", 24.0}, {"w3_rad_s", 4.4}};
+  const Comparison found = compare_one(track_of(truth, start, 2.5, 200, 2e-4, 6), ring());
+  EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("turns retrograde at t ="));
+  EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("pivoting friction explains it"));
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

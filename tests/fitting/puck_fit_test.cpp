@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +31,7 @@ class Throw {
   explicit Throw(std::uint64_t seed) : generator_(seed) {}
   // Slides for that long from where it is, with this velocity; stops when friction has used it up.
   Throw& slide(const Eigen::Vector2d& velocity_m_s, double duration_s) {
-    const double deceleration = kFriction * kGravity_m_s2, speed = velocity_m_s.norm();
+    const double deceleration = friction_ * kGravity_m_s2, speed = velocity_m_s.norm();
     const Eigen::Vector2d from = at_;
     for (int i = 1; i <= std::lround(duration_s / kStep_s); ++i) {
       const double t = kStep_s * i;
@@ -39,6 +40,10 @@ class Throw {
         at_ = from + velocity_m_s / speed * (speed * moving - 0.5 * deceleration * moving * moving);
       add();
     }
+    return *this;
+  }
+  Throw& with_friction(double friction) {
+    friction_ = friction;
     return *this;
   }
   // A hand speeds it up.
@@ -61,6 +66,7 @@ class Throw {
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
     track_.samples.push_back(sample);
   }
+  double friction_ = kFriction;
   std::mt19937_64 generator_;
   std::normal_distribution<double> normal_{0.0, kSigma_m};
   Eigen::Vector2d at_ = Eigen::Vector2d::Zero();
@@ -81,6 +87,20 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
   const data::FitParameter* friction = fit.find("friction");
   EXPECT_LT(std::abs(friction->value - kFriction), 4.0 * friction->sigma);
   EXPECT_LT(friction->sigma, 0.01 * kFriction);
+}
+
+TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
+  Throw thrown(5);
+  thrown.slide({1.0, 0.3}, 0.3).slide({-0.2, 0.6}, 0.2).slide({0.7, -0.4}, 0.3);
+  const data::Fit same = fitting::fit(std::span(&thrown.track(), 1), puck_scene());
+  ASSERT_EQ(same.arcs.size(), 3u);
+  EXPECT_THAT(
+      same.warnings,
+      testing::Contains(testing::HasSubstr("one friction coefficient explains the 3 arcs")));
+  Throw other(6);
+  other.slide({1.0, 0.3}, 0.3).with_friction(0.3).slide({-0.2, 0.9}, 0.25);
+  const data::Fit two = fitting::fit(std::span(&other.track(), 1), puck_scene());
+  EXPECT_THAT(two.warnings, testing::Contains(testing::HasSubstr("does not explain")));
 }
 
 TEST(PuckFit, LeavesOutWhatAHandDoes) {

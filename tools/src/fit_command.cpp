@@ -106,7 +106,7 @@ void run(const FitCommand& command) {
   if (!command.output.empty()) data::write_fit(fit, command.output);
   print(fit);
   if (!fit.converged) {
-    const bool lacking = fit.verdict != "no_feature" && !command.compare;
+    const bool lacking = fit.verdict != "no_feature" && fit.comparison.empty();
     throw NotGood(fmt::format("the fit is not good: {}{}", fit.reason,
                               lacking ? "; --compare tries what the model lacks" : ""));
   }
@@ -124,7 +124,8 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors")
       ->check(CLI::ExistingFile);
   fit->add_option("--model,-m", command->options.model,
-                  "top, rolling, sliding, puck, pivot or auto; overrides the scene's");
+                  "top, rolling, sliding, puck, pivot or auto (compare, as where the scene names "
+                  "none); overrides the scene's");
   fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
   fit->add_option("--object", command->object, "Fit this object of the track only");
   fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");

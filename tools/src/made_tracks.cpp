@@ -303,7 +303,8 @@ void make_puck(const MadeTrackOptions& options, Generator& generator, MadeTrack&
                 {"vx_m_s", *scene.start.vx_m_s},
                 {"vy_m_s", *scene.start.vy_m_s},
                 {"psi_rad", *scene.start.psi_rad},
-                {"w3_rad_s", *scene.start.w3_rad_s}};
+                {"w3_rad_s", *scene.start.w3_rad_s},
+                {"contact_radius_m", body.radius_m}};
   made.judged = {"friction"};
   simulate(std::numbers::pi / 180.0, generator, made);
   add_noise(made, options.noise * body.radius_m, generator);

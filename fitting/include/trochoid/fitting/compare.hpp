@@ -15,13 +15,14 @@ struct Comparison {
 };
 
 /// Fits the rungs of the ladder that make sense for the scene's support. Starts from the model
-/// without losses and adds, one at a time, the loss that lowers BIC most (floor: air couple,
-/// rolling, pivoting and contour friction, and sliding; pivot: drag; puck: air force; spin-down:
+/// without losses and adds, one at a time, the loss that lowers BIC most (floor: linear and
+/// quadratic air couple, gap layer, rolling, pivoting and contour friction, and sliding; pivot: drag; puck: air force; spin-down:
 /// dry, viscous and quadratic couple). Terms the scene names beforehand give starting values only.
 /// Every rung is judged by AICc and BIC (with the effective number of samples of the best one, so
 /// that they can be compared), whiteness of residuals and the prediction of the last third of the
 /// track from the first two. Recommended is the rung with the fewest parameters within 2 of the
-/// least BIC.
+/// least BIC. Where the fitted ring or disc turns retrograde, the recommendation says which losses
+/// explain that and whether the track can tell.
 /// @throws InputError as fit() does for the model without losses.
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
                                  const FitOptions& options = {});
