@@ -36,7 +36,7 @@ Squares squares(const Problem& problem, const Solution& solution) {
 
 namespace {
 
-constexpr double kHopeless = 3.0;  // times the noise: far beyond what a tracker misjudges
+constexpr double kHopeless = 4.0;  // times the noise: far beyond what a tracker misjudges
 
 // A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
 // samples scatter far less about a smooth curve.
@@ -69,8 +69,14 @@ double typical_sigma(const Problem& problem, Channel channel) {
 // its samples about a smooth curve.
 Misfit misfit(const Problem& problem, const Squares& sum) {
   constexpr double kFollowed_rad = 0.2;
-  constexpr double kFollowed = 1e-5;  // of the positions' variance: 0.3 % of the amplitude
-  const bool path_followed = sum.ok && sum.residual < kFollowed * sum.motion;
+  // Within 1 % of the motion, and not so far off that only the model can be to blame.
+  constexpr double kFollowed = 1e-4, kAnyTracker = 8.0;
+  int rows = 0;
+  for (const ArcData& arc : problem.arcs)
+    for (const Reading& reading : arc.readings)
+      rows += reading.channel == Channel::position ? 2 : 0;
+  const double path = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
+  const bool path_followed = sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
   Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
@@ -84,12 +90,7 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
       continue;
     if (seen(problem, channel) && times > worst.times) worst = {times, channel};
   }
-  int rows = 0;
-  for (const ArcData& arc : problem.arcs)
-    for (const Reading& reading : arc.readings)
-      rows += reading.channel == Channel::position ? 2 : 0;
-  const double times = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
-  if (sum.ok && !path_followed && times > worst.times) worst = {times, Channel::position};
+  if (sum.ok && !path_followed && path > worst.times) worst = {path, Channel::position};
   return worst;
 }
 

@@ -14,9 +14,9 @@ struct Squares {
 [[nodiscard]] Squares squares(const Problem& problem, const Solution& solution);
 
 /// What a fit is worth. Words of data::Fit::verdict:
-///   unexplained      not a minimum; or residuals beyond 3 times the track's sigmas, the samples'
-///                    scatter about a smooth curve and 0.3 % of the motion (angles: 0.2 rad); or a
-///                    30th of the motion's variance left
+///   unexplained      not a minimum; or residuals beyond 4 times the track's sigmas, the samples'
+///                    scatter about a smooth curve and 1 % of the motion (angles: 0.2 rad), or
+///                    beyond 8 times; or a 30th of the motion's variance left
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
 ///   weak             explained, but parameters of the motion are not determined
