@@ -326,7 +326,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
       bends(problem, u, all, scaled * svd.matrixV(), size.asDiagonal() * svd.matrixV(), inverse);
   // Correlated residuals let the solution move further along a direction, by the root of `further`.
   Eigen::MatrixXd follow = svd.matrixV() * inverse.asDiagonal() * w;
-  constexpr double kMostBend = 2.0;
+  constexpr double kMostBend = 5.0;
   for (Eigen::Index k = 0; k < count; ++k) {
     if (!(inverse[k] > 0.0)) continue;
     const Eigen::VectorXd direction = svd.matrixV().col(k);
