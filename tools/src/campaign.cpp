@@ -28,6 +28,11 @@ std::vector<fs::path> inputs_of(const CampaignItem& item) {
   std::vector<fs::path> inputs{item.video};
   for (const fs::path& file : {item.scene, item.camera})
     if (!file.empty()) inputs.push_back(file);
+  try {
+    const std::string camera = item.scene.empty() ? "" : data::read_scene(item.scene).camera.file;
+    if (!camera.empty() && item.camera.empty()) inputs.emplace_back(camera);
+  } catch (const InputError&) {  // the run will say what is wrong with the scene
+  }
   return inputs;
 }
 
@@ -113,7 +118,8 @@ std::optional<CampaignRecord> current_record(const Campaign& campaign, const Cam
   if (!json.is_object()) return std::nullopt;
   try {
     CampaignRecord record = record_of(json);
-    if (record.key == key_of(campaign, item)) return record;
+    const bool kept = !record.done || fs::exists(folder_of(campaign, item.name) / kRunFile);
+    if (kept && record.key == key_of(campaign, item)) return record;
   } catch (const Json::exception&) {  // not ours, or an older version's: as if never run
   }
   return std::nullopt;
@@ -168,7 +174,11 @@ std::vector<CampaignLine> collect(const Campaign& campaign) {
         line.found = run.value("found", std::int64_t{0});
       }
       std::error_code code;
-      if (fs::exists(fit, code)) line.fit = data::read_fit(fit);
+      try {
+        if (fs::exists(fit, code)) line.fit = data::read_fit(fit);
+      } catch (const InputError& error) {  // one damaged file is no reason to lose the summary
+        line.record.message = error.what();
+      }
     }
     lines.push_back(std::move(line));
   }

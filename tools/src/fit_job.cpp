@@ -8,7 +8,8 @@ namespace trochoid::tools {
 data::Fit fit_job(std::span<const data::Track> tracks, data::Scene scene,
                   const fitting::FitOptions& options, bool compare) {
   data::Fit fit;
-  if (compare || options.model == "auto") {
+  const bool unnamed = options.model.empty() && scene.model.name == "auto";
+  if (compare || unnamed || options.model == "auto") {
     fitting::Comparison comparison = fitting::compare(tracks, scene, options);
     fit = std::move(comparison.fit);
     scene = std::move(comparison.scene);

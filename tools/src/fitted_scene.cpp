@@ -107,6 +107,12 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   set_air(fit, "air_linear_N_m_s", arc, scene.model.air_linear_N_m_s);
   set_air(fit, "air_quadratic_N_m_s2", arc, scene.model.air_quadratic_N_m_s2);
   if (fit.model == "top" || fit.model == "top-euler") set_top(fit, arc, scene);
+  const data::FitParameter* contact = fit.find("contact_radius_m");
+  if (contact != nullptr && contact->status == data::ParameterStatus::free)
+    throw InputError(fmt::format(
+        "the fit found the puck to touch the floor on a radius of {:.4g} m; a scene's puck touches "
+        "it on all of its face. Fix contact_radius_m in the fit to simulate it",
+        contact->value));
   scene.run.until_s = fit.arcs[arc].to_s - arc_start_s(fit, arc);
   return scene;
 }

@@ -20,10 +20,15 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
                                  output.string(), folder.string()));
   if (fs::is_directory(output, ignored))
     throw InputError(fmt::format("{}: is a folder, name a file to write", output.string()));
-  for (const fs::path& input : inputs)
-    if (!input.empty() && fs::equivalent(output, input, ignored))
+  for (const fs::path& input : inputs) {
+    if (input.empty()) continue;
+    if (fs::equivalent(output, input, ignored))
       throw InputError(fmt::format(
           "{}: is read by this command and would be lost; name another output", output.string()));
+    if (fs::weakly_canonical(output, ignored) == fs::weakly_canonical(input, ignored))
+      throw InputError(
+          fmt::format("{}: is named for two outputs; name two files", output.string()));
+  }
 }
 
 #ifdef TROCHOID_HAS_TRACKING

@@ -20,11 +20,11 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// One arc of the fit, simulated; nothing if the model cannot run it alone.
 std::optional<data::Table> run_arc(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
   constexpr double kSamplesPerSample = 4.0, kMostRows = 40000.0;
-  scene = fitted_scene(fit, arc);
-  if (!(scene.run.until_s > 0.0)) return std::nullopt;
-  const double rows = std::min(kMostRows, kSamplesPerSample * fit.arcs[arc].samples);
-  scene.run.rate_hz = rows / scene.run.until_s;
   try {
+    scene = fitted_scene(fit, arc);
+    if (!(scene.run.until_s > 0.0)) return std::nullopt;
+    const double rows = std::min(kMostRows, kSamplesPerSample * fit.arcs[arc].samples);
+    scene.run.rate_hz = rows / scene.run.until_s;
     model::Trajectory run = model::simulate(scene);
     if (run.values.rows() < 2) return std::nullopt;
     return data::Table{

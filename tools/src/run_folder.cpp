@@ -136,7 +136,7 @@ ReportInput read_run_folder(const fs::path& folder) {
 data::Scene scene_of_fit(const data::Fit& fit, const fs::path& fit_file) {
   data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in " + fit_file.string());
   std::error_code code;
-  if (!scene.camera.file.empty() && !fs::exists(scene.camera.file, code)) {
+  if (!scene.camera.file.empty()) {  // a run leaves the camera beside the fit
     const fs::path beside = fit_file.parent_path() / fs::path(scene.camera.file).filename();
     if (fs::exists(beside, code)) scene.camera.file = beside.string();
   }

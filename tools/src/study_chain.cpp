@@ -101,10 +101,11 @@ FitOutcome measure(const FitSetting& setting, const Options& options) {
     double error = 0.0, in_sigmas = 0.0;
     for (const std::string& name : made.judged) {
       const data::FitParameter* found = fit.find(name);
-      const double off = found == nullptr ? std::numeric_limits<double>::infinity()
-                                          : std::abs(found->value - made.truth.at(name));
+      const bool told = found != nullptr && fit.converged && std::isfinite(found->sigma);
+      const double off = told ? std::abs(found->value - made.truth.at(name))
+                              : std::numeric_limits<double>::infinity();
       error = std::max(error, off / std::abs(made.truth.at(name)));
-      in_sigmas = std::max(in_sigmas, found == nullptr ? off : off / found->sigma);
+      in_sigmas = std::max(in_sigmas, told ? off / found->sigma : off);
     }
     outcome.reached += in_sigmas < kReached_sigma;
     errors.push_back(error);

@@ -36,8 +36,9 @@ data::Camera reduced(data::Camera camera, int reduction) {
   camera.fy *= by;
   camera.cx = (camera.cx + 0.5) * by - 0.5;
   camera.cy = (camera.cy + 0.5) * by - 0.5;
-  camera.width_px /= reduction;
-  camera.height_px /= reduction;
+  // Even sizes: colour is stored at half of them.
+  camera.width_px = reduction > 1 ? camera.width_px / reduction / 2 * 2 : camera.width_px;
+  camera.height_px = reduction > 1 ? camera.height_px / reduction / 2 * 2 : camera.height_px;
   return camera;
 }
 
@@ -52,6 +53,17 @@ data::Table reduced(data::Table truth, int reduction) {
   return truth;
 }
 
+/// A folder of this process alone, gone at the end.
+struct WorkFolder {
+  explicit WorkFolder(const fs::path& target) : path(data::pending_neighbour(target)) {
+    fs::create_directories(path);
+  }
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+  ~WorkFolder() { data::discard_pending(path); }
+  fs::path path;
+};
+
 /// The recording at a fraction of its size, everything `track` needs beside it.
 struct Smaller {
   fs::path video, scene;
@@ -65,8 +77,9 @@ Smaller make_smaller(const fs::path& folder, int reduction, const fs::path& work
     made.video = work / fmt::format("at_{}.mkv", reduction);
     const ChildRun run = run_child(
         {"ffmpeg", "-v", "error", "-nostdin", "-y", "-i", (folder / "video.mp4").string(), "-vf",
-         fmt::format("crop=trunc(iw/{0})*{0}:trunc(ih/{0})*{0}:0:0,scale=iw/{0}:ih/{0}:flags=area",
-                     reduction),
+         fmt::format(
+             "crop=trunc(iw/{0}/2)*2*{0}:trunc(ih/{0}/2)*2*{0}:0:0,scale=iw/{0}:ih/{0}:flags=area",
+             reduction),
          "-c:v", "libx264", "-qp", "8", "-preset", "veryfast", made.video.string()});
     if (!run.started || run.exit_status != 0)
       throw InputError("study chain needs the ffmpeg program to make smaller pictures: " +
@@ -133,8 +146,8 @@ Axes diagram(const std::vector<Row>& rows) {
 }  // namespace
 
 Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& out) {
-  const fs::path work = out / "work";
-  fs::create_directories(work);
+  const WorkFolder folder_of_work(out / "chain");
+  const fs::path& work = folder_of_work.path;
   std::vector<Row> rows;
   fmt::print("\n{:<18} {:>10} {:<8} {:>11} {:>6} {:>10} {:>10} {:>10} {:>10} {:>8}\n", "recording",
              "width", "effort", "found", "wrong", "rms px", "rms mm", "tilt deg", "frames/s",
@@ -167,7 +180,6 @@ Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& 
       }
     }
   }
-  fs::remove_all(work);
   data::write_text(csv, out / "chain_tracking.csv");
   return diagram(rows);
 }

@@ -233,7 +233,8 @@ class Tracking {
       if (frames_ % 16 == 0) report_progress();
       bytes += frame->luma.total() + 2 * frame->chroma.total();
       window.push_back(std::move(*frame));
-      if (bytes < Recording::kHeldBytes / 2) continue;
+      // Large pictures: windows that are mostly overlap would decide the same frames repeatedly.
+      if (bytes < Recording::kHeldBytes / 2 || window.size() < 3 * kOverlap) continue;
       settle(window);
       bytes = bytes / window.size() * kOverlap;
       window.erase(window.begin(), window.end() - kOverlap);
