@@ -14,9 +14,9 @@ struct Sampling {
 [[nodiscard]] constexpr Sampling sampling_of(Effort effort) {
   switch (effort) {
     case Effort::quick:
-      return {2.5, 80.0};
+      return {2.0, 120.0};
     case Effort::exact:
-      return {1.0, 600.0};
+      return {1.25, 400.0};
     case Effort::normal:
       break;
   }
