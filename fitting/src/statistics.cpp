@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "smoothing.hpp"
 #include "trochoid/data/error.hpp"
@@ -246,15 +247,17 @@ void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
   }
 }
 
-}  // namespace
+// The directions of parameter space in natural sizes, and how sharply the data see each.
+struct Directions {
+  Eigen::MatrixXd axes;     // one per column
+  Eigen::VectorXd inverse;  // standard deviation of independent residuals along each; 0: unseen
+  Eigen::MatrixXd blind;    // covariance of the unseen ones
+  Eigen::MatrixXd bread;    // covariance of the seen ones
+};
 
-Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
-  const Linearised all = linearise(problem, u);
-  const int count = static_cast<int>(problem.free.size());
-  Uncertainty result;
-  Eigen::VectorXd size(count);
-  for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
-  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
+                         Uncertainty& result) {
+  const Eigen::Index count = scaled.cols();
   Eigen::MatrixXd triangle = scaled;
   if (scaled.rows() > count)
     triangle = Eigen::HouseholderQR<Eigen::MatrixXd>(scaled)
@@ -270,73 +273,109 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   // Standard deviation of what the data do not see at all, in natural sizes: no derivative says how
   // large, and with small residuals 1 / floor would read as a sharp measurement.
   const double unseen = std::max(1.0 / floor, 1e3);
-  Eigen::VectorXd inverse = Eigen::VectorXd::Zero(count);
-  Eigen::MatrixXd blind = Eigen::MatrixXd::Zero(count, count);
-  for (int i = 0; i < count; ++i) {
-    const Eigen::VectorXd direction = svd.matrixV().col(i);
-    const bool seen = singular[i] > floor;
-    if (seen)
-      inverse[i] = 1.0 / singular[i];
+  Directions seen{
+      svd.matrixV(), Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count), {}};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::VectorXd direction = seen.axes.col(i);
+    const bool sees = singular[i] > floor;
+    if (sees)
+      seen.inverse[i] = 1.0 / singular[i];
     else
-      blind += unseen * unseen * direction * direction.transpose();
-    if (seen && singular[i] > 1.0)
+      seen.blind += unseen * unseen * direction * direction.transpose();
+    if (sees && singular[i] > 1.0)
       ++result.rank;
     else
-      result.null_vectors.push_back(null_vector(problem, direction, seen ? inverse[i] : INFINITY));
+      result.null_vectors.push_back(
+          null_vector(problem, direction, sees ? seen.inverse[i] : INFINITY));
   }
   result.condition = largest / std::max(singular.minCoeff(), 1e-300);
-  const Eigen::MatrixXd bread =
-      svd.matrixV() * inverse.cwiseAbs2().asDiagonal() * svd.matrixV().transpose();
+  seen.bread = seen.axes * seen.inverse.cwiseAbs2().asDiagonal() * seen.axes.transpose();
+  return seen;
+}
 
-  Eigen::VectorXd row_scale = Eigen::VectorXd::Ones(all.jacobian.rows());
-  bool correlated = false;
+// How residuals that hang together widen each row, and the offsets they may share.
+struct Correlation {
+  Eigen::VectorXd row_scale;
   std::vector<Eigen::VectorXd> offsets;
+  bool present = false;
+};
+
+Correlation correlation_of(const Problem& problem, const Linearised& all, Uncertainty& result) {
+  Correlation found{Eigen::VectorXd::Ones(all.jacobian.rows()), {}, false};
   for (int c = 0; c < kChannels; ++c) {
     const Whiteness one = channel_whiteness(problem, all, static_cast<Channel>(c));
-    correlated |= one.inflation > 1.0;
+    found.present |= one.inflation > 1.0;
     if (one.inflation > 1.0)
       for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
-        offsets.push_back(common_offset(problem, all, static_cast<Channel>(c), axis));
+        found.offsets.push_back(common_offset(problem, all, static_cast<Channel>(c), axis));
     for (std::size_t row = 0; row < all.arc.size(); ++row)
       if (all.arc[row] >= 0 && all.channel[row] == static_cast<Channel>(c))
-        row_scale[row] = std::sqrt(one.inflation);
+        found.row_scale[row] = std::sqrt(one.inflation);
     if (one.p_value < result.whiteness.p_value) result.whiteness.p_value = one.p_value;
     if (one.inflation > result.whiteness.inflation) {
       result.whiteness.inflation = one.inflation;
       result.whiteness.correlation_time_s = one.correlation_time_s;
     }
   }
-  Eigen::MatrixXd covariance = bread;
-  if (correlated) {
-    // What the parameters take from few independent samples makes the residuals too small.
-    const double rows = problem.rows(), taken = static_cast<double>(count);
-    const double left = std::max(rows - taken * result.whiteness.inflation, 0.1 * rows);
-    const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
-    for (std::size_t row = 0; row < all.arc.size(); ++row)
-      if (all.arc[row] >= 0) row_scale[row] *= wider;
-    const Eigen::MatrixXd filling = row_scale.asDiagonal() * scaled * bread;
-    covariance = filling.transpose() * filling;
-    for (const Eigen::VectorXd& offset : offsets) {
-      const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
-      covariance += shift * shift.transpose();
-    }
+  return found;
+}
+
+// The sandwich covariance of correlated residuals.
+Eigen::MatrixXd widened(const Problem& problem, const Linearised& all, Correlation correlation,
+                        const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread,
+                        double inflation) {
+  if (!correlation.present) return bread;
+  // What the parameters take from few independent samples makes the residuals too small.
+  const double rows = problem.rows(), taken = static_cast<double>(scaled.cols());
+  const double left = std::max(rows - taken * inflation, 0.1 * rows);
+  const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
+  for (std::size_t row = 0; row < all.arc.size(); ++row)
+    if (all.arc[row] >= 0) correlation.row_scale[row] *= wider;
+  const Eigen::MatrixXd filling = correlation.row_scale.asDiagonal() * scaled * bread;
+  Eigen::MatrixXd covariance = filling.transpose() * filling;
+  for (const Eigen::VectorXd& offset : correlation.offsets) {
+    const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
+    covariance += shift * shift.transpose();
   }
-  // A displacement w t^2 with a standard normal t has the second moment 3 w w^T.
-  const Eigen::MatrixXd w =
-      bends(problem, u, all, scaled * svd.matrixV(), size.asDiagonal() * svd.matrixV(), inverse);
-  // Correlated residuals let the solution move further along a direction, by the root of `further`.
-  Eigen::MatrixXd follow = svd.matrixV() * inverse.asDiagonal() * w;
+  return covariance;
+}
+
+// Second moment of how far a bent valley takes the solution from the straight one. A displacement
+// w t^2 with a standard normal t has the second moment 3 w w^T.
+Eigen::MatrixXd of_bends(const Directions& seen, const Eigen::MatrixXd& w,
+                         const Eigen::MatrixXd& covariance) {
   constexpr double kMostBend = 5.0;
-  for (Eigen::Index k = 0; k < count; ++k) {
-    if (!(inverse[k] > 0.0)) continue;
-    const Eigen::VectorXd direction = svd.matrixV().col(k);
-    const double further = direction.dot(covariance * direction) / (inverse[k] * inverse[k]);
+  // Correlated residuals let the solution move further along a direction, by the root of `further`.
+  Eigen::MatrixXd follow = seen.axes * seen.inverse.asDiagonal() * w;
+  for (Eigen::Index k = 0; k < w.cols(); ++k) {
+    if (!(seen.inverse[k] > 0.0)) continue;
+    const Eigen::VectorXd direction = seen.axes.col(k);
+    const double further =
+        direction.dot(covariance * direction) / (seen.inverse[k] * seen.inverse[k]);
     const double bend = further * w.col(k).norm();
     follow.col(k) *=
         further * std::min(1.0, kMostBend * std::sqrt(further) / std::max(bend, 1e-300));
   }
-  covariance += 3.0 * follow * follow.transpose();
-  covariance += blind;  // after the sandwich, whose filling knows nothing of these directions
+  return 3.0 * follow * follow.transpose();
+}
+
+}  // namespace
+
+Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
+  const Linearised all = linearise(problem, u);
+  const int count = static_cast<int>(problem.free.size());
+  Uncertainty result;
+  Eigen::VectorXd size(count);
+  for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  const Directions seen = directions_of(problem, scaled, result);
+  Correlation correlation = correlation_of(problem, all, result);
+  Eigen::MatrixXd covariance =
+      widened(problem, all, std::move(correlation), scaled, seen.bread, result.whiteness.inflation);
+  const Eigen::MatrixXd w =
+      bends(problem, u, all, scaled * seen.axes, size.asDiagonal() * seen.axes, seen.inverse);
+  covariance += of_bends(seen, w, covariance);
+  covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
   result.identifiable.resize(count);
