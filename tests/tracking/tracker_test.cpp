@@ -40,6 +40,26 @@ TEST(TrackVideo, FollowsADiscThatRestsFirstAndLast) {
   EXPECT_FALSE(result.file.tracks[0].samples[0].has_metres()) << "no scale is known";
 }
 
+// The floor is filmed for a while before anything enters: longer than what is held in memory.
+TEST(TrackVideo, FindsADiscThatComesIntoViewLate) {
+  const ScratchFolder folder("late");
+  constexpr int kEnters = 150, kLength = 230;
+  const auto truth = [](int i) { return Eigen::Vector2d(2.5 * (i - kEnters) - 25.0, 70.0); };
+  write_clip(folder / "clip.mkv", drawn_floor(220, 140, 150.0), kLength, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, truth(i).x(), truth(i).y(), 16.0, 16.0, 0.0, 50.0);
+             });
+  TrackOptions options;
+  options.held_bytes = std::size_t{1} << 20;  // 34 of these pictures
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt, options);
+  ASSERT_EQ(result.file.tracks.size(), 1u);
+  const auto& samples = result.file.tracks[0].samples;
+  EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 0.3);
+  EXPECT_GT(samples.front().frame, kEnters);
+  EXPECT_LT(samples.front().frame, kEnters + 25) << "wholly in view from 17 on";
+  EXPECT_EQ(samples.back().frame, kLength - 1);
+}
+
 // Equal discs meet head on and exchange their motion; the one that stood must not inherit the
 // other's name.
 TEST(TrackVideo, TwoDiscsKeepTheirNamesThroughACollision) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
@@ -104,27 +105,36 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
   weigh_by_size(candidates, held.size());
   // One picture may fit a mirrored tilt or a shadow nearly as well as the body: the best of a few
   // counts, unless one is beyond doubt.
-  constexpr int kMostTries = 16, kEnough = 4;
-  std::optional<Seed> best;
-  double best_value = 0.0;
-  Plate plate;
-  int tries = 0, good = 0;
-  for (const Candidate& c : candidates) {
-    if (++tries > kMostTries || good >= kEnough) break;
-    const Frame& frame = held[c.held_index];
+  constexpr std::size_t kMostTries = 16;
+  constexpr int kEnough = 4;
+  if (candidates.size() > kMostTries) candidates.resize(kMostTries);
+  const auto tried = [&](std::size_t k) -> std::optional<Sighting> {
+    if (k >= candidates.size()) return std::nullopt;
+    const Frame& frame = held[candidates[k].held_index];
+    Plate plate;
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
     Look look{.frame = frame, .background = plate};
-    look.detection = c.detection;
-    const auto seen = finder.find(look);
-    if (!seen || seen->accepted < 0.4) continue;
-    const double clear = clarity(*seen);
-    const double value = clear * std::sqrt(c.score);
+    look.detection = candidates[k].detection;
+    return finder.find(look);
+  };
+  std::optional<Seed> best;
+  double best_value = 0.0, clearest = 0.0;
+  int good = 0;
+  const auto judge = [&](const Candidate& c, const std::optional<Sighting>& seen) {
+    if (!seen || seen->accepted < 0.4) return;
+    const double clear = clarity(*seen), value = clear * std::sqrt(c.score);
     if (value > best_value) {
       best_value = value;
       best = Seed{c.held_index, *seen};
     }
+    clearest = std::max(clearest, clear);
     if (clear > 0.5) ++good;
-    if (clear > 0.85) break;
+  };
+  // Two at a time, one on each core.
+  for (std::size_t k = 0; k < candidates.size() && good < kEnough && clearest <= 0.85; k += 2) {
+    auto second = std::async(std::launch::async, tried, k + 1);
+    judge(candidates[k], tried(k));
+    if (const auto seen = second.get()) judge(candidates[k + 1], seen);
   }
   return best;
 }

@@ -6,6 +6,7 @@
 
 #include "body_search.hpp"
 #include "recording.hpp"
+#include "trochoid/tracking/tracker.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -36,7 +37,7 @@ double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim
   return inside > 0 ? static_cast<double>(floor) / inside : 0.0;
 }
 
-/// The rims seen in the held frames, from the seed both ways.
+/// The rims seen in a window of frames, from the seed both ways.
 struct Watch {
   std::vector<double> radii, ratios, bore;
   cv::Rect2d box;
@@ -83,17 +84,20 @@ Inspection::Body watch(const std::vector<Frame>& held, const Background& backgro
 Inspection inspect_video(const std::filesystem::path& path) {
   SourceOptions how;
   how.chroma = true;
-  const Recording recording(path, how);
-  const auto& held = recording.held();
-  const Background background = Background::from_samples(recording.samples());
-  Inspection result;
-  result.video = recording.info();
-  result.watched_s = held.back().t_s - held.front().t_s;
-  result.restless = background.restless();
+  Recording recording(path, how, TrackOptions{}.held_bytes);
   const auto finder = make_rim_finder(false);
-  const std::vector<Follower::Others> nothing(held.size());
-  if (const auto seed = find_seed(held, background, *finder, nothing))
-    result.body = watch(held, background, *finder, *seed);
+  Inspection result;
+  // A body may come into view late.
+  while (!result.body && recording.advance(0)) {
+    const auto& window = recording.window();
+    const Background background = Background::from_samples(recording.samples());
+    result.watched_s = window.back().t_s;
+    result.restless = background.restless();
+    const std::vector<Follower::Others> nothing(window.size());
+    if (const auto seed = find_seed(window, background, *finder, nothing))
+      result.body = watch(window, background, *finder, *seed);
+  }
+  result.video = recording.info();
   return result;
 }
 

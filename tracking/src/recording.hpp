@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,35 +10,45 @@
 
 namespace trochoid::tracking {
 
-/// A recording as the tracker reads it: its first part held in memory, so that bodies can be sought
-/// in any order there and followed backwards, the rest streamed once. How much is held does not
-/// depend on the recording's length.
+/// A recording as the tracker reads it: a window that moves over it once, whose frames are held in
+/// memory so that bodies can be sought there in any order and followed backwards. How much is held
+/// does not depend on the recording's length.
 class Recording {
  public:
-  /// Pictures held at most [bytes].
-  static constexpr std::size_t kHeldBytes = 96u << 20;
-
-  /// Decodes the first part. @throws InputError as open_video does, or if the window holds no
-  /// frame.
-  Recording(const std::filesystem::path& path, const SourceOptions& options);
+  /// Opens the recording; its window is empty until the first advance().
+  /// @param held_bytes pictures in a window, but never fewer than twice Background::kSamples.
+  /// @throws InputError as open_video does.
+  Recording(const std::filesystem::path& path, const SourceOptions& options,
+            std::size_t held_bytes);
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
-  [[nodiscard]] const std::vector<Frame>& held() const { return held_; }
-  /// Lets the held frames go.
-  void release() { held_.clear(); }
-  /// Next frame after the held ones.
-  [[nodiscard]] std::optional<Frame> next();
-  /// Pictures spread over the whole recording, for the background: from the held part, and, where
-  /// more follows, from the frames of the file that decode alone.
-  [[nodiscard]] BackgroundSamples samples() const;
+  [[nodiscard]] const std::vector<Frame>& window() const { return window_; }
+  /// How many windows there were, the present one included.
+  [[nodiscard]] int windows() const { return windows_; }
+  /// Lets all but the last `keep` frames of the window go and reads on until it is full again.
+  /// `each`, if given, sees every new frame as it comes.
+  /// @return false if nothing followed: the window is then as it was.
+  /// @throws InputError if the first window holds no frame, and as FrameSource::next does.
+  bool advance(std::size_t keep, const std::function<void(const Frame&)>& each = {});
+  /// Pictures for the background: from the window and, where that is not all, from the windows
+  /// before it and the frames of the file that decode alone.
+  [[nodiscard]] BackgroundSamples samples();
+  /// No samples will be asked for any more: what was kept for them goes.
+  void stop_sampling();
 
  private:
+  void remember_window();
+  void read_ahead();
+
   std::filesystem::path path_;
   SourceOptions options_;
+  std::size_t held_bytes_;
   std::unique_ptr<FrameSource> source_;
-  std::vector<Frame> held_;
-  bool more_ = false;
-  std::optional<Frame> first_after_;
+  std::vector<Frame> window_;
+  int windows_ = 0;
+  bool ended_ = false;
+  std::vector<Frame> elsewhere_;  ///< pictures of other parts of the recording
+  bool looked_ahead_ = false, sampled_ = true;
 };
 
 }  // namespace trochoid::tracking

@@ -9,6 +9,7 @@
 
 #include "attitude_sequence.hpp"
 #include "body_search.hpp"
+#include "path_motion.hpp"
 #include "recording.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
@@ -53,29 +54,21 @@ class Tracking {
         scene_(scene),
         options_(options),
         objects_(std::max(options.objects, scene.tracking.objects)),
-        recording_(video, source_options(scene, options)),
+        recording_(video, source_options(scene, options), options.held_bytes),
         camera_(resolve_camera(scene, camera, recording_.info())) {
     if (objects_ < 1) throw InputError("the number of objects must be at least 1");
     choose_finder();
   }
 
   TrackResult run() {
-    background_ = Background::from_samples(recording_.samples());
-    explained_.resize(recording_.held().size());
-    for (int object = 0; object < objects_; ++object)
-      if (!follow_next_body(object)) break;
-    if (paths_.empty() && background_.camera_moves())
-      throw InputError(
-          fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
-                      "changes: put it on a stand, or track a "
-                      "part where it is still with --from and --to",
-                      video_.string()));
-    if (paths_.empty())
-      throw InputError(
-          fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
-                      "[tracking] in the scene",
-                      video_.string()));
-    follow_the_rest();
+    while (read_window()) {
+      settle();
+      while (bodies_missing() && follow_next_body()) {
+      }
+      if (!bodies_missing()) recording_.stop_sampling();
+      report_progress();
+    }
+    if (paths_.empty()) nothing_found();
     return result();
   }
 
@@ -104,70 +97,137 @@ class Tracking {
     return camera_ && camera_->exposure_fraction ? *camera_->exposure_fraction : 0.0;
   }
 
-  /// Whether what was followed ever moved, or turned: a reflection or a clamp that trembles with
-  /// its stand does not.
-  static bool moves(const BodyPath& path) {
-    constexpr double kTrembles_px = 0.7, kOfItsSize = 0.12, kTurns_rad = 0.3;
-    std::vector<double> x, y, turned;
-    for (const auto& [index, at] : path.frames) {
-      x.push_back(at.seen.centre_px.x());
-      y.push_back(at.seen.centre_px.y());
-      if (at.seen.turned_rad) turned.push_back(*at.seen.turned_rad);
-    }
-    // From the fifth to the ninety-fifth of a hundred: single slips do not count.
-    const auto spread = [](std::vector<double>& values) {
-      if (values.empty()) return 0.0;
-      std::sort(values.begin(), values.end());
-      return values[values.size() * 95 / 100] - values[values.size() * 5 / 100];
-    };
-    const double still_px = std::max(kTrembles_px, kOfItsSize * usual_radius_px(path));
-    return std::hypot(spread(x), spread(y)) > still_px || spread(turned) > kTurns_rad ||
-           path.frames.begin()->second.seen.pose;
+  [[nodiscard]] bool bodies_missing() const {
+    return paths_.size() < static_cast<std::size_t>(objects_);
   }
 
-  /// Finds one more body in the held frames and follows it both ways. False if there is none.
-  /// @param attempts how many more times to look when what was found does not move.
-  static constexpr int kAttempts = 4;
-  bool follow_next_body(int object, int attempts = kAttempts) {
-    const auto& held = recording_.held();
-    std::optional<Seed> seed;
-    if (object == 0 && scene_.tracking.at_px) {
-      seed = find_seed_at(held, background_, *finder_, *scene_.tracking.at_px);
-      if (!seed)
-        throw InputError(
-            fmt::format("{}: no rim found around the point given with --at", video_.string()));
-    } else {
-      if (attempts < kAttempts) seed = find_seed_turning(held, background_, *finder_);
-      if (!seed || attempts < kAttempts - 1)
-        seed = find_seed(held, background_, *finder_, explained_);
+  /// Where the camera moves everything does; a body that stood out would have at once.
+  [[nodiscard]] bool worth_looking() const {
+    return bodies_missing() && !(camera_moved_ && recording_.windows() > 1);
+  }
+
+  [[noreturn]] void nothing_found() const {
+    if (camera_moved_)
+      throw InputError(
+          fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
+                      "changes: put it on a stand, or track a "
+                      "part where it is still with --from and --to",
+                      video_.string()));
+    throw InputError(
+        fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
+                    "[tracking] in the scene",
+                    video_.string()));
+  }
+
+  /// Reads on, the bodies known so far followed as the frames come. False at the end.
+  bool read_window() {
+    const bool more = recording_.advance(kOverlap, [this](const Frame& frame) { see(frame); });
+    if (!more || !bodies_missing()) return more;
+    background_ = Background::from_samples(recording_.samples());
+    camera_moved_ = camera_moved_ || background_.camera_moves();
+    explained_.assign(recording_.window().size(), {});
+    for (const BodyPath& path : paths_) explain(path);
+    return true;
+  }
+
+  void see(const Frame& frame) {
+    Follower::Others others;
+    for (std::size_t k = 0; k < followers_.size(); ++k) {
+      auto seen = followers_[k]->follow(frame, others);
+      if (!seen) continue;
+      others.emplace_back(seen->centre_px, seen->rim.semi_major_px());
+      paths_[k].frames[frame.index] = {frame.t_s, trimmed(std::move(*seen))};
     }
-    if (!seed) return false;
+    ++frames_;
+    damaged_ += frame.damaged ? 1 : 0;
+    if (frames_ % 16 == 0) report_progress();
+  }
+
+  /// A body followed through the window, and its follower at the window's end, to go on with.
+  struct Followed {
     BodyPath path;
-    if (!seed->seen.pose) path.marks = marks_of(held[seed->held_index], seed->seen);
-    if (path.marks) seed->seen.turned_rad = 0.0, seed->seen.turned_sigma_rad = 0.01;
-    path.frames[held[seed->held_index].index] = {held[seed->held_index].t_s, seed->seen};
-    auto follower = std::make_unique<Follower>(*finder_, background_, path.marks);
+    std::unique_ptr<Follower> follower;
+  };
+
+  /// Finds one more body in the window and follows it both ways. False if there is none.
+  bool follow_next_body() {
+    if (paths_.empty() && scene_.tracking.at_px) {
+      add(follow_from(seed_pointed_at()));
+      return true;
+    }
+    constexpr int kAttempts = 4;
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      const auto seed = find_seed(recording_.window(), background_, *finder_, explained_);
+      if (!seed) return false;
+      Followed found = follow_from(*seed);
+      if (attempt == 0) prefer_one_that_turns(found);
+      explain(found.path);
+      if (!moves(found.path)) continue;
+      add(std::move(found));
+      return true;
+    }
+    return false;
+  }
+
+  void add(Followed found) {
+    paths_.push_back(std::move(found.path));
+    followers_.push_back(std::move(found.follower));
+  }
+
+  /// What looks most like a body but hardly moves may be part of the scene, and the body one that
+  /// turns in place: it explains more of what changes.
+  void prefer_one_that_turns(Followed& found) {
+    constexpr double kHardly_radii = 0.5;
+    if (found.path.frames.begin()->second.seen.pose || travel_in_radii(found.path) > kHardly_radii)
+      return;
+    const auto seed = find_seed_turning(recording_.window(), background_, *finder_);
+    if (!seed) return;
+    Followed other = follow_from(*seed);
+    const auto explains = [this](const Followed& followed) {
+      return moves(followed.path) ? changes_explained(followed.path, background_.active()) : 0;
+    };
+    if (explains(other) <= explains(found)) return;
+    explain(found.path);
+    found = std::move(other);
+  }
+
+  [[nodiscard]] Seed seed_pointed_at() const {
+    auto seed = find_seed_at(recording_.window(), background_, *finder_, *scene_.tracking.at_px);
+    if (!seed)
+      throw InputError(
+          fmt::format("{}: no rim found around the point given with --at", video_.string()));
+    return *seed;
+  }
+
+  /// Follows a body through the window, ahead and back at once.
+  [[nodiscard]] Followed follow_from(Seed seed) const {
+    BodyPath path;
+    const auto& window = recording_.window();
+    const Frame& start = window[seed.held_index];
+    if (!seed.seen.pose) path.marks = marks_of(start, seed.seen);
+    if (path.marks) seed.seen.turned_rad = 0.0, seed.seen.turned_sigma_rad = 0.01;
+    path.frames[start.index] = {start.t_s, seed.seen};
+    const auto follow = [&](Follower& follower, std::ptrdiff_t step, BodyPath::Frames& frames) {
+      follower.start(start, seed.seen);
+      const auto end = static_cast<std::ptrdiff_t>(window.size());
+      for (auto i = static_cast<std::ptrdiff_t>(seed.held_index) + step; i >= 0 && i < end;
+           i += step) {
+        const auto k = static_cast<std::size_t>(i);
+        if (auto seen = follower.follow(window[k], explained_[k]))
+          frames[window[k].index] = {window[k].t_s, trimmed(std::move(*seen))};
+      }
+    };
     BodyPath::Frames before;
     auto backward = std::async(std::launch::async, [&] {
       Follower back(*finder_, background_, path.marks);
-      back.start(held[seed->held_index], seed->seen);
-      for (std::size_t i = seed->held_index; i-- > 0;)
-        if (auto seen = back.follow(held[i], explained_[i]))
-          before[held[i].index] = {held[i].t_s, trimmed(std::move(*seen))};
+      follow(back, -1, before);
     });
-    follower->start(held[seed->held_index], seed->seen);
-    for (std::size_t i = seed->held_index + 1; i < held.size(); ++i)
-      if (auto seen = follower->follow(held[i], explained_[i]))
-        path.frames[held[i].index] = {held[i].t_s, trimmed(std::move(*seen))};
+    auto ahead = std::make_unique<Follower>(*finder_, background_, path.marks);
+    follow(*ahead, 1, path.frames);
     backward.get();
     path.frames.merge(before);
-    if (seed->seen.pose) decide(path, held, *follower);
-    explain(path);
-    const bool pointed_at = object == 0 && scene_.tracking.at_px;
-    if (!pointed_at && !moves(path)) return attempts > 0 && follow_next_body(object, attempts - 1);
-    paths_.push_back(std::move(path));
-    followers_.push_back(std::move(follower));
-    return true;
+    if (seed.seen.pose) decide(path, window, *ahead);
+    return {std::move(path), std::move(ahead)};
   }
 
   /// What consecutive frames say together: attitudes, and frames their neighbours can help.
@@ -206,46 +266,15 @@ class Tracking {
   }
 
   void explain(const BodyPath& path) {
-    const auto& held = recording_.held();
-    for (std::size_t i = 0; i < held.size(); ++i)
-      if (const auto at = path.frames.find(held[i].index); at != path.frames.end())
+    const auto& window = recording_.window();
+    for (std::size_t i = 0; i < window.size(); ++i)
+      if (const auto at = path.frames.find(window[i].index); at != path.frames.end())
         explained_[i].emplace_back(at->second.seen.centre_px, at->second.seen.rim.semi_major_px());
   }
 
-  /// Streams what follows the held frames past all followers.
-  void follow_the_rest() {
-    frames_ = static_cast<std::int64_t>(recording_.held().size());
-    for (const Frame& frame : recording_.held()) damaged_ += frame.damaged ? 1 : 0;
-    recording_.release();
-    report_progress();
-    std::vector<Frame> window;
-    std::size_t bytes = 0;
-    while (auto frame = recording_.next()) {
-      Follower::Others others;
-      for (std::size_t k = 0; k < followers_.size(); ++k) {
-        auto seen = followers_[k]->follow(*frame, others);
-        if (!seen) continue;
-        others.emplace_back(seen->centre_px, seen->rim.semi_major_px());
-        paths_[k].frames[frame->index] = {frame->t_s, trimmed(std::move(*seen))};
-      }
-      ++frames_;
-      damaged_ += frame->damaged ? 1 : 0;
-      if (frames_ % 16 == 0) report_progress();
-      bytes += frame->luma.total() + 2 * frame->chroma.total();
-      window.push_back(std::move(*frame));
-      // Large pictures: windows that are mostly overlap would decide the same frames repeatedly.
-      if (bytes < Recording::kHeldBytes / 2 || window.size() < 3 * kOverlap) continue;
-      settle(window);
-      bytes = bytes / window.size() * kOverlap;
-      window.erase(window.begin(), window.end() - kOverlap);
-    }
-    settle(window);
-    report_progress();
-  }
-
-  /// The last frames of a window open the next.
-  static constexpr std::ptrdiff_t kOverlap = 12;
-  void settle(const std::vector<Frame>& window) {
+  /// Attitudes of the bodies that were followed through the window.
+  void settle() {
+    const auto& window = recording_.window();
     if (window.size() <= kOverlap) return;
     for (std::size_t k = 0; k < followers_.size(); ++k)
       if (!paths_[k].frames.empty() && paths_[k].frames.begin()->second.seen.pose)
@@ -330,10 +359,13 @@ class Tracking {
   std::optional<data::Camera> camera_;
   std::unique_ptr<BodyFinder> finder_;
   Background background_;
-  std::vector<Follower::Others> explained_;  ///< per held frame
+  bool camera_moved_ = false;
+  std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;
   std::int64_t frames_ = 0, damaged_ = 0;
+  /// The last frames of a window open the next.
+  static constexpr std::size_t kOverlap = 12;
 };
 
 }  // namespace

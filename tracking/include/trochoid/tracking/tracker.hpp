@@ -15,6 +15,9 @@ struct TrackOptions {
   std::string from, to;
   Effort effort = Effort::normal;
   std::optional<std::filesystem::path> edges;  ///< CSV of accepted edge points per frame
+  /// Decoded pictures held in memory at once [bytes], but never fewer than 32 pictures: bodies are
+  /// sought, and followed backwards, within what is held.
+  std::size_t held_bytes = std::size_t{96} << 20;
   /// Called with frames done and frames promised (0 = unknown); may be empty.
   std::function<void(std::int64_t done, std::int64_t total)> progress;
 };
