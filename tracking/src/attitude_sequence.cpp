@@ -334,18 +334,50 @@ struct Neighbours {
   }
 };
 
-/// The nearest frames with a pose on either side, at most a few frames off; nothing at the ends.
-std::optional<Neighbours> neighbours_of(const std::vector<Glimpse>& glimpses, std::size_t i) {
+/// Frames in which clearly less speaks for the fit than in those around: it may have settled
+/// beside the body.
+std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kReach = 12, kFewest = 8;
+  constexpr double kOfUsual = 0.05, kDeviations = 2.5 * 1.48;
+  std::vector<bool> poor(glimpses.size(), false);
+  std::vector<double> around, off;
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  for (std::size_t i = 0; i < glimpses.size(); ++i) {
+    if (!glimpses[i].seen || !glimpses[i].seen->pose) continue;
+    around.clear(), off.clear();
+    for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
+         ++k)
+      if (const Glimpse& g = glimpses[k]; g.seen && g.seen->pose)
+        around.push_back(g.seen->pose->evidence);
+    if (around.size() < kFewest) continue;
+    const double usual = median(around);
+    for (const double evidence : around) off.push_back(std::abs(evidence - usual));
+    poor[i] = glimpses[i].seen->pose->evidence <
+              usual - std::max(kOfUsual * usual, kDeviations * median(off));
+  }
+  return poor;
+}
+
+/// The nearest frames with a good pose on either side, at most a few frames off; nothing at the
+/// ends.
+std::optional<Neighbours> neighbours_of(const std::vector<Glimpse>& glimpses,
+                                        const std::vector<bool>& poor, std::size_t i) {
   constexpr std::size_t kFarthest = 6;
   std::array<const Glimpse*, 2> before{}, after{};
   std::size_t count = 0;
   for (std::size_t k = 1; k <= kFarthest && k <= i && count < 2; ++k)
-    if (const Glimpse& g = glimpses[i - k]; g.seen && g.seen->pose) before[count++] = &g;
+    if (const Glimpse& g = glimpses[i - k]; g.seen && g.seen->pose && !poor[i - k])
+      before[count++] = &g;
   if (count == 0) return std::nullopt;
   if (count == 1) before[1] = before[0];
   count = 0;
   for (std::size_t k = 1; k <= kFarthest && i + k < glimpses.size() && count < 2; ++k)
-    if (const Glimpse& g = glimpses[i + k]; g.seen && g.seen->pose) after[count++] = &g;
+    if (const Glimpse& g = glimpses[i + k]; g.seen && g.seen->pose && !poor[i + k])
+      after[count++] = &g;
   if (count == 0) return std::nullopt;
   if (count == 1) after[1] = after[0];
   return Neighbours{*before[1], *before[0], *after[0], *after[1]};
@@ -361,6 +393,7 @@ void decide_attitudes(const Background& background, const BodyFinder& finder,
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
                           std::vector<Glimpse>& glimpses) {
   constexpr double kContradicted = 0.3, kNear = 0.35, kUsualShare = 0.5, kAsGood = 0.9;
+  constexpr double kBetter = 1.02;
   const bool alike = finder.faces_look_alike();
   std::vector<double> evidences;
   for (const Glimpse& g : glimpses)
@@ -370,8 +403,9 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
   std::nth_element(evidences.begin(), middle, evidences.end());
   const double usual = *middle;
   const std::vector<Glimpse> was = glimpses;
+  const std::vector<bool> poor = poor_fits(was);
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
-    const auto around = neighbours_of(was, i);
+    const auto around = neighbours_of(was, poor, i);
     if (!around) return;
     const auto& before = was[i].seen;
     if (before && !before->pose) return;
@@ -386,13 +420,16 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
       return std::max(between_axes(axis_of(s.pose->pose), axis, alike),
                       2.0 * (s.centre_px - guess.centre_px).norm() / size);
     };
-    if (before && off(*before) < kContradicted + 0.5 * step) return;
+    const bool contradicted = before && off(*before) >= kContradicted + 0.5 * step;
+    if (before && !contradicted && !poor[i]) return;
     const double frame_s = (around->b.frame->t_s - around->a.frame->t_s) /
                            static_cast<double>(around->b.frame->index - around->a.frame->index);
     auto seen = measure(*was[i].frame, guess, around->at(was[i].frame->t_s - frame_s, alike));
     if (!seen || !seen->pose || off(*seen) > kNear + 0.5 * step) return;
-    if (seen->pose->evidence < (before ? kAsGood * before->pose->evidence : kUsualShare * usual))
-      return;
+    const double least = !before        ? kUsualShare * usual
+                         : contradicted ? kAsGood * before->pose->evidence
+                                        : kBetter * before->pose->evidence;
+    if (seen->pose->evidence < least) return;
     if (before) seen->turned_rad = before->turned_rad;
     glimpses[i].seen = std::move(seen);
   });

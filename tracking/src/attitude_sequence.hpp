@@ -22,8 +22,8 @@ struct Glimpse {
 void decide_attitudes(const Background& background, const BodyFinder& finder,
                       std::vector<Glimpse>& glimpses);
 
-/// Measures frames again in which the body was lost, or seen in an attitude that its neighbours on
-/// both sides contradict, from where these say it was.
+/// Measures frames again, from where their neighbours on both sides say the body was: those in
+/// which it was lost, seen in an attitude these contradict, or fitted clearly worse than around.
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
                           std::vector<Glimpse>& glimpses);
 

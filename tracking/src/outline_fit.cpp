@@ -22,7 +22,7 @@ namespace {
 constexpr double kFarBlurPx = 2.5, kNearBlurPx = 1.0;
 constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, 0.1, false};
 constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
-// From a prediction: where the last sharp look then starts.
+// From a prediction that is off by more than the blur: where the last sharp look then starts.
 constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 2, 0.5, false};
 // Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
 Search exact(const Sampling& sampling, double blur_px, double outline_px) {
@@ -78,7 +78,7 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
 
 std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
   if (!a || !b) return a ? a : b;
-  return a->evidence >= b->evidence ? a : b;
+  return a->evidence * a->score >= b->evidence * b->score ? a : b;
 }
 
 std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
@@ -102,13 +102,36 @@ std::optional<Fitted> of_both_tilts(const Scenery& scenery, std::optional<Fitted
   return other && other->evidence > kNoticeably * fitted->evidence ? other : fitted;
 }
 
-// A prediction is often right to the blur already; the wider look is easily misled by shadows.
+double outline_length_px(const Scenery& scenery, const data::Pose<>& pose) {
+  constexpr double kStepPx = 8.0;
+  double length_px = 0.0;
+  for (const OutlineSample& sample :
+       outline_samples(scenery.body, pose, scenery.camera, scenery.motion, kStepPx))
+    if (sample.silhouette) length_px += sample.arc_px;
+  return length_px;
+}
+
+// How far the edges of a fit lie from where a pose would put them, rms [px].
+double moved_px(const Scenery& scenery, const Refined& refined, const data::Pose<>& from) {
+  const PoseMotion::Step step = scenery.motion.step_between(from, refined.pose);
+  double sum = 0.0;
+  for (const OutlineSample& sample : refined.samples) sum += std::pow(sample.motion.dot(step), 2);
+  return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(refined.samples.size())));
+}
+
+// A prediction is mostly right to the blur: looking from farther would only let shadows and the
+// body's other edges mislead it. Where it was not, or little then speaks for it, the wider looks
+// have their say.
 std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
                                           std::optional<double> blur_px) {
-  constexpr double kSure = 0.6;
-  std::optional<Fitted> fitted;
-  if (const auto drawn = refine(scenery, predicted, kDraw))
-    fitted = fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px);
+  constexpr double kClear = 0.8, kSure = 0.6, kFarPx = 0.8;
+  std::optional<Fitted> fitted =
+      fit_exactly(scenery, predicted, outline_length_px(scenery, predicted), blur_px);
+  if (!fitted || fitted->score < kClear || moved_px(scenery, fitted->refined, predicted) > kFarPx) {
+    if (const auto drawn = refine(scenery, predicted, kDraw))
+      fitted =
+          better(std::move(fitted), fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px));
+  }
   if (!fitted || fitted->score < kSure)
     fitted = better(std::move(fitted), fit_from(scenery, predicted));
   return of_both_tilts(scenery, std::move(fitted));
