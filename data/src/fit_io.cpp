@@ -322,13 +322,17 @@ Fit read_fit(const std::filesystem::path& path) {
   return fit;
 }
 
-void write_fit(const Fit& fit, const std::filesystem::path& path) {
-  check_fit(fit, path.string());
+std::string fit_text(const Fit& fit, const std::string& where) {
+  check_fit(fit, where);
   Json json;
   json["trochoid_fit"] = kVersion;
   json.update(to_json(fit));
   // Text from outside (a file name) may be broken UTF-8: replace it rather than refuse to write.
-  write_text(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", path);
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void write_fit(const Fit& fit, const std::filesystem::path& path) {
+  write_text(fit_text(fit, path.string()), path);
 }
 
 }  // namespace trochoid::data

@@ -10,6 +10,7 @@
 
 #include "canvas.hpp"
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -27,6 +28,7 @@ struct Options {
   std::string pattern = "9x6", dictionary = "4X4_50", floor;
   double square_mm = 0.0, marker_mm = 0.0, floor_height_mm = 0.0, radius_mm = 0.0;
   fs::path floor_points, circle_points, output, picture;
+  bool json = false;
 };
 
 tracking::BoardPattern pattern_of(const Options& options) {
@@ -169,6 +171,36 @@ void draw_check(const Options& options, const Views& views, data::Camera camera)
   write_picture(picture, options.picture);
 }
 
+void tell(const Options& options, const Views& views, const tracking::Calibration& result,
+          const std::string& floor) {
+  const auto worst = std::max_element(result.view_rms_px.begin(), result.view_rms_px.end());
+  const std::string& worst_name =
+      views.found[static_cast<std::size_t>(worst - result.view_rms_px.begin())].name;
+  const data::Camera& c = result.camera;
+  const Eigen::Vector3d at = c.position_m();
+  if (options.json)
+    return print_json({{"camera", options.output.string()},
+                       {"views", views.found.size()},
+                       {"pictures", views.looked_at},
+                       {"rms_px", result.rms_px},
+                       {"worst_view", worst_name},
+                       {"worst_rms_px", *worst},
+                       {"sigma_focal_px", result.sigma_focal_px},
+                       {"sigma_centre_px", result.sigma_centre_px},
+                       {"floor", floor},
+                       {"camera_m", {at.x(), at.y(), at.z()}}});
+  fmt::print(
+      "{}: board found in {} of {} pictures, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
+      options.output.string(), views.found.size(), views.looked_at, result.rms_px, *worst,
+      worst_name);
+  fmt::print(
+      "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
+      "{:.4f}, k2 {:.4f}\n",
+      c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
+      result.sigma_k1, c.distortion[1]);
+  fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
+}
+
 void run(const Options& options) {
   const tracking::BoardPattern pattern = pattern_of(options);
   const Views views = look_at_inputs(options, pattern);
@@ -176,19 +208,7 @@ void run(const Options& options) {
   const std::string floor = place_floor(options, views, result.camera);
   if (!options.picture.empty()) draw_check(options, views, result.camera);
   data::write_camera(result.camera, options.output);
-  const auto worst = std::max_element(result.view_rms_px.begin(), result.view_rms_px.end());
-  const data::Camera& c = result.camera;
-  fmt::print(
-      "{}: board found in {} of {} pictures, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
-      options.output.string(), views.found.size(), views.looked_at, result.rms_px, *worst,
-      views.found[static_cast<std::size_t>(worst - result.view_rms_px.begin())].name);
-  fmt::print(
-      "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
-      "{:.4f}, k2 {:.4f}\n",
-      c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
-      result.sigma_k1, c.distortion[1]);
-  const Eigen::Vector3d at = c.position_m();
-  fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
+  tell(options, views, result, floor);
   constexpr double kPoor_px = 1.0;
   if (result.rms_px > kPoor_px)
     throw NotGood(
@@ -231,6 +251,7 @@ void add_calibrate_command(CLI::App& app) {
       ->check(positive_number());
   command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
+  add_json_flag(*command, options->json);
   command->callback([options] { run(*options); });
 }
 

@@ -8,6 +8,7 @@
 
 #include "campaign.hpp"
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 struct Options {
   std::string manifest, part;
   int jobs = 0;
-  bool summary_only = false, again = false;
+  bool summary_only = false, again = false, json = false;
 };
 
 /// "3/10": the third tenth of the items, for one job of an array on a cluster.
@@ -66,7 +67,7 @@ void run_items(const Campaign& campaign, const std::vector<const CampaignItem*>&
   });
 }
 
-void summarise(const Campaign& campaign, bool whole) {
+void summarise(const Campaign& campaign, bool json) {
   const std::vector<CampaignLine> lines = collect(campaign);
   data::write_text(summary_csv(lines), campaign.folder / "summary.csv");
   data::write_text(summary_html(campaign, lines), campaign.folder / "summary.html");
@@ -79,14 +80,23 @@ void summarise(const Campaign& campaign, bool whole) {
     else
       ++(line.record.exit_status == 0 ? good : not_good);
   }
-  for (const CampaignLine& line : lines)
-    if (line.known && !line.record.done)
-      fmt::print("failed: {}: {}\n", line.record.name, line.record.message);
-  fmt::print("{} recordings: {} good, {} not good, {} failed, {} not run; see {} and summary.csv\n",
-             lines.size(), good, not_good, failed, open,
-             (campaign.folder / "summary.html").string());
-  if (whole && failed > 0)
-    throw NotGood(fmt::format("{} of {} recordings failed", failed, lines.size()));
+  const std::string page = (campaign.folder / "summary.html").string();
+  if (json) {
+    print_json({{"recordings", lines.size()},
+                {"good", good},
+                {"not_good", not_good},
+                {"failed", failed},
+                {"not_run", open},
+                {"summary", page}});
+  } else {
+    for (const CampaignLine& line : lines)
+      if (line.known && !line.record.done)
+        fmt::print("failed: {}: {}\n", line.record.name, line.record.message);
+    fmt::print(
+        "{} recordings: {} good, {} not good, {} failed, {} not run; see {} and summary.csv\n",
+        lines.size(), good, not_good, failed, open, page);
+  }
+  if (failed > 0) throw NotGood(fmt::format("{} of {} recordings failed", failed, lines.size()));
 }
 
 void run(const Options& options) {
@@ -102,7 +112,7 @@ void run(const Options& options) {
     run_items(campaign, items, options.jobs);
   }
   // One job of an array does not know what the others have left; the summary is made at the end.
-  if (options.part.empty()) summarise(campaign, true);
+  if (options.part.empty()) summarise(campaign, options.json);
 }
 
 }  // namespace
@@ -115,10 +125,12 @@ void add_campaign_command(CLI::App& app) {
       ->required();
   command->add_option("-j,--jobs", options->jobs, "Recordings at a time; 0: one per core")
       ->check(non_negative_number());
-  command->add_option(
+  CLI::Option* part = command->add_option(
       "--part", options->part,
       "Only the K-th of N equal shares, K/N, and no summary: for a cluster's array");
-  command->add_flag("--summary", options->summary_only, "Run nothing, write the summary");
+  command->add_flag("--summary", options->summary_only, "Run nothing, write the summary")
+      ->excludes(part);
+  add_json_flag(*command, options->json);
   command->add_flag("--again", options->again, "Run also what is done");
   command->footer(
       "Example:\n  trochoid campaign lab.toml\nwrites lab.campaign/: open summary.html");

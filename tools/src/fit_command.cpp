@@ -22,7 +22,7 @@ struct FitCommand {
   std::vector<std::string> tracks;
   std::string scene, output;
   std::optional<int> object;
-  bool compare = false;
+  bool compare = false, json = false;
   fitting::FitOptions options;
 };
 
@@ -104,7 +104,10 @@ void run(const FitCommand& command) {
   data::Fit fit = fit_job(tracks, scene, options, command.compare);
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
-  print(fit);
+  if (command.json)
+    fmt::print("{}", data::fit_text(fit, "fit"));
+  else
+    print(fit);
   if (!fit.converged) {
     const bool lacking = fit.verdict != "no_feature" && fit.comparison.empty();
     throw NotGood(fmt::format("the fit is not good: {}{}", fit.reason,
@@ -141,6 +144,7 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
       ->check(non_negative_number());
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
+  fit->add_flag("--json", command->json, "Print the fit as its file holds it (JSON)");
   fit->callback([command] { run(*command); });
 }
 

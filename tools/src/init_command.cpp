@@ -11,6 +11,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -27,7 +28,7 @@ using tracking::Inspection;
 struct Options {
   fs::path video, output;
   double radius_mm = 0.0;
-  bool force = false;
+  bool force = false, json = false;
 };
 
 constexpr double kFlatRatio =
@@ -138,6 +139,16 @@ void run(Options options) {
   const std::string text = scene_text(options, seen, radius_mm);
   (void)data::parse_scene(text, options.output.string());  // what is written can be read
   data::write_text(text, options.output);
+  if (options.json) {
+    nlohmann::ordered_json summary{{"scene", options.output.string()},
+                                   {"frame_rate_hz", seen.video.frame_rate_hz},
+                                   {"found", seen.body.has_value()}};
+    if (seen.body)
+      summary.update({{"kind", seen.body->bore_shows ? "ring" : "disc"},
+                      {"radius_px", seen.body->radius_px},
+                      {"frames", seen.body->frames}});
+    return print_json(summary);
+  }
   note(seen.body ? fmt::format("{}: {} of about {:.0f} px radius, followed through {} frames",
                                options.output.string(), seen.body->bore_shows ? "a ring" : "a disc",
                                seen.body->radius_px, seen.body->frames)
@@ -155,6 +166,7 @@ void add_init_command(CLI::App& app) {
   command->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known")
       ->check(positive_number());
   command->add_flag("--force", options->force, "Replace the scene if it exists");
+  add_json_flag(*command, options->json);
   command->footer("Example: trochoid init ring.mp4 --radius-mm 30 -o ring.toml");
   command->callback([options] { run(*options); });
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "overlay.hpp"
 #include "progress.hpp"
@@ -63,7 +64,7 @@ void run(const Options& options) {
     summary["height_px"] = frames.height_px;
   }
   if (options.json) {
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
     return;
   }
   for (const std::string& written : {options.output, options.still})
@@ -93,7 +94,7 @@ void add_overlay_command(CLI::App& app) {
       ->add_option("--fit-track", options->fit_track,
                    "Place of this track among those fitted together (0 = first)")
       ->check(non_negative_number());
-  command->add_flag("--json", options->json, "Print a summary as JSON");
+  add_json_flag(*command, options->json);
   command->footer(
       "Example:\n  trochoid overlay ring.mp4 --track ring.track.csv --fit ring.fit.json "
       "-o ring.overlay.mp4 --still ring.path.png");

@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "render_picture.hpp"
@@ -31,7 +32,7 @@ struct Options {
   double rate_hz = 0.0, until_s = 0.0;
   int width_px = 640, height_px = 480, quality = 14;
   double body = -1.0, floor = -1.0;  // brightness, instead of the style's colours
-  bool no_shadow = false, lossless = false;
+  bool no_shadow = false, lossless = false, json = false;
   RenderStyle style;
 };
 
@@ -299,6 +300,15 @@ void run(const Options& options) {
   data::write_camera(camera, targets.camera);
   data::write_text(object_of(scene, trajectory.model).dump(1) + "\n", targets.object);
   video.commit();
+  if (options.json)
+    return print_json({{"video", targets.video.string()},
+                       {"truth", targets.truth.string()},
+                       {"camera", targets.camera.string()},
+                       {"object", targets.object.string()},
+                       {"frames", frames},
+                       {"frame_rate_hz", rate_hz},
+                       {"width_px", camera.width_px},
+                       {"height_px", camera.height_px}});
   fmt::print("{}: {} frames of {} x {} at {:.6g} Hz, truth in {}\n", targets.video.string(), frames,
              camera.width_px, camera.height_px, rate_hz, targets.truth.string());
 }
@@ -356,6 +366,7 @@ void add_render_command(CLI::App& app) {
       ->check(CLI::Range(0, 51));
   command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)");
   add_look_options(*command, *options);
+  add_json_flag(*command, options->json);
   command->callback([options] { run(*options); });
 }
 

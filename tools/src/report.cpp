@@ -109,8 +109,7 @@ std::string parameter_section(const data::Fit& fit) {
       html += fmt::format(
           "<tr><td><code>{}</code></td><td "
           "class=\"number{}\">{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-          escaped(parameter.name),
-          given || !parameter.identifiable ? "" : " strong",
+          escaped(parameter.name), given || !parameter.identifiable ? "" : " strong",
           shown ? with_superscripts(value_words(parameter.value, parameter.sigma))
                 : fmt::format("{} ± ∞", short_number(parameter.value)),
           escaped(parameter.unit), status_words(parameter), escaped(parameter.note));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "report.hpp"
@@ -44,7 +45,7 @@ void run(const Options& options) {
   data::write_text(html, options.output);
   if (!options.path_svg.empty()) data::write_text(make_path_svg(input), options.path_svg);
   if (options.json)
-    fmt::print("{}\n", nlohmann::json{{"report", options.output}, {"bytes", html.size()}}.dump(2));
+    print_json({{"report", options.output}, {"bytes", html.size()}});
   else
     note("wrote " + options.output);
 }
@@ -61,7 +62,7 @@ void add_report_command(CLI::App& app) {
   command->add_option("-o,--output", options->output, "Page to write, .html")->required();
   command->add_option("--path-svg", options->path_svg,
                       "Also write the path as a picture for papers");
-  command->add_flag("--json", options->json, "Print a summary as JSON");
+  add_json_flag(*command, options->json);
   command->footer("Example:\n  trochoid report ring.trochoid/ -o report.html");
   command->callback([options] { run(*options); });
 }

@@ -3,11 +3,11 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "overlay.hpp"
 #include "progress.hpp"
 #include "report.hpp"
@@ -252,6 +252,7 @@ void tell(const Run& run, const Verdict& verdict, const Options& options) {
   const fs::path folder = folder_of(options);
   if (options.json) {
     nlohmann::ordered_json summary{{"folder", folder.string()},
+                                   {"report", (folder / "report.html").string()},
                                    {"verdict", verdict.sentence},
                                    {"grade", verdict.grade},
                                    {"frames", run.tracked.summary.frames},
@@ -260,8 +261,9 @@ void tell(const Run& run, const Verdict& verdict, const Options& options) {
     if (run.fit) {
       summary["model"] = run.fit->model;
       summary["converged"] = run.fit->converged;
+      summary["fit"] = (folder / (stem_of(options) + ".fit.json")).string();
     }
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
     return;
   }
   fmt::print("{}: {}\n", verdict.word, verdict.sentence);
@@ -346,7 +348,7 @@ void add_run_command(CLI::App& app) {
                    "Overlay plays this many times slower (default: at most 60 frames/s)")
       ->check(CLI::Range(0.01, 1000.0));
   command->add_option("--seed", options->seed, "Seed of everything random");
-  command->add_flag("--json", options->json, "Print the summary as JSON");
+  add_json_flag(*command, options->json);
   command->footer(
       "Example:\n  trochoid run ring.mp4 --scene ring.toml\nwrites ring.trochoid/; open "
       "ring.trochoid/report.html");

@@ -10,6 +10,7 @@
 #include "animation.hpp"
 #include "commands.hpp"
 #include "fitted_scene.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
@@ -33,7 +34,7 @@ struct Options {
   std::size_t arc = 0;
   std::optional<double> until_s, rate_hz, tolerance;
   std::string model, integrator;
-  bool list = false, steady = false, thesis = false;
+  bool list = false, steady = false, thesis = false, json = false;
 };
 
 void apply_overrides(const Options& options, data::Scene& scene) {
@@ -80,6 +81,23 @@ std::string stem_of(const Options& options) {
   return named.extension() == ".toml" ? named.stem().string() : options.scene;
 }
 
+void tell(const Options& options, const model::Trajectory& run, const fs::path& output,
+          const std::vector<std::string>& pictures) {
+  const std::string outcome(model::sentence(run.outcome));
+  if (options.json)
+    return print_json({{"trajectory", output.string()},
+                       {"rows", run.values.rows()},
+                       {"outcome", outcome},
+                       {"model", run.model},
+                       {"integrator", run.integrator},
+                       {"error_estimate_m", run.error_estimate_m},
+                       {"pictures", pictures}});
+  fmt::print("{}: {} rows, {}\n", output.string(), run.values.rows(), outcome);
+  note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
+                   run.integrator, run.integrator_reason, run.error_estimate_m));
+  for (const std::string& picture : pictures) fmt::print("{}\n", picture);
+}
+
 void simulate_scene(const Options& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
@@ -100,19 +118,17 @@ void simulate_scene(const Options& options) {
   data::Table table = trajectory_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
-  fmt::print("{}: {} rows, {}\n", output.string(), table.values.rows(),
-             model::sentence(run.outcome));
-  note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
-                   run.integrator, run.integrator_reason, run.error_estimate_m));
+  std::vector<std::string> pictures;
   if (!options.plots.empty())
     for (const fs::path& plot : write_trajectory_plots(table, stem, options.plots))
-      fmt::print("{}\n", plot.string());
+      pictures.push_back(plot.string());
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) {
     write_animation(table, options.animation);
-    fmt::print("{}\n", options.animation.string());
+    pictures.push_back(options.animation.string());
   }
 #endif
+  tell(options, run, output, pictures);
 }
 
 void run(const Options& options) {
@@ -155,6 +171,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_flag("--steady", options->steady,
                     "List the steady motions of the scene's body instead of running it");
   command->add_flag("--list", options->list, "List the bundled scenes");
+  add_json_flag(*command, options->json);
   command->footer("Example: trochoid simulate --scene thesis-base -o base.csv --plots plots/");
   command->callback([options] { run(*options); });
 }

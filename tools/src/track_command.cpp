@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "track_effort.hpp"
@@ -26,6 +27,7 @@ struct Options {
   std::string from, to, at;
   double rate_hz = 0.0;
   tracking::Effort effort = tracking::Effort::normal;
+  bool json = false;
 };
 
 Eigen::Vector2d parse_point(const std::string& text) {
@@ -56,6 +58,34 @@ void write_timing(const fs::path& track, double seconds, const tracking::TrackSu
   data::write_text(timing.dump(2) + "\n", path);
 }
 
+/// How many frames showed what, for people or for scripts.
+void tell(const Options& options, const tracking::TrackResult& result,
+          std::optional<std::int64_t> interpolated) {
+  const tracking::TrackSummary& s = result.summary;
+  if (!options.json) {
+    note(
+        fmt::format("{}: {} bodies in {} frames: {} found, {} lost, {} doubtful,{} {} frames "
+                    "damaged; metres: {}",
+                    options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost,
+                    s.doubtful, interpolated ? fmt::format(" {} interpolated,", *interpolated) : "",
+                    s.damaged, s.camera_words));
+    return;
+  }
+  nlohmann::ordered_json summary{{"track", options.output.string()},
+                                 {"bodies", result.file.tracks.size()},
+                                 {"frames", s.frames},
+                                 {"found", s.found},
+                                 {"lost", s.lost},
+                                 {"doubtful", s.doubtful},
+                                 {"damaged", s.damaged},
+                                 {"metres", s.camera_words}};
+  if (interpolated) {
+    summary["smooth"] = options.smooth.string();
+    summary["interpolated"] = *interpolated;
+  }
+  print_json(summary);
+}
+
 void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   check_output(options.output, {options.video, options.scene, options.camera});
@@ -78,19 +108,15 @@ void run(const Options& options) {
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   data::write_track(result.file, options.output);
-  std::string interpolated;
+  std::optional<std::int64_t> interpolated;
   if (!options.smooth.empty()) {
     const tracking::SmoothTrack smoothed = tracking::smooth_track(result.file);
     data::write_table(smoothed.table, options.smooth);
-    interpolated = fmt::format(" {} interpolated,", smoothed.interpolated);
+    interpolated = smoothed.interpolated;
   }
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   write_timing(options.output, elapsed.count(), result.summary);
-  const tracking::TrackSummary& s = result.summary;
-  note(fmt::format(
-      "{}: {} bodies in {} frames: {} found, {} lost, {} doubtful,{} {} frames damaged; metres: {}",
-      options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost, s.doubtful,
-      interpolated, s.damaged, s.camera_words));
+  tell(options, result, interpolated);
   const auto wanted = static_cast<std::size_t>(scene.tracking.objects);
   if (result.file.tracks.size() < wanted)
     throw NotGood(
@@ -124,6 +150,7 @@ void add_track_command(CLI::App& app) {
       *track, options->effort,
       "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
   track->add_option("-o,--output", options->output, "Track CSV to write")->required();
+  add_json_flag(*track, options->json);
   track->callback([options] { run(*options); });
 }
 

@@ -3,8 +3,8 @@
 
 namespace trochoid::tools {
 
-/// Finite numbers > 0, and >= 0; the refusal repeats the value and says what would be right (CLI11's
-/// own spell out the largest double).
+/// Finite numbers > 0, and >= 0; the refusal repeats the value and says what would be right
+/// (CLI11's own spell out the largest double).
 [[nodiscard]] CLI::Validator positive_number();
 [[nodiscard]] CLI::Validator non_negative_number();
 

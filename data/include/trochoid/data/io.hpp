@@ -22,6 +22,9 @@ void write_track(const TrackFile& file, const std::filesystem::path& path);
 [[nodiscard]] std::string to_toml(const Scene& scene);
 
 [[nodiscard]] Fit read_fit(const std::filesystem::path& path);
+/// The text of a fit file, ending in a newline.
+/// @param where names it in errors.
+[[nodiscard]] std::string fit_text(const Fit& fit, const std::string& where);
 void write_fit(const Fit& fit, const std::filesystem::path& path);
 
 [[nodiscard]] Camera read_camera(const std::filesystem::path& path);

@@ -1,0 +1,14 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+namespace trochoid::tools {
+
+/// --json: instead of words for people a command ends with one JSON object on stdout
+/// (docs/formats.md lists the keys).
+void add_json_flag(CLI::App& command, bool& json);
+
+/// Names from outside may be broken UTF-8: replaced rather than refused.
+void print_json(const nlohmann::ordered_json& summary);
+
+}  // namespace trochoid::tools
