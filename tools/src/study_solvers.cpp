@@ -13,6 +13,7 @@
 #include "plot.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
+#include "solver_bars.hpp"
 #include "study_runs.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -52,7 +53,9 @@ void print_machine() {
              std::thread::hardware_concurrency(), __VERSION__);
   fmt::print(
       "# error: largest |k - k_reference| over the run, against an 80-bit extrapolation "
-      "method in vector form\n# time: whole simulate() call, all outputs, fastest repeat\n");
+      "method in vector form\n# time: whole simulate() call: every column, the run that estimates "
+      "the error; fastest "
+      "repeat\n");
 }
 
 void print_rows(const std::vector<Row>& rows) {
@@ -147,7 +150,8 @@ void run(const Options& options) {
       rows, "evaluations of the right-hand side",
       [](const StudyRun& run) { return static_cast<double>(run.statistics.evaluations); },
       options.out / "solvers_evaluations.svg");
-  fmt::print("{}\n", (options.out / "solvers_time.svg").string());
+  study_solver_bars(options.repeats, options.out / "solver_bars.csv");
+  fmt::print("\n{}\n", (options.out / "solvers_time.svg").string());
 }
 
 }  // namespace
