@@ -286,9 +286,10 @@ class Chain {
       const Eigen::Vector2d px = 0.5 * (other->centre_px - seen->centre_px);
       const Eigen::Vector2d m =
           0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>();
-      seen->covariance_px2 += px * px.transpose();
-      seen->pose->covariance_px2 += px * px.transpose();
-      seen->pose->covariance_m2 += m * m.transpose();
+      const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
+      seen->covariance_px2 += px2;
+      seen->pose->covariance_px2 += px2, seen->pose->common.px2 += px2;
+      seen->pose->covariance_m2 += m2, seen->pose->common.m2 += m2;
     });
   }
 
@@ -362,8 +363,8 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
   return poor;
 }
 
-/// The nearest frames with a good pose on either side, at most a few frames off; nothing at the
-/// ends.
+/// The nearest frames with a good pose on either side, at most a few frames off; at an end, two on
+/// the same side.
 std::optional<Neighbours> neighbours_of(const std::vector<Glimpse>& glimpses,
                                         const std::vector<bool>& poor, std::size_t i) {
   constexpr std::size_t kFarthest = 6;
@@ -372,15 +373,61 @@ std::optional<Neighbours> neighbours_of(const std::vector<Glimpse>& glimpses,
   for (std::size_t k = 1; k <= kFarthest && k <= i && count < 2; ++k)
     if (const Glimpse& g = glimpses[i - k]; g.seen && g.seen->pose && !poor[i - k])
       before[count++] = &g;
-  if (count == 0) return std::nullopt;
+  const std::size_t earlier = count;
   if (count == 1) before[1] = before[0];
   count = 0;
   for (std::size_t k = 1; k <= kFarthest && i + k < glimpses.size() && count < 2; ++k)
     if (const Glimpse& g = glimpses[i + k]; g.seen && g.seen->pose && !poor[i + k])
       after[count++] = &g;
-  if (count == 0) return std::nullopt;
+  // At an end the two nearest lead beyond themselves.
+  if (earlier == 0 && count == 2) return Neighbours{*after[0], *after[0], *after[1], *after[1]};
+  if (count == 0 && earlier == 2) return Neighbours{*before[0], *before[0], *before[1], *before[1]};
+  if (earlier == 0 || count == 0) return std::nullopt;
   if (count == 1) after[1] = after[0];
   return Neighbours{*before[1], *before[0], *after[0], *after[1]};
+}
+
+/// Where a body would have been one frame before `pose`, moving as between its neighbours.
+Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
+  Pose earlier = pose;
+  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, kTurn);
+  const double turned = std::remainder(pose.phi_rad - before.phi_rad, kTurn) +
+                        std::remainder(after.phi_rad - pose.phi_rad, kTurn);
+  // More than half a turn in two frames.
+  earlier.phi_rad -= std::abs(turned) > 0.5 * kTurn ? 0.5 * turned : turn;
+  earlier.theta_rad -= 0.5 * (after.theta_rad - before.theta_rad);
+  earlier.centre_m -= 0.5 * (after.centre_m - before.centre_m);
+  return earlier;
+}
+
+/// Frames in which the body moves far during the exposure are measured again with how it moves as
+/// the frames on both sides know it: while it was followed, only the past did.
+void measure_smeared(const Background& background, const BodyFinder& finder,
+                     std::vector<Glimpse>& glimpses) {
+  constexpr double kLeastSmear_px = 1.5, kAsGood = 0.95, kNear = 0.25;
+  const double fraction = finder.exposure_fraction();
+  if (!(fraction > 0.0)) return;
+  const bool alike = finder.faces_look_alike();
+  const std::vector<Glimpse> was = glimpses;
+  const auto posed = [&](std::size_t i) { return was[i].seen && was[i].seen->pose; };
+  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+    if (i == 0 || i + 1 >= was.size() || !posed(i) || !posed(i - 1) || !posed(i + 1)) return;
+    const Sighting& seen = *was[i].seen;
+    if (seen.attitude_doubtful) return;
+    const double way_px = apart_px(*was[i - 1].seen, seen) + apart_px(seen, *was[i + 1].seen);
+    if (0.5 * fraction * way_px < kLeastSmear_px) return;
+    const Pose pose = seen.pose->pose;
+    Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
+    if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
+    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after));
+    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
+    const double off =
+        std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
+                 (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
+    if (off > kNear) return;
+    again->turned_rad = seen.turned_rad;
+    glimpses[i].seen = std::move(again);
+  });
 }
 
 }  // namespace
@@ -433,6 +480,7 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
     if (before) seen->turned_rad = before->turned_rad;
     glimpses[i].seen = std::move(seen);
   });
+  measure_smeared(background, finder, glimpses);
 }
 
 }  // namespace trochoid::tracking

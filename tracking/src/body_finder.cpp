@@ -140,6 +140,7 @@ class CylinderFinder final : public BodyFinder {
       return 0.0;
     }
   }
+  [[nodiscard]] double exposure_fraction() const override { return exposure_fraction_; }
   [[nodiscard]] bool faces_look_alike() const override { return alike_; }
   [[nodiscard]] double mark_rad() const override {
     return body_.marks.empty() ? 0.0 : body_.marks.front().angle_rad;

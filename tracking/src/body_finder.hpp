@@ -55,6 +55,8 @@ class BodyFinder {
     return 0.0;
   }
   /// Poses (theta, phi) and (pi - theta, phi + pi) show the same picture.
+  /// Shutter time over frame interval; 0: not known.
+  [[nodiscard]] virtual double exposure_fraction() const { return 0.0; }
   [[nodiscard]] virtual bool faces_look_alike() const { return false; }
   /// Angle of the spin mark in the body, 0 without one.
   [[nodiscard]] virtual double mark_rad() const { return 0.0; }

@@ -1,6 +1,7 @@
 #include "colour_window.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -23,28 +24,38 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-// Colour on circles about the axis in the plane of the near face.
-bool colour_on_circles(const cv::Mat& chroma, const data::Body& body, const data::Camera& camera,
-                       const data::Pose<>& pose, const std::vector<double>& radii_m,
-                       Colour& colour) {
+// Points on circles about the axis in the plane of the near face.
+std::vector<Eigen::Vector2d> circle_points(const data::Body& body, const data::Camera& camera,
+                                           const data::Pose<>& pose,
+                                           const std::vector<double>& radii_m) {
   constexpr int kAround = 24;
-  constexpr size_t kFewest = 12;
   const Eigen::Vector3d face = pose.centre_m + body.half_thickness_m() * axis_towards(camera, pose);
   const Eigen::Vector3d along = node_line(pose), across = ascent(pose);
-  std::vector<double> cb, cr;
+  std::vector<Eigen::Vector2d> points;
   for (const double radius : radii_m)
     for (int i = 0; i < kAround; ++i) {
       const double a = 2.0 * std::numbers::pi * i / kAround;
-      const Eigen::Vector2d p = camera.image_from_table<double>(
-          face + radius * (std::cos(a) * along + std::sin(a) * across));
-      const int x = static_cast<int>(std::floor(0.5 * (p.x() + 0.5)));
-      const int y = static_cast<int>(std::floor(0.5 * (p.y() + 0.5)));
-      if (x < 0 || y < 0 || x >= chroma.cols || y >= chroma.rows) continue;
-      const auto c = chroma.at<cv::Vec2b>(y, x);
-      cb.push_back(c[0]);
-      cr.push_back(c[1]);
+      points.push_back(camera.image_from_table<double>(
+          face + radius * (std::cos(a) * along + std::sin(a) * across)));
     }
-  if (cb.size() < kFewest) return false;
+  return points;
+}
+
+constexpr size_t kFewestPoints = 12;
+
+bool colour_on_circles(const cv::Mat& chroma, const data::Body& body, const data::Camera& camera,
+                       const data::Pose<>& pose, const std::vector<double>& radii_m,
+                       Colour& colour) {
+  std::vector<double> cb, cr;
+  for (const Eigen::Vector2d& p : circle_points(body, camera, pose, radii_m)) {
+    const int x = static_cast<int>(std::floor(0.5 * (p.x() + 0.5)));
+    const int y = static_cast<int>(std::floor(0.5 * (p.y() + 0.5)));
+    if (x < 0 || y < 0 || x >= chroma.cols || y >= chroma.rows) continue;
+    const auto c = chroma.at<cv::Vec2b>(y, x);
+    cb.push_back(c[0]);
+    cr.push_back(c[1]);
+  }
+  if (cb.size() < kFewestPoints) return false;
   colour.middle = {median_of(cb), median_of(cr)};
   for (double& v : cb) v = std::abs(v - colour.middle.x());
   for (double& v : cr) v = std::abs(v - colour.middle.y());
@@ -52,7 +63,69 @@ bool colour_on_circles(const cv::Mat& chroma, const data::Body& body, const data
   return true;
 }
 
+bool luma_on_circles(const cv::Mat& luma, const data::Body& body, const data::Camera& camera,
+                     const data::Pose<>& pose, const std::vector<double>& radii_m, double& level) {
+  std::vector<double> levels;
+  for (const Eigen::Vector2d& p : circle_points(body, camera, pose, radii_m)) {
+    const int x = static_cast<int>(std::lround(p.x())), y = static_cast<int>(std::lround(p.y()));
+    if (x >= 0 && y >= 0 && x < luma.cols && y < luma.rows)
+      levels.push_back(luma.at<std::uint8_t>(y, x));
+  }
+  if (levels.size() < kFewestPoints) return false;
+  level = median_of(levels);
+  return true;
+}
+
+double light_of(double level) {
+  const double v = std::clamp(level / 255.0, 0.0, 1.0);
+  return 255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+double level_of(double light) {
+  const double v = std::max(0.0, light / 255.0);
+  return 255.0 * (v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055);
+}
+
+// Light of the three primaries of a surface with this luma, by BT.601.
+std::array<double, 3> primaries(const Tint& tint, double luma) {
+  const double cb = tint.cb * luma, cr = tint.cr * luma;
+  return {light_of(luma + 1.402 * cr), light_of(luma - 0.344 * cb - 0.714 * cr),
+          light_of(luma + 1.772 * cb)};
+}
+
 }  // namespace
+
+std::optional<Tints> tints_of(const cv::Mat& luma, const cv::Mat& chroma, const data::Body& body,
+                              const data::Camera& camera, const data::Pose<>& pose) {
+  constexpr double kNeutral = 128.0, kDarkest = 10.0;
+  if (chroma.empty()) return std::nullopt;
+  const double R = body.radius_m, band = R - body.inner_radius_m;
+  const auto tint_on = [&](const std::vector<double>& radii_m) -> std::optional<Tint> {
+    Colour colour;
+    double level = 0.0;
+    if (!colour_on_circles(chroma, body, camera, pose, radii_m, colour) ||
+        !luma_on_circles(luma, body, camera, pose, radii_m, level))
+      return std::nullopt;
+    level = std::max(level, kDarkest);
+    return Tint{(colour.middle.x() - kNeutral) / level, (colour.middle.y() - kNeutral) / level};
+  };
+  const auto inside = tint_on({R - 0.35 * band, R - 0.6 * band});
+  const auto outside = tint_on({1.4 * R, 1.7 * R});
+  if (!inside || !outside) return std::nullopt;
+  return Tints{*inside, *outside};
+}
+
+double mixing_error(const Tints& tints, double inner_light, double outer_light) {
+  constexpr double kLeastStep = 1.0;
+  const double inner = level_of(inner_light), outer = level_of(outer_light);
+  const auto one = primaries(tints.body, inner), other = primaries(tints.ground, outer);
+  double mixed = 0.0;
+  constexpr std::array<double, 3> kShare{0.299, 0.587, 0.114};
+  for (size_t k = 0; k < 3; ++k) mixed += kShare[k] * level_of(0.5 * (one[k] + other[k]));
+  const double step = outer_light - inner_light;
+  if (std::abs(step) < kLeastStep) return 0.0;
+  return (light_of(mixed) - 0.5 * (inner_light + outer_light)) / step;
+}
 
 LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window, const data::Body& body,
                           const data::Camera& camera, const data::Pose<>& pose) {

@@ -1,4 +1,6 @@
 #pragma once
+#include <optional>
+
 #include "edge_profile.hpp"
 #include "trochoid/data/body.hpp"
 #include "trochoid/data/camera.hpp"
@@ -17,5 +19,24 @@ inline constexpr double kColourBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0 + 4.0 / 6.0;
 [[nodiscard]] LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window,
                                         const data::Body& body, const data::Camera& camera,
                                         const data::Pose<>& pose);
+
+/// Colour of a surface in any light: by how much cb and cr differ from neutral, over the luma.
+struct Tint {
+  double cb = 0.0, cr = 0.0;
+};
+
+/// Colours of the body at `pose` and of its surroundings; nothing without chroma or where they
+/// cannot be seen.
+struct Tints {
+  Tint body, ground;
+};
+[[nodiscard]] std::optional<Tints> tints_of(const cv::Mat& luma, const cv::Mat& chroma,
+                                            const data::Body& body, const data::Camera& camera,
+                                            const data::Pose<>& pose);
+
+/// Light of different colours mixes linearly in each primary, but not in the luma: how far in the
+/// middle of an edge between these levels of light (0..255, outside the luma's transfer curve) the
+/// light taken from the luma is off, over the difference of the levels.
+[[nodiscard]] double mixing_error(const Tints& tints, double inner_light, double outer_light);
 
 }  // namespace trochoid::tracking

@@ -35,7 +35,7 @@ class LightWindow {
 
 /// Samples of picture and background plate along the normal of an outline; s grows outwards.
 struct Profile {
-  static constexpr int kMost = 48;
+  static constexpr int kMost = 64;
   static constexpr float kStepPx = 0.5f;
   int count = 0;
   float first_px = 0.0f;  ///< s of sample 0

@@ -20,6 +20,8 @@ using ShadingMatrix = Eigen::Matrix<double, kShading, kShading>;
 
 struct Columns {
   std::array<float, Profile::kMost> share, density, ground, strip;
+  std::array<float, Profile::kMost>
+      widening;  // of the share: derivative by the logarithm of the blur
 };
 
 struct Noise {
@@ -39,9 +41,28 @@ struct Working {
   Noise noise;
 };
 
-void columns_of(const StretchProfile& p, Columns& c) {
+// The mean of the steps of a profile at s, its derivative by s, and that by the logarithm of the
+// blur.
+struct Ramp {
+  float share = 0.0f, density = 0.0f, widening = 0.0f;
+};
+
+Ramp ramp_at(const StretchProfile& p, float s) {
   const NormalTable& table = NormalTable::instance();
-  const float inverse = 1.0f / static_cast<float>(p.blur_px);
+  Ramp ramp;
+  const bool swept = p.steps > 0;
+  const int count = swept ? p.steps : 1;
+  const float inverse = 1.0f / static_cast<float>(swept ? p.sharp_px : p.blur_px);
+  for (int k = 0; k < count; ++k) {
+    const float x = (swept ? s - p.step_at_px[static_cast<size_t>(k)] : s) * inverse;
+    const auto step = table.at(x);
+    ramp.share += step.share, ramp.density += step.density, ramp.widening += step.density * x;
+  }
+  const float part = 1.0f / static_cast<float>(count);
+  return {part * ramp.share, part * inverse * ramp.density, part * inverse * ramp.widening};
+}
+
+void columns_of(const StretchProfile& p, Columns& c) {
   const auto strip = static_cast<float>(p.strip_px);
   float mean = 0.0f;
   for (int j = 0; j < p.profile.count; ++j) mean += p.profile.background[static_cast<size_t>(j)];
@@ -49,12 +70,11 @@ void columns_of(const StretchProfile& p, Columns& c) {
   const float scale = p.plate ? static_cast<float>(p.profile.count) / std::max(mean, 1.0f) : 0.0f;
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const auto step = table.at(p.profile.s_px(j) * inverse);
-    c.share[k] = step.share;
-    c.density[k] = step.density * inverse;
-    c.strip[k] = p.strip_px > 0.0
-                     ? table.at((p.profile.s_px(j) + strip) * inverse).share - step.share
-                     : 0.0f;
+    const Ramp ramp = ramp_at(p, p.profile.s_px(j));
+    c.share[k] = ramp.share;
+    c.density[k] = ramp.density;
+    c.widening[k] = ramp.widening;
+    c.strip[k] = p.strip_px > 0.0 ? ramp_at(p, p.profile.s_px(j) + strip).share - ramp.share : 0.0f;
     c.ground[k] = p.plate ? scale * p.profile.background[k] : 1.0f;
   }
 }
@@ -77,17 +97,16 @@ bool plain_levels(const StretchProfile& p, const Columns& c, Working& w) {
 void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
   // Samples along the first index, so that the sums are dot products of whole vectors.
   Eigen::Matrix<float, Profile::kMost, kAll + 1> rows;
-  const auto inverse_blur = static_cast<float>(1.0 / p.blur_px);
   const int count = p.profile.count, whole = (count + 3) / 4 * 4;
   for (int j = 0; j < count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px(j), ground = c.ground[k];
     const float a = 1.0f - c.share[k], b = c.share[k] * ground;
-    const float d = (w.inner - w.outer * ground) * c.density[k];
+    const float contrast = w.inner - w.outer * ground, d = contrast * c.density[k];
     const float sa = s * a, sb = s * b;
     rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
     rows(j, 3) = sa, rows(j, 4) = sb, rows(j, 5) = s * sa, rows(j, 6) = s * sb;
-    rows(j, 7) = c.strip[k], rows(j, 8) = d * s * inverse_blur;
+    rows(j, 7) = c.strip[k], rows(j, 8) = contrast * c.widening[k];
     rows(j, kAll) = p.profile.light[k] - w.inner * a - w.outer * b;
   }
   rows.middleRows(count, whole - count).setZero();
@@ -284,6 +303,8 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   e.offset_px = offset;
   e.noise_variance_px2 = 1.0 / static_cast<double>(information);
   e.shading_variance_px2 = pull.dot(w.shading_covariance * pull);
+  constexpr int kStrip = kShading - 1;
+  e.strip_variance_px2 = pull[kStrip] * pull[kStrip] * w.shading_covariance(kStrip, kStrip);
   const float s = std::clamp(static_cast<float>(offset), p.profile.first_px, -p.profile.first_px);
   const float ground = c.ground[static_cast<size_t>(std::clamp(
       (s - p.profile.first_px) / Profile::kStepPx, 0.0f, static_cast<float>(p.profile.count - 1)))];

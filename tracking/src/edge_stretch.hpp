@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <vector>
 
 #include "edge_fit.hpp"
@@ -8,9 +9,15 @@ namespace trochoid::tracking {
 /// A profile across a predicted edge at s = 0.
 struct StretchProfile {
   Profile profile;
-  double blur_px = 0.7;  ///< of its edge
-  bool plate = false;    ///< the outer level is a multiple of the background plate
-  int curve = 0;         ///< neighbours are profiles of the same curve
+  double blur_px = 0.7;  ///< of its edge, were it a Gaussian step
+  /// An edge that moves during the exposure is the mean of steps at these places (about s = 0),
+  /// each blurred by `sharp_px`; none: one step at s = 0, blurred by `blur_px`.
+  static constexpr int kMostSteps = 12;
+  int steps = 0;
+  std::array<float, kMostSteps> step_at_px{};
+  double sharp_px = 0.7;
+  bool plate = false;  ///< the outer level is a multiple of the background plate
+  int curve = 0;       ///< neighbours are profiles of the same curve
   /// Distance inwards to an edge of the body itself, too near to look between: a strip of unknown
   /// level; 0: none.
   double strip_px = 0.0;

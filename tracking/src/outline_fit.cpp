@@ -172,27 +172,41 @@ bool believable(const Fitted& fitted) {
          fitted.refined.solution.covariance.allFinite();
 }
 
+PoseSpread spread_of(const Scenery& scenery, const data::Pose<>& pose,
+                     const Eigen::MatrixXd& step_covariance) {
+  PoseSpread spread;
+  const Eigen::MatrixXd centre = scenery.motion.velocities(pose).topRows<3>();
+  const Eigen::Matrix3d covariance = centre * step_covariance * centre.transpose();
+  const Eigen::Matrix<double, 2, 3> J = scenery.camera.jacobian_px_per_m(pose.centre_m);
+  spread.m2 = covariance.topLeftCorner<2, 2>();
+  spread.px2 = J * covariance * J.transpose();
+  spread.theta_rad2 = spread.across_rad2 = std::numeric_limits<double>::infinity();
+  if (const int rotation = scenery.motion.rotation(); rotation >= 0) {
+    spread.theta_rad2 = step_covariance(rotation, rotation);
+    spread.across_rad2 = step_covariance(rotation + 1, rotation + 1);
+  }
+  return spread;
+}
+
+void set_sigmas(const PoseSpread& spread, PoseMeasurement& m) {
+  m.covariance_m2 = spread.m2;
+  m.covariance_px2 = spread.px2;
+  m.sigma_theta_rad = std::sqrt(spread.theta_rad2);
+  m.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  const double sine = std::sin(m.pose.theta_rad), across = std::sqrt(spread.across_rad2);
+  constexpr double kLeastSine = 1e-6;
+  // Beyond a radian the direction of the tilt is simply not seen.
+  if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
+}
+
 PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   const Refined& r = fitted.refined;
   PoseMeasurement m;
   m.pose = r.pose;
   m.centre_px = scenery.camera.image_from_table<double>(r.pose.centre_m);
-  const auto velocities = scenery.motion.velocities(r.pose);
-  const Eigen::MatrixXd centre = velocities.topRows<3>();
-  const Eigen::Matrix3d covariance = centre * r.solution.covariance * centre.transpose();
-  const Eigen::Matrix<double, 2, 3> J = scenery.camera.jacobian_px_per_m(r.pose.centre_m);
-  m.covariance_m2 = covariance.topLeftCorner<2, 2>();
-  m.covariance_px2 = J * covariance * J.transpose();
-  m.sigma_theta_rad = m.sigma_phi_rad = std::numeric_limits<double>::infinity();
-  const int rotation = scenery.motion.rotation();
-  if (rotation >= 0) {
-    m.sigma_theta_rad = std::sqrt(r.solution.covariance(rotation, rotation));
-    const double sine = std::sin(r.pose.theta_rad);
-    const double across = std::sqrt(r.solution.covariance(rotation + 1, rotation + 1));
-    constexpr double kLeastSine = 1e-6;
-    // Beyond a radian the direction of the tilt is simply not seen.
-    if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
-  }
+  set_sigmas(spread_of(scenery, r.pose, r.solution.covariance), m);
+  m.common = spread_of(scenery, r.pose, r.solution.common);
+  m.inflation = r.solution.inflation;
   m.rms_px = r.solution.rms_px;
   m.blur_px = fitted.blur_px;
   m.accepted = fitted.score;
@@ -227,6 +241,22 @@ double spin_sigma_rad(const PoseMeasurement& m, const MarkReading& marks) {
 }
 
 }  // namespace
+
+void PoseMeasurement::inflate(double better) {
+  const double by = better / inflation;
+  const auto grown = [by](const auto& whole, const auto& fixed) {
+    return by * (whole - fixed) + fixed;
+  };
+  covariance_m2 = grown(covariance_m2, common.m2);
+  covariance_px2 = grown(covariance_px2, common.px2);
+  const double theta = sigma_theta_rad;
+  if (std::isfinite(theta)) sigma_theta_rad = std::sqrt(grown(theta * theta, common.theta_rad2));
+  if (std::isfinite(sigma_phi_rad)) {
+    const double sine = std::sin(pose.theta_rad), across = sigma_phi_rad * sine;
+    sigma_phi_rad = std::sqrt(grown(across * across, common.across_rad2)) / sine;
+  }
+  inflation = better;
+}
 
 OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camera camera,
                              Effort effort)
@@ -264,7 +294,12 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))
-          : PoseMotion::Step()};
+          : PoseMotion::Step(),
+      tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
+      evidence.predicted && evidence.previous && evidence.exposure_fraction > 0.0
+          ? std::optional(
+                ExposureMotion(*evidence.previous, starts.front(), evidence.exposure_fraction))
+          : std::nullopt};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;

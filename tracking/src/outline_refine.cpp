@@ -27,32 +27,58 @@ double clear_of_next(double next_px, double extent_px, double blur_px) {
   return std::min(extent_px, next_px - kClearOfBlur * std::min(blur_px, 1.0));
 }
 
+// The edge of an outline that sweeps over the picture during the exposure.
+void set_sweep(const Sweep& sweep, double own_blur_px, StretchProfile& look) {
+  const double mean = sweep.mean_px(), step = sweep.step_px();
+  look.steps = sweep.count;
+  look.sharp_px = std::sqrt(own_blur_px * own_blur_px + step * step / 12.0);
+  double square = 0.0;
+  for (int k = 0; k < sweep.count; ++k) {
+    const double at = sweep.shift_px[static_cast<size_t>(k)] - mean;
+    look.step_at_px[static_cast<size_t>(k)] = static_cast<float>(at);
+    square += at * at / sweep.count;
+  }
+  look.blur_px = std::sqrt(look.sharp_px * look.sharp_px + square);
+}
+
 // Whatever the picture of luma or colour shows near a point of the outline.
-bool look_at(const Scenery& scenery, const OutlineSample& sample, const Search& search, bool colour,
-             StretchProfile& look) {
+bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* sweep,
+             const Search& search, bool colour, StretchProfile& look) {
+  if (sweep != nullptr && sweep->count == 0) return false;
+  // Between two surfaces of the body there is no room for a ramp.
+  if (!sample.silhouette) sweep = nullptr;
   const double own_blur =
       colour ? std::hypot(search.blur_px, std::sqrt(kColourBlur2Px2)) : search.blur_px;
+  look.steps = 0;
   look.blur_px = blur_along(scenery, sample, own_blur);
+  double half_range = 0.0, middle = 0.0;
+  if (sweep != nullptr) {
+    set_sweep(*sweep, own_blur, look);
+    half_range = sweep->half_range_px();
+    middle = sweep->mean_px();
+  }
   const double widen = look.blur_px - search.blur_px;
-  const double extent = search.extent_px + 2.0 * widen;
-  double inside = clear_of_next(sample.inside_px, extent, look.blur_px);
+  constexpr double kMostExtent = 0.5 * (Profile::kMost - 1) * Profile::kStepPx;
+  const double extent = std::min(kMostExtent, search.extent_px + std::max(half_range, 2.0 * widen));
+  double inside = clear_of_next(sample.inside_px - half_range, extent, look.blur_px);
   // A wall too narrow to look past: a strip of its own beside the face.
   look.strip_px = 0.0;
   if (search.exact && sample.edge == Edge::lower_rim && inside < extent) {
     look.strip_px = sample.inside_px;
     inside = extent;
   }
-  const double outside = clear_of_next(sample.outside_px, extent, look.blur_px);
-  if (inside < kLeastInsidePx || outside < kLeastInsidePx) return false;
+  const double outside = clear_of_next(sample.outside_px - half_range, extent, look.blur_px);
+  const double least = kLeastInsidePx + half_range;
+  if (inside < least || outside < least) return false;
   static const LightWindow kNoPlate;
   const LightWindow& picture = colour ? scenery.colour : scenery.picture;
   const LightWindow& plate = sample.silhouette && !colour ? scenery.plate : kNoPlate;
-  if (!sample_profile(picture, plate, sample.image_px, sample.normal_px, inside, outside,
-                      look.profile))
+  const Eigen::Vector2d at_px = sample.image_px + middle * sample.normal_px;
+  if (!sample_profile(picture, plate, at_px, sample.normal_px, inside, outside, look.profile))
     return false;
   look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8);
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
-  look.plate = plate_explains(look.profile, 1.5 * look.blur_px);
+  look.plate = plate_explains(look.profile, std::max(1.5 * look.blur_px, half_range));
   return true;
 }
 
@@ -85,14 +111,20 @@ std::vector<Surroundings> surroundings_of(const std::vector<StretchProfile>& loo
   return out;
 }
 
+// Contrast over mean level: how strong an edge is.
+double tone_of(const ProfileEdge& edge) {
+  constexpr double kLeast = 0.2, kMost = 2.0;  // black beside white
+  return std::clamp(std::abs(edge.contrast) / std::max(edge.mean_level, 1.0), kLeast, kMost);
+}
+
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, rounded rims, levels beyond the range of the
 // picture.
 double model_sd_px(const StretchProfile& look, const Surroundings& around, bool silhouette) {
-  constexpr double kShapePx = 0.03, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
+  constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
   constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
-  const double shape_px = silhouette ? kShapePx : kOwnShapePx;
+  const double shape_px = silhouette ? kShapePx / tone_of(look.edge) : kOwnShapePx;
   const double steep_px = std::min(kMostPx, kUnderBlurPx * around.steepness);
   const double clipped_px = look.profile.clipped() ? kClippedPx : 0.0;
   // An edge wider than the picture's blur is not that of the body alone.
@@ -103,14 +135,34 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
                    kAlongShare * kAlongShare * look.edge.shading_variance_px2);
 }
 
+// What edges of a whole side of the body may be wrong by alike [px]: light beside them that is not
+// known by some share of it, and colours that luma mixes wrongly.
+double common_sd_px(const Scenery& scenery, const StretchProfile& look) {
+  constexpr double kUnknownPx = 0.025;        // beside an edge as strong as its mean level
+  const double step_px = 2.5 * look.blur_px;  // of a Gaussian edge: shift per share of its step
+  const ProfileEdge& e = look.edge;
+  const double tone = tone_of(e);
+  constexpr double kMostMixing = 0.3;
+  const double mixing = scenery.tints
+                            ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
+                                           e.mean_level + 0.5 * e.contrast)
+                            : 0.0;
+  return std::hypot(kUnknownPx / std::pow(tone, 1.5),
+                    step_px * std::min(kMostMixing, std::abs(mixing)));
+}
+
 EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, bool colour) {
   const bool bore = sample.edge == Edge::upper_bore || sample.edge == Edge::lower_bore;
   EdgeEquation e;
   e.motion = sample.motion.transpose();
   e.swell = bore ? -1.0 : 1.0;
   e.polarity = edge.contrast < 0.0 ? -1.0 : 1.0;
-  constexpr double kMostTone = 2.0;  // black beside white
+  constexpr double kMostTone = 2.0;
   e.tone = std::clamp(edge.contrast / std::max(edge.mean_level, 1.0), -kMostTone, kMostTone);
+  // Walls are lit like nothing else, and all along the rim alike.
+  constexpr double kLowerPx = 0.03;
+  if (sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore)
+    e.lower_px = std::hypot(kLowerPx, std::sqrt(edge.strip_variance_px2));
   e.group = colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
   e.colour = colour;
   e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
@@ -138,24 +190,28 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
   out.equations.push_back(equation);
 }
 
+// What one round looked at.
+struct Round {
+  std::vector<OutlineSample> outline;
+  std::vector<Sweep> sweeps;                         // during the exposure; empty: hardly any
+  std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
+  std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
+
+  [[nodiscard]] const Sweep* sweep(size_t i) const { return sweeps.empty() ? nullptr : &sweeps[i]; }
+};
+
 // Edges of the silhouette, each by itself.
-void collect_roughly(const Scenery& scenery, const std::vector<OutlineSample>& all,
-                     const Search& search, bool colour, Refined& out) {
+void collect_roughly(const Scenery& scenery, const Round& round, const Search& search, bool colour,
+                     Refined& out) {
+  const std::vector<OutlineSample>& all = round.outline;
   StretchProfile look;
   for (size_t i = 0; i < all.size(); ++i)
-    if (all[i].silhouette && look_at(scenery, all[i], search, colour, look) &&
+    if (all[i].silhouette && look_at(scenery, all[i], round.sweep(i), search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
       keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
       out.places.push_back(i);
     }
 }
-
-// What one round looked at.
-struct Round {
-  std::vector<OutlineSample> outline;
-  std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
-  std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
-};
 
 // All edges, also those between two surfaces of the body; returns what the blur should grow by.
 double collect_exactly(const Scenery& scenery, const Search& search, bool colour, Round& round,
@@ -167,7 +223,7 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
   looks.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i)
     if ((all[i].silhouette || !colour) &&
-        look_at(scenery, all[i], search, colour, looks[places.size()]))
+        look_at(scenery, all[i], round.sweep(i), search, colour, looks[places.size()]))
       places.push_back(i);
   looks.resize(places.size());
   const double wider = fit_stretches(looks);
@@ -177,15 +233,30 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i].edge, colour);
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
+    equation.common_px = common_sd_px(scenery, looks[i]);
     keep(sample, looks[i].edge, equation, out);
     out.places.push_back(places[i]);
   }
   return wider;
 }
 
+// Sweeps longer than the blur are ramps; shorter ones only widen the edges.
+void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round) {
+  constexpr double kLeastPx = 1.5, kPartPx = 1.2;
+  round.sweeps.clear();
+  if (!scenery.exposure) return;
+  double longest = 0.0;
+  for (const OutlineSample& sample : round.outline)
+    longest = std::max(longest, std::abs(sample.motion.dot(scenery.smear)));
+  if (longest < kLeastPx) return;
+  round.sweeps = sweeps_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose,
+                           round.outline, static_cast<int>(std::ceil(longest / kPartPx)));
+}
+
 bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, double step_px,
              Round& round, Refined& out) {
   round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion, step_px);
+  find_sweeps(scenery, pose, round);
   out.outline_px = 0.0;
   for (const OutlineSample& sample : round.outline)
     if (sample.silhouette) out.outline_px += sample.arc_px;
@@ -196,7 +267,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
   for (const bool colour : {false, true}) {
     if (colour && scenery.colour.empty()) continue;
     if (!search.exact) {
-      collect_roughly(scenery, round.outline, search, colour, out);
+      collect_roughly(scenery, round, search, colour, out);
       continue;
     }
     const double wider = collect_exactly(scenery, search, colour, round, out);
@@ -277,10 +348,16 @@ double outline_score(const Refined& refined) {
 
 double evidence_of(const Refined& refined) {
   constexpr double kTolerancePx = 0.1;
+  // A residual of this size halves what an edge says, however clear it is, if it claims to be
+  // exact.
+  constexpr double kHalvesPx = 0.3;
   double evidence = 0.0;
-  for (size_t i = 0; i < refined.edges.size(); ++i)
-    evidence += refined.equations[i].arc_px *
-                certainty(refined.edges[i], refined.equations[i].residual_px, kTolerancePx);
+  for (size_t i = 0; i < refined.edges.size(); ++i) {
+    const EdgeEquation& e = refined.equations[i];
+    const double off2 = e.residual_px * e.residual_px /
+                        (kHalvesPx * kHalvesPx + e.variance_px2 + e.model_px * e.model_px);
+    evidence += e.arc_px * certainty(refined.edges[i], e.residual_px, kTolerancePx) / (1.0 + off2);
+  }
   return evidence;
 }
 

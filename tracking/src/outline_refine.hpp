@@ -2,7 +2,9 @@
 #include <optional>
 #include <vector>
 
+#include "colour_window.hpp"
 #include "edge_stretch.hpp"
+#include "exposure.hpp"
 #include "outline_samples.hpp"
 #include "robust_step.hpp"
 #include "trochoid/tracking/effort.hpp"
@@ -20,7 +22,9 @@ struct Scenery {
   LightWindow picture, plate;
   LightWindow colour;  ///< colour_window, or empty
   Sampling sampling;
-  PoseMotion::Step smear{};  ///< the body's motion during the exposure; empty: not known
+  PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
+  std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
+  std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
 
   /// The same with both windows blurred.
   [[nodiscard]] Scenery blurred(double sigma_px) const {
@@ -31,7 +35,9 @@ struct Scenery {
             plate.blurred(sigma_px),
             colour.blurred(sigma_px),
             sampling,
-            smear};
+            smear,
+            tints,
+            exposure};
   }
 };
 

@@ -76,6 +76,12 @@ struct Row {
       sum += value[static_cast<size_t>(k)] * x[static_cast<size_t>(index[static_cast<size_t>(k)])];
     return sum;
   }
+  // Adds weight * row^T.
+  void add_to(double weight, Vector& x) const {
+    for (int k = 0; k < count; ++k)
+      x[static_cast<size_t>(index[static_cast<size_t>(k)])] +=
+          weight * value[static_cast<size_t>(k)];
+  }
   // Adds weight * row^T row and weight * row * offset.
   void accumulate(double weight, double offset, ArrowSystem& system) const {
     for (int a = 0; a < count; ++a) {
@@ -172,6 +178,32 @@ double jackknife_ratio(const std::vector<EdgeEquation>& equations, const std::ve
   const Eigen::MatrixXd off = answers.colwise() - mean;
   const Eigen::MatrixXd variance = (kSectors - 1.0) / kSectors * off * off.transpose();
   return covariance.ldlt().solve(variance).trace() / static_cast<double>(n);
+}
+
+// What errors common to whole sides of the outline do to the answer: no residual shows them, and
+// nothing is estimated of them.
+Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
+                                  const std::vector<Row>& rows, const ArrowSystem& factorised,
+                                  double scale, int first, int count) {
+  constexpr size_t kLower = 4, kPatterns = 5;
+  std::array<Vector, kPatterns> patterns{};
+  for (size_t i = 0; i < equations.size(); ++i) {
+    const EdgeEquation& e = equations[i];
+    const double weight = e.weight / (e.variance_px2 * scale * scale);
+    if (e.group < 2) {
+      const auto side = static_cast<size_t>(2 * e.group);
+      rows[i].add_to(weight * e.common_px * std::cos(e.direction_rad), patterns[side]);
+      rows[i].add_to(weight * e.common_px * std::sin(e.direction_rad), patterns[side + 1]);
+    }
+    if (e.lower_px > 0.0) rows[i].add_to(weight * e.lower_px, patterns[kLower]);
+  }
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
+  for (Vector& pattern : patterns) {
+    factorised.solve(pattern);
+    const Eigen::Map<const Eigen::VectorXd> answer(&pattern[static_cast<size_t>(first)], count);
+    covariance += answer * answer.transpose();
+  }
+  return covariance;
 }
 
 // Tukey's weights about the solution so far, for errors that are `scale` times as large as claimed.
@@ -297,11 +329,11 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   // Noise grows with the correlation, what the edge models may be wrong by does not.
   const double inflation = out.correlation * scale2 / (scale * scale);
   out.covariance = inflation * inverse;
-  // The sixths share some of their errors, so that the ratio is a little low; a small one may also
-  // be luck.
-  constexpr double kShared = 1.3, kLeast = 0.6, kMostInflated = 25.0;
+  constexpr double kLeast = 0.6, kMost = 25.0;  // a small ratio may also be luck
   const double ratio = jackknife_ratio(equations, rows, prior, scale, out.covariance);
-  if (std::isfinite(ratio)) out.covariance *= std::clamp(kShared * ratio, kLeast, kMostInflated);
+  if (std::isfinite(ratio)) out.inflation = std::clamp(ratio, kLeast, kMost);
+  out.common = common_covariance(equations, rows, solving.system, scale, first, n);
+  out.covariance = out.inflation * out.covariance + out.common;
   return true;
 }
 

@@ -22,6 +22,11 @@ struct EdgeEquation {
   double model_px = 0.0;
   int group = 0;               ///< 0 .. kGroups - 1
   double direction_rad = 0.0;  ///< of the normal
+  /// What it may be wrong by together with all others of its group: alike for the whole lit side of
+  /// a body, opposite on the dark one, so that only the answer moves and no residual shows it [px].
+  double common_px = 0.0;
+  /// The same, for all edges of the far face and the wall against those of the near face [px].
+  double lower_px = 0.0;
   /// Seen in the colour planes: with a shift of these planes and one along the normal as nuisances.
   bool colour = false;
   double offset_px = 0.0;
@@ -35,6 +40,10 @@ struct EdgeEquation {
 struct RobustSolution {
   PoseMotion::Step step;
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
+  Eigen::MatrixXd common;      ///< of it, what errors common to whole sides of the outline do
+  /// Variance the rest has been multiplied by: how far the answer moves without parts of the
+  /// outline, over what was expected. Noisy; frames of one clip have nearly the same.
+  double inflation = 1.0;
   double swell_px = 0.0, polarity_px = 0.0;
   Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
   double rms_px = 0.0;

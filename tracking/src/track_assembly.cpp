@@ -59,6 +59,24 @@ void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bo
   if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
 }
 
+/// Inflation of the covariances, smoothed over neighbours in time: one frame's own says as much
+/// about the frame, partly hidden maybe, as about luck.
+std::vector<double> smoothed_inflations(const BodyPath& path) {
+  constexpr std::size_t kReach = 10;
+  std::vector<double> logs;
+  for (const auto& [index, at] : path.frames)
+    logs.push_back(at.seen.pose ? std::log(at.seen.pose->inflation) : 0.0);
+  std::vector<double> smoothed;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const std::size_t from = i - std::min(i, kReach), to = std::min(logs.size(), i + kReach + 1);
+    double sum = 0.0;
+    for (std::size_t k = from; k < to; ++k) sum += logs[k];
+    const double around = sum / static_cast<double>(to - from);
+    smoothed.push_back(std::exp(std::max(around, 0.5 * (around + logs[i]))));
+  }
+  return smoothed;
+}
+
 }  // namespace
 
 double usual_radius_px(const BodyPath& path) {
@@ -78,6 +96,8 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
   data::Track track{.object = object, .samples = {}};
   Unwrapper phi(2.0 * kPi);
   Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
+  const std::vector<double> inflations = smoothed_inflations(path);
+  auto inflation = inflations.begin();
   for (const auto& [index, at] : path.frames) {
     const Sighting& seen = at.seen;
     data::TrackSample sample;
@@ -87,10 +107,13 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
                      std::clamp(seen.centre_px.y() / std::max(1, options.height_px - 1), 0.0, 1.0);
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
+    const double usual = *inflation++;
     if (seen.pose) {
-      sample.centre_m = seen.pose->pose.centre_m.head<2>();
-      sample.covariance_m2 = seen.pose->covariance_m2;
-      angles_from_pose(sample, *seen.pose, options.fold, options.mark_rad);
+      PoseMeasurement pose = *seen.pose;
+      pose.inflate(usual);
+      sample.centre_m = pose.pose.centre_m.head<2>();
+      sample.covariance_m2 = pose.covariance_m2;
+      angles_from_pose(sample, pose, options.fold, options.mark_rad);
     } else {
       metres_from_rim(sample, seen, rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.

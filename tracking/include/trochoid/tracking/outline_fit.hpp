@@ -21,6 +21,14 @@ struct EdgePoint {
   double residual_px = 0.0;   ///< along the normal, after the fit
 };
 
+/// Covariance of a pose in parts that add up.
+struct PoseSpread {
+  Eigen::Matrix2d m2 = Eigen::Matrix2d::Zero();   ///< of the centre's x, y [m^2]
+  Eigen::Matrix2d px2 = Eigen::Matrix2d::Zero();  ///< of its projection [px^2]
+  double theta_rad2 = 0.0;
+  double across_rad2 = 0.0;  ///< of the axis, at right angles to theta
+};
+
 /// What one frame says about the pose of the body, with the covariance of what was estimated.
 struct PoseMeasurement {
   data::Pose<> pose;               ///< psi only if a mark was read
@@ -30,12 +38,19 @@ struct PoseMeasurement {
   double sigma_theta_rad = 0.0;    ///< infinite when the image does not tell
   double sigma_phi_rad = 0.0;
   std::optional<double> sigma_psi_rad;
+  /// Of these, what does not come from the scatter of this frame's edges.
+  PoseSpread common;
+  /// Variance by which the scatter has been multiplied because parts of the outline contradict each
+  /// other; noisy, frames of one clip have nearly the same: PoseMeasurement::inflate.
+  double inflation = 1.0;
+  /// Replaces `inflation` by a better one.
+  void inflate(double better);
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
   double accepted = 0.0;  ///< fraction of the predicted outline with an accepted edge
   /// Sum over the outline [px] of how much better its edges explain the picture than none would,
   /// less their misfit: compares fits to one picture.
   double evidence = 0.0;
-  double blur_px = 0.0;   ///< of the edges of this picture, for the next one
+  double blur_px = 0.0;  ///< of the edges of this picture, for the next one
   std::vector<EdgePoint> edges;
 };
 

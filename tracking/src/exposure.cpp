@@ -1,0 +1,120 @@
+#include "exposure.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace trochoid::tracking {
+namespace {
+
+using Pose = data::Pose<>;
+using Edge = data::OutlinePoint::Edge;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+Eigen::Vector3d axis_of(const Pose& pose) {
+  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+}
+
+Eigen::Vector3d turned(const Eigen::Vector3d& v, double angle_rad) {
+  return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * v;
+}
+
+// Edges that take each other's place as the body turns: the outer border, that of the bore, and
+// those between two surfaces of the body each for itself.
+int family_of(Edge edge, bool silhouette) {
+  const bool bore = edge == Edge::upper_bore || edge == Edge::lower_bore;
+  return silhouette ? (bore ? 1 : 0) : 2 + static_cast<int>(edge);
+}
+
+// Where an outline crosses the normal of a sample: from its point nearest to that line, along the
+// tangent there. Nothing if it does not cross it on this side or does so at a grazing angle.
+std::optional<double> crossing_px(const std::vector<data::OutlinePoint>& outline,
+                                  const OutlineSample& sample) {
+  constexpr double kLeastCosine = 0.5, kFarthestPx = 3.0;
+  const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
+  const int family = family_of(sample.edge, sample.silhouette);
+  const data::OutlinePoint* nearest = nullptr;
+  double least = kFarthestPx;
+  for (const auto& point : outline) {
+    const double aside = std::abs(along.dot(point.image_px - sample.image_px));
+    if (aside >= least || point.normal_px.dot(sample.normal_px) < kLeastCosine ||
+        family_of(point.edge, point.silhouette) != family)
+      continue;
+    least = aside;
+    nearest = &point;
+  }
+  if (nearest == nullptr) return std::nullopt;
+  return nearest->normal_px.dot(nearest->image_px - sample.image_px) /
+         nearest->normal_px.dot(sample.normal_px);
+}
+
+}  // namespace
+
+ExposureMotion::ExposureMotion(const Pose& before, const Pose& middle, double fraction) {
+  constexpr double kLeastSine = 0.1;
+  steep_ = std::min(std::sin(before.theta_rad), std::sin(middle.theta_rad)) < kLeastSine;
+  const double turn = std::remainder(middle.phi_rad - before.phi_rad, kTurn);
+  tilt_rad_ = fraction * (middle.theta_rad - before.theta_rad);
+  precession_rad_ = fraction * turn;
+  axis_ = fraction * (axis_of(middle) - axis_of(before));
+  // Whatever rolls on its rim turns its velocity as it turns its axis.
+  const double half_turn = steep_ ? 0.0 : 0.5 * turn;
+  shift_m_ = fraction * turned(middle.centre_m - before.centre_m, half_turn);
+}
+
+Pose ExposureMotion::at(const Pose& middle, double share) const {
+  Pose pose = middle;
+  if (steep_) {
+    set_axis((axis_of(middle) + share * axis_).normalized(), pose);
+    pose.centre_m += share * shift_m_;
+    return pose;
+  }
+  pose.theta_rad += share * tilt_rad_;
+  pose.phi_rad += share * precession_rad_;
+  pose.centre_m += share * turned(shift_m_, 0.5 * share * precession_rad_);
+  return pose;
+}
+
+double Sweep::mean_px() const {
+  double sum = 0.0;
+  for (int k = 0; k < count; ++k) sum += shift_px[static_cast<size_t>(k)];
+  return count > 0 ? sum / count : 0.0;
+}
+
+double Sweep::half_range_px() const {
+  if (count == 0) return 0.0;
+  const auto [least, most] = std::minmax_element(shift_px.begin(), shift_px.begin() + count);
+  return 0.5 * (*most - *least + step_px());
+}
+
+double Sweep::step_px() const {
+  double sum = 0.0;
+  for (int k = 1; k < count; ++k)
+    sum += std::abs(shift_px[static_cast<size_t>(k)] - shift_px[static_cast<size_t>(k) - 1]);
+  return count > 1 ? sum / (count - 1) : 0.0;
+}
+
+std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
+                             const PoseMotion& motion, const ExposureMotion& exposure,
+                             const Pose& middle, const std::vector<OutlineSample>& outline,
+                             int parts) {
+  constexpr double kStepPx = 1.5;
+  parts = std::clamp(parts, 1, Sweep::kMost);
+  std::vector<Sweep> sweeps(outline.size());
+  std::vector<bool> lost(outline.size(), false);
+  for (int k = 0; k < parts; ++k) {
+    const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));
+    const auto moved = data::visible_outline(body, pose, camera, kStepPx);
+    for (size_t i = 0; i < outline.size(); ++i) {
+      if (lost[i]) continue;
+      const auto crossing = crossing_px(moved, outline[i]);
+      lost[i] = !crossing;
+      if (crossing) sweeps[i].shift_px[static_cast<size_t>(k)] = *crossing;
+    }
+  }
+  for (size_t i = 0; i < outline.size(); ++i) sweeps[i].count = lost[i] ? 0 : parts;
+  return sweeps;
+}
+
+}  // namespace trochoid::tracking
