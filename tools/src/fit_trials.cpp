@@ -73,7 +73,12 @@ Attempt attempt(const MadeTrack& made, const std::string& strategy,
   options.threads = 1;
   Attempt result;
   const double begin = thread_time_ms();
-  result.fit = fitting::fit(std::span(&made.track, 1), made.scene, options);
+  try {
+    result.fit = fitting::fit(std::span(&made.track, 1), made.scene, options);
+  } catch (const Error& error) {  // a track the fit does not take, as a puck that hardly slides
+    result.fit.outcome = "refused";
+    result.fit.reason = error.what();
+  }
   result.time_ms = thread_time_ms() - begin;
   return result;
 }
@@ -167,7 +172,7 @@ double chi2_of(const MadeTrack& made, const data::Fit& fit) {
 }
 
 struct Draw {
-  bool used = false;
+  bool used = false, refused = false;
   std::map<std::string, bool> inside;
   double mahalanobis2 = 0.0;
   double likelihood_ratio = 0.0;  // chi-square at the truth less chi-square at the fit
@@ -179,6 +184,7 @@ Draw draw(const MadeTrackOptions& tracks, std::uint64_t seed, int index) {
   const Attempt from_truth = attempt(made, "single", made.truth);
   const Attempt tried = attempt(made, "auto", {});
   Draw result;
+  result.refused = tried.fit.outcome == "refused";
   result.used = answered(tried.fit) && near_best(tried.fit.chi2, from_truth.fit.chi2);
   if (!result.used) return result;
   const Eigen::VectorXd errors = errors_of(made, tried.fit);
@@ -234,6 +240,7 @@ Coverage fit_coverage(const MadeTrackOptions& tracks, int draws, std::uint64_t s
   Coverage coverage;
   coverage.draws = draws;
   for (const Draw& one : all) {
+    coverage.refused += one.refused;
     if (!one.used) continue;
     ++coverage.used;
     coverage.parameters = static_cast<int>(one.inside.size());

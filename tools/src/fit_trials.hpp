@@ -43,7 +43,8 @@ struct FitTrial {
 /// How often error bars hold the truth.
 struct Coverage {
   int draws = 0;
-  int used = 0;  ///< fits that reached the optimum
+  int used = 0;     ///< fits that reached the optimum
+  int refused = 0;  ///< tracks that a fit does not take
   int parameters = 0;
   std::map<std::string, double> inside_95;  ///< share of 95 % intervals that hold the truth
   double mahalanobis2 = 0.0;                ///< mean squared distance of the truth

@@ -54,8 +54,8 @@ void print_table(const std::vector<FitStrategy>& strategies, const std::vector<F
 }
 
 void print_coverage(const Coverage& coverage) {
-  fmt::print("\nerror bars of {} fits without a guess ({} at the optimum):\n", coverage.draws,
-             coverage.used);
+  fmt::print("\nerror bars of {} fits without a guess ({} at the optimum, {} tracks not taken):\n",
+             coverage.draws, coverage.used, coverage.refused);
   for (const auto& [name, share] : coverage.inside_95)
     fmt::print("  95 % interval of {:<22} holds the truth in {:5.2f} %\n", name, 100.0 * share);
   fmt::print("  mean squared Mahalanobis distance {:.3f} for {} parameters ({:+.2f} %)\n",
