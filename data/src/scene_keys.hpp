@@ -74,6 +74,7 @@ void camera_keys(Visit&& visit) {
   visit("scale_px_per_m", &CameraSettings::scale_px_per_m, kPositive);
   visit("height_m", &CameraSettings::height_m, kPositive);
   visit("readout_s", &CameraSettings::readout_s, kNonNegative);
+  visit("rows", &CameraSettings::rows, kPositive);
   visit("frame_rate_hz", &CameraSettings::frame_rate_hz, kPositive);
   visit("exposure_s", &CameraSettings::exposure_s, kNonNegative);
 }

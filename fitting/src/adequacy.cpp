@@ -37,6 +37,8 @@ Squares squares(const Problem& problem, const Solution& solution) {
 namespace {
 
 constexpr double kHopeless = 4.0;  // times the noise: far beyond what a tracker misjudges
+constexpr double kDoubtful = 2.0;
+constexpr const char* kChannelWords[] = {"positions", "tilt", "azimuth", "spin angle"};
 
 // A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
 // samples scatter far less about a smooth curve.
@@ -76,7 +78,11 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
     for (const Reading& reading : arc.readings)
       rows += reading.channel == Channel::position ? 2 : 0;
   const double path = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
-  const bool path_followed = sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
+  // Stated sigmas without pixels are somebody's word for independent errors.
+  const bool tracked = std::all_of(problem.arcs.begin(), problem.arcs.end(),
+                                   [](const ArcData& a) { return a.filmed || a.sigma_unknown; });
+  const bool path_followed =
+      tracked && sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
   Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
@@ -85,7 +91,9 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
       scatter = std::max(scatter, excess_scatter(arc, channel));
     const double times = problem.noise_scale[c] / scatter;
     if (channel == Channel::position && path_followed) continue;
-    if (channel != Channel::position &&
+    // Where the angle is all there is, being followed is not enough.
+    const bool whole = problem.predictor->model_name() == "pivot" && times >= kAnyTracker;
+    if (channel != Channel::position && !whole &&
         problem.noise_scale[c] * typical_sigma(problem, channel) < kFollowed_rad)
       continue;
     if (seen(problem, channel) && times > worst.times) worst = {times, channel};
@@ -185,7 +193,8 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
   fit.verdict_words = fit.reason;
 }
 
-void accept(const Solution& solution, const Uncertainty& error, data::Fit& fit) {
+void accept(const Solution& solution, const Uncertainty& error, const Misfit& worst,
+            data::Fit& fit) {
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
@@ -201,7 +210,14 @@ void accept(const Solution& solution, const Uncertainty& error, data::Fit& fit) 
     words += fmt::format(", and what is left looks like noise ({:.2g} times the stated)",
                          fit.noise_scale);
   const std::vector<std::string> open = undetermined(fit);
-  fit.verdict = !open.empty() ? "weak" : correlated ? "good_correlated" : "good";
+  const bool doubtful = worst.times > kDoubtful;
+  fit.verdict = doubtful || !open.empty() ? "weak" : correlated ? "good_correlated" : "good";
+  if (doubtful)
+    words += fmt::format(
+        "; but the residuals of its {} are {:.2g} times their noise: the model lacks something, or "
+        "a "
+        "better minimum exists, and the error bars are too small",
+        kChannelWords[static_cast<int>(worst.channel)], worst.times);
   if (!open.empty()) words += "; not determined: " + listed(open);
   fit.verdict_words = words;
 }
@@ -213,7 +229,6 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   const Squares sum = squares(problem, solution);
   warn_unexplained(sum, fit);
   const Misfit worst = misfit(problem, sum);
-  const char* const kChannelWords[] = {"positions", "tilt", "azimuth", "spin angle"};
   const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
   if (!solution.converged) return refuse("no_convergence", "unexplained", solution.message, fit);
   if (!explains_path(sum))
@@ -231,7 +246,7 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                               "model '{}', whose parameters mean nothing here",
                               kPolynomials[degree], fit.model),
                   fit);
-  accept(solution, error, fit);
+  accept(solution, error, worst, fit);
 }
 
 }  // namespace trochoid::fitting

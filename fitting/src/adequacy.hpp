@@ -19,7 +19,8 @@ struct Squares {
 ///                    beyond 8 times; or a 30th of the motion's variance left
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
-///   weak             explained, but parameters of the motion are not determined
+///   weak             explained, but parameters of the motion are not determined; or residuals
+///                    beyond 2 times those measures
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
 /// Sets converged, outcome, reason, verdict and verdict_words; warns of residuals above the

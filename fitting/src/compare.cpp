@@ -149,6 +149,16 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   return sigma_known ? rms : rms / std::sqrt(std::max(seen.sum / seen.rows, 1e-300));
 }
 
+// A model that has no answer to part of the track does not predict the rest.
+double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& rung,
+                             const FitOptions& options) {
+  try {
+    return held_back(tracks, rung, options);
+  } catch (const Error&) {
+    return kInfinity;
+  }
+}
+
 constexpr double kWhite = 0.01;  // p-value above which residuals count as white
 
 // Parameters that `below` does not have start at a fiftieth of their typical size: near the known
@@ -190,7 +200,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
-      rung.held_back_rms_sigma = held_back(tracks, rung, options);
+      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   } catch (const NumericalError&) {
     rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
   }
@@ -400,7 +410,11 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     again.model.clear();
     again.start = values_of(chosen->fit);
     if (!again.start.empty()) again.strategy = "single";
-    result.fit = fit(tracks, chosen->scene, again);
+    try {
+      result.fit = fit(tracks, chosen->scene, again);
+    } catch (const NumericalError& error) {
+      result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
+    }
   }
   for (const Rung& rung : rungs)
     if (rung.fitted) result.fit.comparison.push_back(table_row(rung, &rung == chosen));

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/parallel.hpp"
@@ -48,26 +49,26 @@ Start start_from(const Problem& solved, const std::string& path) {
   return start;
 }
 
-// The search proper, on a problem whose spin angle is out of the way.
-Found search_path(const Problem& problem, const Quest& quest) {
-  constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
-  Found best;
-  const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  for (const model::Predictor* relative : quest.relatives) {
-    Problem easier = for_predictor(problem, *relative);
-    const bool rolls = relative->model_name() == "rolling";
-    const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
-    if (!rough.solution.usable || rough.unexplained > kRoughly) continue;
-    easier.set_base(rough.solution.u);
-    const Start start = start_from(easier, rough.path);
-    for (const int window : {all, std::max(24, all / 4)}) {
-      Found found = grow(problem, start, window);
-      if (better(found, best)) best = std::move(found);
-      if (best.passed || best.unexplained < kExplained) return best;
-    }
+// What an easier model makes of the losses stands for what it lacks itself.
+Start with_given_losses(const Problem& problem, Start start) {
+  for (const FreeParameter& parameter : problem.free)
+    if (is_loss(problem, parameter))
+      start.values[problem.predictor->parameters()[parameter.index].name] = parameter.given;
+  return start;
+}
+
+// From a relative's solution over its bridges: a start for the model itself.
+Start carried_over(const Problem& problem, const Relative& relative, Start start) {
+  for (const model::Predictor* bridge : relative.bridges) {
+    Problem between = for_predictor(problem, *bridge);
+    apply(start, between);
+    const Solution solution =
+        solve(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
+    if (!solution.usable) continue;
+    between.set_base(solution.u);
+    start = start_from(between, start.path);
   }
-  Found found = search(problem, quest.starter);
-  return better(found, best) ? found : best;
+  return start;
 }
 
 // Without angles a sliding body's neighbouring valleys explain its path nearly as well.
@@ -78,6 +79,39 @@ Found look_about(const Problem& problem, Found found) {
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   if (seen || !rim || (found.passed && !slides)) return found;
   return hop(problem, std::move(found), kMisses);
+}
+
+// The search proper, on a problem whose spin angle is out of the way.
+Found search_path(const Problem& problem, const Quest& quest) {
+  constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
+  constexpr double kSlowly = 1.2;
+  Found best;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const auto take = [&](Found found) {
+    found = look_about(problem, std::move(found));
+    if (better(found, best)) best = std::move(found);
+    return surely_found(problem, best);
+  };
+  bool searched = false;
+  for (const Relative& relative : quest.relatives) {
+    if (relative.model == nullptr) {
+      searched = true;
+      if (take(search(problem, quest.starter))) return best;
+      continue;
+    }
+    Problem easier = for_predictor(problem, *relative.model);
+    easier.rough = true;
+    const bool rolls = relative.model->model_name() == "rolling";
+    const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
+    if (!rough.solution.usable || rough.unexplained > kRoughly) continue;
+    easier.set_base(rough.solution.u);
+    const Start near = start_from(easier, rough.path);
+    if (take(grow(problem, carried_over(problem, relative, near), all))) return best;
+    const Start plain = with_given_losses(problem, near);
+    if (take(grow(problem, plain, std::max(24, all / 4), kSlowly))) return best;
+  }
+  if (!searched) take(search(problem, quest.starter));
+  return best;
 }
 
 Found find_arc(const Problem& problem, const Quest& quest) {
@@ -103,7 +137,7 @@ Found find_arc(const Problem& problem, const Quest& quest) {
     throw InputError(
         fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
                     options.strategy));
-  Found best = look_about(problem, search_path(problem, quest));
+  Found best = search_path(problem, quest);
   if (best.passed || !quest.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
   return from_given.solution.usable &&

@@ -4,14 +4,22 @@
 
 namespace trochoid::fitting {
 
+/// An easier model, searched without a guess, and the steps from its solution to the model's own:
+/// each is minimised from where the one before it ended.
+struct Relative {
+  const model::Predictor* model = nullptr;  ///< null: now the model itself
+  std::vector<const model::Predictor*> bridges;
+};
+
 /// How to look for a solution.
 struct Quest {
   Starter starter;
   const FitOptions* options = nullptr;
   bool start_given = false;
   /// Easier relatives of the model, tried first: a sliding body may nearly roll, and a softened
-  /// friction law has a smooth cost. Their parameters are found by name.
-  std::vector<const model::Predictor*> relatives;
+  /// friction law has a smooth cost. Their parameters are found by name. The model itself comes
+  /// last unless it is in the list.
+  std::vector<Relative> relatives;
 };
 
 /// Every arc alone (in parallel), without a guess or from the given start; then all arcs together

@@ -10,6 +10,7 @@
 #include "observed.hpp"
 #include "prepare.hpp"
 #include "profile.hpp"
+#include "smoothing.hpp"
 #include "starter.hpp"
 #include "statistics.hpp"
 #include "trochoid/data/error.hpp"
@@ -31,7 +32,7 @@ Found search_without_outliers(Problem& problem, const Quest& quest) {
 Solution settle_weights(Problem& problem, Solution solution, double fixed_tolerance) {
   // Weights within half a per cent and chi-square within a millionth: a hundredth of a sigma.
   constexpr double kSettled = 5e-3;
-  for (int round = 0; round < 6; ++round) {
+  for (int round = 0; round < 4; ++round) {
     const double change = reweight(problem, solution.u, true);
     if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
     Solution next = solve(problem, solution.u, {.iterations = 20, .function_tolerance = 1e-7});
@@ -64,6 +65,7 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
   solution = settle_weights(problem, std::move(solution), options.tolerance);
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);
   problem.set_base(solution.u);
+  name_attitudes(problem);
   solution.u = problem.start();
   return solution;
 }
@@ -78,6 +80,11 @@ data::Fit& refuse(const Problem& problem, const std::string& reason, data::Fit& 
 
 void add_what_was_asked_for(const Problem& problem, const Solution& solution,
                             const Uncertainty& error, const FitOptions& options, data::Fit& fit) {
+  if (!fit.converged) {  // the spread about a path that is not the body's means nothing
+    if (options.profile || options.bootstrap > 0)
+      fit.warnings.push_back("no profile and no bootstrap of a fit that is not accepted");
+    return;
+  }
   if (options.profile)
     fit.profiles = profiles(problem, solution, error.covariance.diagonal().cwiseSqrt(),
                             error.whiteness.inflation, options.threads);
@@ -86,13 +93,22 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
                               options.bootstrap, options.seed, options.threads);
 }
 
+// Median time between samples.
+double frame_time_s(std::span<const data::Track> tracks) {
+  std::vector<double> steps_s;
+  for (const data::Track& track : tracks)
+    for (std::size_t i = 1; i < track.samples.size(); ++i)
+      steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
+  return median(std::move(steps_s));
+}
+
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
-                   const std::vector<const model::Predictor*>& relatives,
-                   const data::Scene& given_scene, const FitOptions& options) {
+                   const std::vector<Relative>& relatives, const data::Scene& given_scene,
+                   const FitOptions& options) {
   if (tracks.empty()) throw InputError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
-  const auto wrapped = observed(plain, scene);
+  const auto wrapped = observed(plain, scene, frame_time_s(tracks));
   const model::Predictor& predictor = wrapped ? *wrapped : plain;
   Problem problem = prepare(tracks, predictor, scene, options);
   data::Fit fit;
@@ -115,8 +131,8 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     return refuse(problem, failure.what(), fit);
   }
   describe(problem, solution, error, scene, fit);
-  add_what_was_asked_for(problem, solution, error, options, fit);
   judge(problem, solution, error, fit);
+  add_what_was_asked_for(problem, solution, error, options, fit);
   return fit;
 }
 
@@ -133,8 +149,11 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scen
   if (!options.model.empty()) scene.model.name = options.model;
   const auto predictor = model::make_predictor(scene);
   const auto relatives = relatives_of(scene);
-  std::vector<const model::Predictor*> plain;
-  for (const auto& relative : relatives) plain.push_back(relative.get());
+  std::vector<Relative> plain;
+  for (const OwnedRelative& owned : relatives) {
+    plain.push_back({owned.model.get(), {}});
+    for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
+  }
   return fit_with(tracks, *predictor, plain, scene, options);
 }
 

@@ -83,11 +83,13 @@ Eigen::MatrixX2d ArcData::positions_m() const {
 ArcData ArcData::keep(const std::vector<int>& samples) const {
   ArcData part = *this;
   part.t_s.clear();
+  part.row_px.clear();
   part.readings.clear();
   std::vector<int> renumbered(t_s.size(), -1);
   for (const int i : samples) {
     renumbered[i] = static_cast<int>(part.t_s.size());
     part.t_s.push_back(t_s[i]);
+    part.row_px.push_back(row_px[i]);
   }
   for (Reading reading : readings) {
     reading.sample = renumbered[reading.sample];
@@ -135,6 +137,7 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
     if (choice.psi) add_angle(arc, index, Channel::psi, sample.psi);
     arc.filmed |= sample.centre_px.allFinite();
     arc.t_s.push_back(sample.t_s);
+    arc.row_px.push_back(sample.centre_px.y());
   }
   for (const Channel channel : {Channel::theta, Channel::phi, Channel::psi}) {
     bool present = false;

@@ -27,7 +27,8 @@ struct ArcData {
   int track = 0;
   int object = 0;
   std::vector<double> t_s;
-  double start_s = 0.0;  ///< the initial state of the arc belongs to this instant
+  std::vector<double> row_px;  ///< where in the image each sample was; NaN: unknown
+  double start_s = 0.0;        ///< the initial state of the arc belongs to this instant
   std::vector<model::Observable> observables;
   std::vector<Reading> readings;
   int rows = 0;

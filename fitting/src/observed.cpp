@@ -1,6 +1,9 @@
 #include "observed.hpp"
 
+#include <algorithm>
 #include <limits>
+
+#include "timing.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -12,15 +15,23 @@ using model::PredictRequest;
 
 class ObservedPredictor : public model::Predictor {
  public:
-  ObservedPredictor(const model::Predictor& plain, bool scaled, bool timed)
+  struct Asked {
+    bool scale = false, factor = false, readout = false, delay = false;
+    [[nodiscard]] bool any() const { return scale || factor || readout || delay; }
+  };
+  ObservedPredictor(const model::Predictor& plain, const Asked& asked, double readout_s)
       : plain_(plain), infos_(plain.parameters()), own_(static_cast<int>(infos_.size())) {
-    const auto add = [&](const char* name, const char* meaning) {
-      infos_.push_back({name, "1", ParameterInfo::Role::observation, 0.0,
-                        std::numeric_limits<double>::infinity(), false, 1.0, true, meaning});
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const auto add = [&](const char* name, const char* unit, double value, const char* meaning) {
+      infos_.push_back({name, unit, ParameterInfo::Role::observation,
+                        unit[0] == 's' ? -kInfinity : 0.0, kInfinity, false, value, true, meaning});
       return static_cast<int>(infos_.size()) - 1;
     };
-    if (scaled) scale_ = add(kScale, "measured over true length");
-    if (timed) factor_ = add(kTimeFactor, "true over measured duration");
+    if (asked.scale) scale_ = add(kScale, "1", 1.0, "measured over true length");
+    if (asked.factor) factor_ = add(kTimeFactor, "1", 1.0, "true over measured duration");
+    // Applied where the samples' rows are known (timing.hpp).
+    if (asked.readout) add(kReadout, "s", readout_s, "rolling shutter, first to last row");
+    if (asked.delay) add(kAngleDelay, "s", 0.0, "angles later than positions");
   }
   [[nodiscard]] const std::string& model_name() const override { return plain_.model_name(); }
   [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override { return infos_; }
@@ -93,7 +104,8 @@ Prediction ObservedPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& v
 
 }  // namespace
 
-std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene) {
+std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene,
+                                           double frame_s) {
   auto& prior = scene.fit.prior;
   const bool from_radius = scene.camera.file.empty() && !scene.camera.scale_px_per_m;
   if (const auto radius = prior.find("radius_m");
@@ -107,10 +119,17 @@ std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, da
         assumed_hz / rate->second.value,
         assumed_hz * rate->second.sigma / (rate->second.value * rate->second.value)};
   }
-  const bool scaled = scene.fit.free_scale || prior.contains(kScale);
-  const bool timed = prior.contains(kTimeFactor);
-  if (!scaled && !timed) return nullptr;
-  return std::make_unique<ObservedPredictor>(predictor, scaled, timed);
+  const auto asked_for = [&](const char* name, double usual) {
+    const auto& free = scene.fit.free;
+    const bool listed = std::find(free.begin(), free.end(), name) != free.end();
+    if (listed && !prior.contains(name)) prior[name] = {usual, frame_s};
+    return prior.contains(name);
+  };
+  const ObservedPredictor::Asked asked{
+      scene.fit.free_scale || prior.contains(kScale), prior.contains(kTimeFactor),
+      asked_for(kReadout, scene.camera.readout_s), asked_for(kAngleDelay, 0.0)};
+  if (!asked.any()) return nullptr;
+  return std::make_unique<ObservedPredictor>(predictor, asked, scene.camera.readout_s);
 }
 
 }  // namespace trochoid::fitting

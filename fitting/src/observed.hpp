@@ -13,10 +13,13 @@ inline constexpr const char* kTimeFactor = "frame_rate_factor";  ///< true over 
 ///   scale               x_measured = scale * x; with [fit] free_scale, a prior on "scale", or a
 ///                       prior on radius_m when the known radius gave the metres;
 ///   frame_rate_factor   t_true - t_start = factor * (t_measured - t_start); with a prior on
-///                       frame_rate_hz (a clip whose container lies).
+///                       frame_rate_hz (a clip whose container lies);
+///   readout_s, angle_delay_s  see timing.hpp; with a prior on them or in [fit] free. Without a
+///                       prior they are taken to lie within a frame's time of the scene's.
 /// Writes their priors into scene.fit.prior.
-/// @returns null if the scene asks for neither.
+/// @param frame_s  typical time between samples [s].
+/// @returns null if the scene asks for none.
 [[nodiscard]] std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor,
-                                                         data::Scene& scene);
+                                                         data::Scene& scene, double frame_s);
 
 }  // namespace trochoid::fitting

@@ -14,6 +14,7 @@ namespace {
 
 struct Estimate {
   double value = 0.0, sigma = 0.0;
+  int arc = 0;
 };
 
 // The friction of one arc alone; sigma 0 where that cannot be told.
@@ -35,7 +36,7 @@ Estimate friction_of(const Problem& problem, int arc, int friction) {
     const double sigma = std::sqrt(error.covariance(place, place));
     const double value = alone.value(place, solution.u);
     if (!std::isfinite(sigma) || sigma > value) return {};
-    return {value, sigma};
+    return {value, sigma, arc};
   } catch (const NumericalError&) {
     return {};
   }
@@ -57,7 +58,10 @@ void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
   for (const Estimate& one : estimates) {
     weights += 1.0 / (one.sigma * one.sigma);
     sum += one.value / (one.sigma * one.sigma);
-    list += fmt::format("{}{:.3g} +- {:.2g}", list.empty() ? "" : ", ", one.value, one.sigma);
+    const ArcData& arc = problem.arcs[static_cast<std::size_t>(one.arc)];
+    list +=
+        fmt::format("{}{:.3g} +- {:.2g} (object {}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
+                    one.value, one.sigma, arc.object, arc.t_s.front(), arc.t_s.back());
   }
   for (const Estimate& one : estimates)
     chi2 += std::pow((one.value - sum / weights) / one.sigma, 2);

@@ -200,10 +200,15 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
 
 bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   if (settings.fixed.contains(info.name)) return false;
-  if (info.name == kScale || info.name == kTimeFactor) return true;  // there only when asked for
+  for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
+    if (info.name == asked_for) return true;
   if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
     return settings.free_pivot || listed(settings.free, info.name);
-  if (settings.free.empty() || info.role == ParameterInfo::Role::initial)
+  // Freeing the clock leaves the model its own choice of the rest.
+  const bool chosen =
+      std::any_of(settings.free.begin(), settings.free.end(),
+                  [](const std::string& name) { return name != kReadout && name != kAngleDelay; });
+  if (!chosen || info.role == ParameterInfo::Role::initial)
     return info.worth_fitting || listed(settings.free, info.name);
   return listed(settings.free, info.name);
 }
@@ -225,6 +230,7 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
   }
   problem.base.assign(problem.arcs.size(), values);
   problem.row_weights.resize(problem.arcs.size());
+  problem.timing = timing_of(predictor, scene);
   const auto add = [&](int index, int arc) {
     const ParameterInfo& info = parameters[index];
     FreeParameter parameter{
@@ -272,6 +278,32 @@ void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen
   if (const int psi = predictor.index_of("psi_rad"); psi >= 0) values[psi] -= std::numbers::pi;
 }
 
+void name_attitudes(Problem& problem) {
+  const model::Predictor& predictor = *problem.predictor;
+  const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
+  if (theta < 0 || phi < 0) return;
+  const bool bound = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
+    return (p.index == theta || p.index == phi) &&
+           (p.prior || p.transform.kind != Transform::Kind::identity);
+  });
+  const auto fixed = [&](int index) {
+    return std::none_of(problem.free.begin(), problem.free.end(),
+                        [&](const FreeParameter& p) { return p.index == index; });
+  };
+  if (bound || fixed(theta) || fixed(phi)) return;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    Eigen::VectorXd& values = problem.base[arc];
+    const bool marked = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
+    if (problem.arcs[arc].folded && !marked && values[theta] > 0.5 * std::numbers::pi) {
+      values[theta] = std::numbers::pi - values[theta];
+      values[phi] += std::numbers::pi;
+      for (const char* rate : {"w1_rad_s", "w3_rad_s"})  // along axes that turn round
+        if (const int i = predictor.index_of(rate); i >= 0) values[i] = -values[i];
+    }
+    values[phi] = std::remainder(values[phi], 2.0 * std::numbers::pi);
+  }
+}
+
 bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
               Eigen::MatrixXd* jacobian, bool held_too) {
   const ArcData& data = problem.arcs[arc];
@@ -291,7 +323,9 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
       if (held_too || !problem.free[i].held) request.derivatives.push_back(problem.free[i].index);
   model::Prediction prediction;
   try {
-    prediction = problem.predictor->predict(values, request);
+    prediction = has_timing(*problem.predictor)
+                     ? predict_timed(*problem.predictor, values, request, data, problem.timing)
+                     : problem.predictor->predict(values, request);
   } catch (const Error&) {  // outside the model's range: a rejected step
     return false;
   }

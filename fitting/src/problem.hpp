@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "observations.hpp"
+#include "timing.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -48,6 +49,8 @@ struct Problem {
   std::vector<Eigen::VectorXd> row_weights;  ///< per arc, sqrt of the robust weights; empty = 1
   std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
   double tolerance = 1e-8;
+  Timing timing;
+  bool rough = false;  ///< a search may end near the minimum: only a start is wanted
   std::function<void(const std::string& line)> log;  ///< may be empty
 
   [[nodiscard]] int shared_count() const;
@@ -85,6 +88,12 @@ struct Problem {
 /// Angle coordinates outside [0, pi] name the same attitude as folded ones: brings theta back and
 /// turns phi, psi and the rates accordingly. `sign` receives the derivative of each folded value.
 void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen::VectorXd& sign);
+
+/// Of the two names of one attitude of a body whose faces look alike, (theta, phi) and (pi - theta,
+/// phi + pi), takes the one with the lesser tilt at the start of each arc, and phi within half a
+/// turn of zero. Leaves arcs alone where the spin angle is seen or theta is bounded or known
+/// beforehand.
+void name_attitudes(Problem& problem);
 
 struct Solution {
   Eigen::VectorXd u;

@@ -114,16 +114,27 @@ std::vector<Start> settled(const Problem& window, const Starter& starter) {
   return best;
 }
 
+// Ends when the best valley has been reached so often that no better one is to be expected: it is
+// not the model's fault alone then if it does not pass.
 Found search_widely(const Problem& problem, const Starter& starter, Found best) {
   constexpr std::size_t kGrown = 6;
+  constexpr int kOftenEnough = 3;
+  constexpr double kSameValley = 1e-3;  // of chi-square
+  int reached = 0;
   constexpr double kSlowly = 1.2;
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   for (int window = std::min(kFewestSamples, all); window <= all; window *= 2) {
     const std::vector<Start> starts = settled(windowed(problem, window), starter);
     for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, kSlowly);
+      if (!found.solution.usable) continue;
+      const double gain = best.reduced_chi2 / found.reduced_chi2 - 1.0;
+      if (!best.solution.usable || gain > kSameValley)
+        reached = 1;
+      else if (gain > -kSameValley)
+        ++reached;
       if (better(found, best)) best = std::move(found);
-      if (best.passed || best.unexplained < kExplained) return best;
+      if (best.passed || best.unexplained < kExplained || reached >= kOftenEnough) return best;
     }
   }
   return best;

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <deque>
 #include <numbers>
 
 #include "smoothing.hpp"
@@ -34,17 +35,21 @@ SpinDifference spin_difference(const Problem& problem, int arc, int psi, int ome
   return difference;
 }
 
-// Continues the angles along their own rate: the next value lies where the latest rate takes it,
+// Continues the angles along their own rate: the next value lies where the latest rates take it,
 // not merely within half a turn. Returns slope and value at t = 0 of the line through them.
 std::pair<double, double> line_through(const SpinDifference& raw) {
-  std::vector<double> angle, rates;
+  constexpr std::size_t kLatest = 31;
+  std::vector<double> angle;
+  std::deque<double> rates;
   for (std::size_t i = 0; i < raw.t_s.size(); ++i) {
     double d = raw.angle_rad[i];
     if (i > 0) {
       const double step_s = raw.t_s[i] - raw.t_s[i - 1];
-      const double expected = angle.back() + (rates.empty() ? 0.0 : median(rates) * step_s);
+      const double expected =
+          angle.back() + (rates.empty() ? 0.0 : median({rates.begin(), rates.end()}) * step_s);
       d = expected + std::remainder(d - expected, 2.0 * std::numbers::pi);
       rates.push_back((d - angle.back()) / step_s);
+      if (rates.size() > kLatest) rates.pop_front();
     }
     angle.push_back(d);
   }

@@ -1,5 +1,7 @@
 #include "starter.hpp"
 
+#include <algorithm>
+
 #include "trochoid/model/inertia.hpp"
 
 namespace trochoid::fitting {
@@ -10,7 +12,11 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
   const Eigen::Vector2d known(px >= 0 ? predictor.parameters()[px].value : 0.0,
                               py >= 0 ? predictor.parameters()[py].value : 0.0);
   return [=](const ArcData& window) {
-    if (!free_pivot) return top_starts(window, known);
+    if (!free_pivot) {
+      std::vector<Start> starts = top_starts(window, known);
+      for (Start& start : fast_top_starts(window, known)) starts.push_back(std::move(start));
+      return starts;
+    }
     std::vector<Start> all;
     for (const Eigen::Vector2d& pivot : pivot_guesses(window))
       for (Start& start : top_starts(window, pivot)) all.push_back(std::move(start));
@@ -45,19 +51,27 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
   return [](const ArcData&) { return std::vector<Start>{}; };
 }
 
-// Easier relatives of a sliding body, see Quest: the exact Coulomb law, and a sharply regularised
-// one, make a rough cost and stiff equations.
-std::vector<std::unique_ptr<model::Predictor>> relatives_of(data::Scene scene) {
-  constexpr double kGentle_m_s = 1e-3;
-  std::vector<std::unique_ptr<model::Predictor>> relatives;
+// The exact Coulomb law, and a sharply regularised one, make a rough cost and stiff equations; the
+// gentle law's minimum lies far from theirs. Each bridge takes a third of the regularisation.
+std::vector<OwnedRelative> relatives_of(data::Scene scene) {
+  constexpr double kGentle_m_s = 1e-3, kSharpest_m_s = 1e-4, kStep = 0.33;
+  std::vector<OwnedRelative> relatives;
   if (scene.model.name != "sliding") return relatives;
+  const double given_m_s = scene.model.slip_regularisation_m_s.value_or(0.0);
   scene.model.name = "rolling";
-  relatives.push_back(model::make_predictor(scene));
-  if (scene.model.slip_regularisation_m_s.value_or(0.0) < 0.7 * kGentle_m_s) {
-    scene.model.name = "sliding";
-    scene.model.slip_regularisation_m_s = kGentle_m_s;
-    relatives.push_back(model::make_predictor(scene));
-  }
+  relatives.push_back({model::make_predictor(scene), {}});
+  if (given_m_s >= 0.7 * kGentle_m_s) return relatives;
+  scene.model.name = "sliding";
+  const auto softened = [&](double by_m_s) {
+    scene.model.slip_regularisation_m_s = by_m_s;
+    return model::make_predictor(scene);
+  };
+  // The exact law runs as fast as the gentle one, a sharply regularised one does not.
+  if (given_m_s == 0.0) relatives.push_back({nullptr, {}});
+  relatives.push_back({softened(kGentle_m_s), {}});
+  const double last_m_s = std::max(given_m_s / (0.7 * kStep), kSharpest_m_s);
+  for (double by_m_s = kStep * kGentle_m_s; by_m_s >= last_m_s; by_m_s *= kStep)
+    relatives.back().bridges.push_back(softened(by_m_s));
   return relatives;
 }
 

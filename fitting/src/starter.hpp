@@ -11,7 +11,13 @@ namespace trochoid::fitting {
 /// Where a search without a guess starts, by the model.
 [[nodiscard]] Starter starter_for(const model::Predictor& predictor, const data::Scene& scene);
 
-/// Easier relatives of a sliding body, see Quest; none for other models.
-[[nodiscard]] std::vector<std::unique_ptr<model::Predictor>> relatives_of(data::Scene scene);
+/// A relative with the models it is made of.
+struct OwnedRelative {
+  std::unique_ptr<model::Predictor> model;
+  std::vector<std::unique_ptr<model::Predictor>> bridges;
+};
+
+/// Easier relatives of a sliding body, see Relative; none for other models.
+[[nodiscard]] std::vector<OwnedRelative> relatives_of(data::Scene scene);
 
 }  // namespace trochoid::fitting

@@ -25,6 +25,12 @@ struct Start {
 /// @param pivot_m position of the pivot in the track's frame [m].
 [[nodiscard]] std::vector<Start> top_starts(const ArcData& arc, const Eigen::Vector2d& pivot_m);
 
+/// Starts for a fast top, whose nutation is a small, fast tremble on slow precession: precession
+/// from a smooth path about the pivot, b from the strongest line in what is left, a = W (b - W cos
+/// theta). None where no line stands out of the noise.
+[[nodiscard]] std::vector<Start> fast_top_starts(const ArcData& arc,
+                                                 const Eigen::Vector2d& pivot_m);
+
 /// Places the pivot of a top may be, when nobody knows: from circles through the track.
 [[nodiscard]] std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& arc);
 

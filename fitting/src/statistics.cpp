@@ -22,6 +22,7 @@ double chi2_upper_tail(double chi2, double dof) {
 }
 
 Whiteness whiteness(const Eigen::MatrixXd& series, double step_s, double taken) {
+  constexpr double kStructured = 1e-3;
   Whiteness result;
   const Eigen::Index n = series.rows();
   const double power = series.squaredNorm();
@@ -45,6 +46,14 @@ Whiteness whiteness(const Eigen::MatrixXd& series, double step_s, double taken) 
     const double rho = correlation(lag);
     if (rho < noise) break;
     sum += rho;
+  }
+  if (sum == 0.0 && result.p_value < kStructured) {
+    // What swings about zero averages out of a mean, but not out of every parameter.
+    for (Eigen::Index lag = 1; lag <= tested; ++lag)
+      if (const double rho = std::abs(correlation(lag)); rho > noise) sum += rho;
+    result.inflation = 1.0 + 2.0 * sum;
+    result.correlation_time_s = static_cast<double>(tested) * step_s;
+    return result;
   }
   // Each fitted parameter follows the slow part of the residuals and lowers the first correlation
   // by about (1 + rho)/n (Kendall, Biometrika 41, 403, 1954, for a mean and a trend); what that
@@ -72,6 +81,8 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   // A loss that came out as nothing is known if its error is small against the given value's.
   if (parameter.transform.is_over_decades())
     return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
+  if (info.unit == "s")  // a clock's error is known if it is known to a frame
+    return duration / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
   if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);
   double extent = 1.0;
   if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1) {
@@ -171,47 +182,67 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
   return typical > 0.0 ? Eigen::VectorXd(0.5 / typical * rows) : rows;
 }
 
+// Residuals of a displaced solution; false where a parameter leaves its range or the model ends.
+bool displaced(const Problem& problem, const Eigen::VectorXd& u, const Eigen::VectorXd& step,
+               Eigen::VectorXd& residuals) {
+  Eigen::VectorXd at = u;
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    const Transform& transform = problem.free[i].transform;
+    const double value = transform.value(u[i]) + step[i];
+    at[i] = transform.inverse(value);
+    if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + 1e-12))
+      return false;
+  }
+  Eigen::Index first = 0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd r;
+    if (!evaluate(problem, arc, at, r, nullptr)) return false;
+    residuals.segment(first, r.size()) = r;
+    first += r.size();
+  }
+  return residuals.allFinite();
+}
+
+// What one standard deviation along each direction of the data really does to the residuals.
+struct Chords {
+  Eigen::MatrixXd slope;  ///< half the difference of the two ends; linear: of unit length
+  Eigen::MatrixXd bend;   ///< mean of the two ends about the middle; linear: zero
+  bool straight = true;   ///< the derivatives say the same
+};
+
+// Chords where the data see enough of a direction and the model goes on to both ends, tangents
+// elsewhere. `scaled_directions` and `size_v`: derivatives and values per unit of each direction.
+Chords chords_of(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
+                 const Eigen::MatrixXd& scaled_directions, const Eigen::MatrixXd& size_v,
+                 const Eigen::VectorXd& sd) {
+  constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
+  constexpr double kStraight = 0.2;
+  Chords chords{scaled_directions * sd.asDiagonal(),
+                Eigen::MatrixXd::Zero(scaled_directions.rows(), sd.size()), true};
+  for (Eigen::Index k = 0; k < sd.size(); ++k) {
+    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
+    const Eigen::VectorXd step = sd[k] * size_v.col(k);
+    Eigen::VectorXd ahead = all.residuals, behind = all.residuals;
+    if (!displaced(problem, u, step, ahead) || !displaced(problem, u, -step, behind)) continue;
+    // Turning angles jump by whole turns of residual; priors are linear.
+    Eigen::VectorXd slope = 0.5 * (ahead - behind);
+    const Eigen::Index priors = slope.size() - problem.rows();
+    slope.tail(priors) = chords.slope.col(k).tail(priors);
+    chords.bend.col(k) = 0.5 * (ahead + behind) - all.residuals;
+    if ((slope - chords.slope.col(k)).norm() < kStraight) continue;
+    chords.straight = false;
+    chords.slope.col(k) = slope;
+  }
+  return chords;
+}
+
 // How far the valley bends: when the solution is moved by one standard deviation along a singular
 // direction k to either side, the mean of the two residual vectors leaves the tangent plane, and
 // the other directions follow by w(., k), in their own standard deviations. One column per
-// direction; zero where the data see too little of it, or the model ends.
-Eigen::MatrixXd bends(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
-                      const Eigen::MatrixXd& scaled_directions, const Eigen::MatrixXd& size_v,
-                      const Eigen::VectorXd& sd) {
-  constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
-  const Eigen::Index count = sd.size();
-  Eigen::MatrixXd w = Eigen::MatrixXd::Zero(count, count);
-  const auto moved = [&](const Eigen::VectorXd& step, Eigen::VectorXd& residuals) {
-    Eigen::VectorXd at = u;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Transform& transform = problem.free[i].transform;
-      const double value = transform.value(u[i]) + step[i];
-      at[i] = transform.inverse(value);
-      // Out of its range: the valley ends before it bends.
-      if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + 1e-12))
-        return false;
-    }
-    Eigen::Index first = 0;
-    residuals = Eigen::VectorXd::Zero(all.residuals.size());
-    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-      Eigen::VectorXd r;
-      if (!evaluate(problem, arc, at, r, nullptr)) return false;
-      residuals.segment(first, r.size()) = r;
-      first += r.size();
-    }
-    return true;
-  };
-  for (Eigen::Index k = 0; k < count; ++k) {
-    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
-    const Eigen::VectorXd step = sd[k] * size_v.col(k);
-    Eigen::VectorXd ahead, behind;
-    if (!moved(step, ahead) || !moved(-step, behind)) continue;
-    Eigen::VectorXd bend = 0.5 * (ahead + behind) - all.residuals;
-    // Turning angles jump by whole turns of residual; priors do not bend.
-    if (!bend.allFinite()) continue;
-    w.col(k) = sd.asDiagonal() * (scaled_directions.transpose() * bend);
-    w(k, k) = 0.0;
-  }
+// direction.
+Eigen::MatrixXd bends(const Chords& chords) {
+  Eigen::MatrixXd w = chords.slope.transpose() * chords.bend;
+  w.diagonal().setZero();
   return w;
 }
 
@@ -367,13 +398,31 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   Uncertainty result;
   Eigen::VectorXd size(count);
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
-  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
-  const Directions seen = directions_of(problem, scaled, result);
+  Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  Directions seen = directions_of(problem, scaled, result);
+  const auto chords_along = [&](const Directions& by) {
+    return chords_of(problem, u, all, scaled * by.axes, size.asDiagonal() * by.axes, by.inverse);
+  };
+  Chords chords = chords_along(seen);
+  // A cost with ripples (sticking that comes and goes) has derivatives that hold nowhere but at one
+  // point: what counts is how it changes over an error bar.
+  if (!chords.straight) {
+    Eigen::VectorXd sharpness = seen.inverse;
+    for (double& entry : sharpness) entry = entry > 0.0 ? 1.0 / entry : 0.0;
+    const Eigen::MatrixXd blind = scaled * seen.axes;
+    Eigen::MatrixXd along = chords.slope * sharpness.asDiagonal();
+    for (Eigen::Index k = 0; k < along.cols(); ++k)
+      if (!(seen.inverse[k] > 0.0)) along.col(k) = blind.col(k);
+    scaled = along * seen.axes.transpose();
+    result.rank = 0;
+    result.null_vectors.clear();
+    seen = directions_of(problem, scaled, result);
+    chords = chords_along(seen);
+  }
   Correlation correlation = correlation_of(problem, all, result);
   Eigen::MatrixXd covariance =
       widened(problem, all, std::move(correlation), scaled, seen.bread, result.whiteness.inflation);
-  const Eigen::MatrixXd w =
-      bends(problem, u, all, scaled * seen.axes, size.asDiagonal() * seen.axes, seen.inverse);
+  const Eigen::MatrixXd w = bends(chords);
   covariance += of_bends(seen, w, covariance);
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();

@@ -13,8 +13,10 @@ namespace trochoid::fitting {
 
 /// How residuals of one channel hang together in time.
 struct Whiteness {
-  double p_value = 1.0;    ///< Ljung-Box test of being white
-  double inflation = 1.0;  ///< variance factor of a mean: 1 + 2 sum of autocorrelations, >= 1
+  double p_value = 1.0;  ///< Ljung-Box test of being white
+  /// Variance factor of a mean: 1 + 2 sum of autocorrelations, >= 1; their sizes are summed where
+  /// the residuals swing about zero.
+  double inflation = 1.0;
   double correlation_time_s = 0.0;
 };
 /// @param series one column per coordinate, rows in time order with mean spacing step_s.

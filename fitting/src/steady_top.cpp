@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -11,28 +12,34 @@
 namespace trochoid::fitting {
 namespace {
 
+// A path about the pivot without nutation: distance and azimuth as polynomials in time since the
+// start, constant and linear without drag; with drag the axis sinks or rises and the rate drifts.
 struct Circle {
-  double radius_m = 0.0, azimuth_rad = 0.0, rate_rad_s = 0.0;
+  Eigen::VectorXd distance_m, azimuth_rad;
 };
 
-// Mean distance from the pivot and the line through the continued azimuth.
-Circle circle_through(const ArcData& arc, const Eigen::Vector2d& pivot_m) {
+double at(const Eigen::VectorXd& coefficients, double t) {
+  double value = 0.0;
+  for (Eigen::Index k = coefficients.size() - 1; k >= 0; --k) value = value * t + coefficients[k];
+  return value;
+}
+
+Circle circle_through(const ArcData& arc, const Eigen::Vector2d& pivot_m, bool drag) {
   const Eigen::MatrixX2d xy = arc.positions_m().rowwise() - pivot_m.transpose();
   const Eigen::Index n = xy.rows();
-  Eigen::VectorXd azimuth(n), t(n);
+  const int highest = drag ? 3 : 1;
+  Eigen::VectorXd azimuth(n);
+  Eigen::MatrixXd powers(n, highest + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     azimuth[i] = std::atan2(xy(i, 0), -xy(i, 1));
     if (i > 0)
       azimuth[i] =
           azimuth[i - 1] + std::remainder(azimuth[i] - azimuth[i - 1], 2.0 * std::numbers::pi);
-    t[i] = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
+    const double t = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
+    for (int k = 0; k <= highest; ++k) powers(i, k) = std::pow(t, k);
   }
-  const Eigen::VectorXd centred = t.array() - t.mean();
-  Circle circle;
-  circle.radius_m = xy.rowwise().norm().mean();
-  circle.rate_rad_s = centred.dot(azimuth) / centred.squaredNorm();
-  circle.azimuth_rad = azimuth.mean() - circle.rate_rad_s * t.mean();
-  return circle;
+  return {powers.leftCols(highest).colPivHouseholderQr().solve(xy.rowwise().norm()),
+          powers.colPivHouseholderQr().solve(azimuth)};
 }
 
 double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector2d& pivot_m) {
@@ -40,14 +47,13 @@ double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector
   double chi2 = 0.0;
   for (const Reading& reading : arc.readings) {
     if (reading.channel != Channel::position) continue;
-    const double phi =
-        circle.azimuth_rad +
-        circle.rate_rad_s * (arc.t_s[static_cast<std::size_t>(reading.sample)] - arc.start_s);
-    const Eigen::Vector2d at =
-        pivot_m + circle.radius_m * Eigen::Vector2d(std::sin(phi), -std::cos(phi));
+    const double t = arc.t_s[static_cast<std::size_t>(reading.sample)] - arc.start_s;
+    const double phi = at(circle.azimuth_rad, t);
+    const Eigen::Vector2d place =
+        pivot_m + at(circle.distance_m, t) * Eigen::Vector2d(std::sin(phi), -std::cos(phi));
     double weight = 1.0 / problem.noise_scale[0];
     if (problem.row_weights[0].size() > 0) weight *= problem.row_weights[0][reading.row];
-    chi2 += (weight * (reading.whitener.transpose() * (at - reading.value))).squaredNorm();
+    chi2 += (weight * (reading.whitener.transpose() * (place - reading.value))).squaredNorm();
   }
   return chi2;
 }
@@ -56,7 +62,8 @@ double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector
 
 void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
   using model::Observable;
-  if (problem.arcs.size() != 1 || fit.find("gamma1_1_s") != nullptr) return;
+  if (problem.arcs.size() != 1) return;
+  const bool drag = fit.find("gamma1_1_s") != nullptr;
   const ArcData& arc = problem.arcs[0];
   if (arc.observable_index(Observable::x_m) < 0 || arc.observable_index(Observable::theta_rad) >= 0)
     return;
@@ -69,10 +76,11 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   if (path.row_weights[0].size() > 0 && path.arcs[0].rows != arc.rows) return;
   Eigen::VectorXd residuals;
   if (!evaluate(path, 0, u, residuals, nullptr)) return;
-  const Circle circle = circle_through(arc, pivot_m);
-  // Four more parameters lower chi-square by 4 +- 2.8 when they mean nothing; 3 sigma.
-  constexpr double kBoughtByChance = 4.0 + 3.0 * 2.83;
-  if (chi2_of(problem, circle, pivot_m) - residuals.squaredNorm() > kBoughtByChance) return;
+  const Circle circle = circle_through(arc, pivot_m, drag);
+  // Four more parameters lower chi-square by 4 +- 2.8 when they mean nothing, 3 sigma; and of as
+  // many frequencies as there are samples nutation may take that of the noise's strongest line.
+  const double bought_by_chance = 4.0 + 3.0 * 2.83 + 2.0 * std::log(arc.t_s.size());
+  if (chi2_of(problem, circle, pivot_m) - residuals.squaredNorm() > bought_by_chance) return;
   constexpr const char* kHidden[] = {"a_1_s2", "b_1_s", "l_m", "theta_rad"};
   for (data::FitParameter& parameter : fit.parameters) {
     const bool hidden = std::any_of(std::begin(kHidden), std::end(kHidden),
@@ -85,7 +93,7 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   fit.warnings.push_back(fmt::format(
       "no nutation is seen: steady precession determines l sin(theta) = {:.6g} m, the rate W = "
       "{:.6g} rad/s, and a + W^2 cos(theta) = b W; not a, b and l",
-      circle.radius_m, circle.rate_rad_s));
+      circle.distance_m[0], circle.azimuth_rad[1]));
 }
 
 }  // namespace trochoid::fitting

@@ -50,6 +50,14 @@ bool better(const Found& a, const Found& b) {
   return a.solution.usable && (!b.solution.usable || a.reduced_chi2 < b.reduced_chi2);
 }
 
+bool surely_found(const Problem& problem, const Found& best) {
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const bool slides = problem.predictor->model_name() == "sliding";
+  if (seen || !slides) return best.passed || best.unexplained < kExplained;
+  return best.passed &&
+         best.reduced_chi2 < 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
+}
+
 Problem for_predictor(const Problem& problem, const model::Predictor& predictor) {
   Problem other = problem;
   other.predictor = &predictor;
@@ -131,6 +139,10 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     if (window < all && solution.chi2 / free_rows(part) > 30.0 * chi2_gate(part.rows())) return {};
     if (window == all) break;
   }
+  if (problem.rough)
+    return judged(problem,
+                  solve(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3}),
+                  start.path);
   return judged(problem, solve_to_the_end(current), start.path);
 }
 

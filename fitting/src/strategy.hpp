@@ -80,6 +80,11 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// Whether a is usable and explains more than b.
 [[nodiscard]] bool better(const Found& a, const Found& b);
 
+/// Whether looking on is idle: the path is explained but for a per cent, or the gate is passed.
+/// From positions alone a sliding body's neighbouring valleys pass the gate as well: there
+/// chi-square has to be within half a standard deviation of its distribution.
+[[nodiscard]] bool surely_found(const Problem& problem, const Found& best);
+
 /// `unexplained` of a path that is explained but for a per cent of its amplitude.
 inline constexpr double kExplained = 1e-4;
 

@@ -119,6 +119,7 @@ pivot_m = [0.5, -0.25, 1.0]
 scale_px_per_m = 100.0
 height_m = 2.0
 readout_s = 0.5
+rows = 720.0
 frame_rate_hz = 60.0
 exposure_s = 0.25
 

@@ -135,6 +135,41 @@ TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
   EXPECT_LT(pull(fit, "pivoting_friction_m", 3e-4), kFar);
 }
 
+// The exact law: the cost has ripples wherever a spell of sticking comes or goes, and derivatives
+// at a point say little about its error bars.
+TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
+  Case c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
+  c.scene.model.friction = 0.2;  // 0.3 in truth
+  c.scene.fit.fixed = {{"air_linear_N_m_s[1]", 1e-6},
+                       {"air_linear_N_m_s[3]", 2e-7},
+                       {"rolling_friction_m", 5e-5},
+                       {"pivoting_friction_m", 3e-4}};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(fit.chi2 / fit.dof, 1.4);
+  EXPECT_LT(pull(fit, "friction", 0.3), kFar);
+  EXPECT_LT(pull(fit, "theta_rad", 0.9599310885968813), kFar);
+  EXPECT_LT(pull(fit, "w2_rad_s", 19.659649062935802), kFar);
+  EXPECT_LT(fit.find("friction")->sigma, 0.01);
+}
+
+// (theta, phi) and (pi - theta, phi + pi) are one attitude of a plain disc.
+TEST_F(RimFit, NamesAnAttitudeByItsLesserTilt) {
+  const Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  FitOptions options;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  options.strategy = "single";
+  for (const char* same : {"x_m", "y_m", "w2_rad_s"}) options.start[same] = fit.find(same)->value;
+  for (const char* turned : {"w1_rad_s", "w3_rad_s"})
+    options.start[turned] = -fit.find(turned)->value;
+  options.start["theta_rad"] = M_PI - fit.find("theta_rad")->value;
+  options.start["phi_rad"] = fit.find("phi_rad")->value + M_PI;
+  const data::Fit mirrored = fitting::fit(std::span(&c.track, 1), c.scene, options);
+  ASSERT_TRUE(mirrored.converged) << mirrored.reason;
+  for (const char* name : {"theta_rad", "phi_rad", "w1_rad_s", "w2_rad_s", "w3_rad_s"})
+    EXPECT_LT(pull(mirrored, name, fit.find(name)->value), 0.1) << name;  // the same minimum
+}
+
 TEST_F(RimFit, BoundsALossThatIsNotThere) {
   Case c = noisy("s06_roll_disc", 1.5, 2e-4);
   c.scene.model.pivoting_friction_m = 1e-4;

@@ -101,6 +101,29 @@ TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("widened"));
 }
 
+// A wobble of two thirds of the noise, seven samples long: neighbours are not alike, but what is
+// left is not noise either.
+TEST(Verdict, DoesNotTakeAWobbleForNoise) {
+  const auto wobbling = [path = nutating_top()](double t) -> Eigen::Vector2d {
+    const double phase = 2.0 * M_PI * kRate_Hz * t / 7.0;
+    return path(t) + 0.9 * kSigma_m * Eigen::Vector2d(std::cos(phase), std::sin(phase));
+  };
+  const data::Fit fit = fit_of(track_of(wobbling, white(kSigma_m, 7)), top());
+  EXPECT_TRUE(fit.converged);
+  EXPECT_LT(fit.whiteness_p, 1e-3);
+  EXPECT_EQ(fit.verdict, "good_correlated") << fit.verdict_words;
+}
+
+// Residuals of three times the noise, whose sigmas somebody stated: followed, but not explained.
+TEST(Verdict, IsWeakWhereTheModelLeavesSeveralTimesTheNoise) {
+  const auto drifting = [path = nutating_top()](double t) -> Eigen::Vector2d {
+    return path(t) + 5.0 * kSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
+  };
+  const data::Fit fit = fit_of(track_of(drifting, white(kSigma_m, 8)), top());
+  EXPECT_EQ(fit.verdict, "weak") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
+}
+
 TEST(Verdict, FindsNothingOfATopInAStraightLine) {
   const auto line = [](double t) { return Eigen::Vector2d(0.05 * t, 0.01 - 0.02 * t); };
   const data::Fit fit = fit_of(track_of(line, white(kSigma_m, 3)), top());

@@ -25,6 +25,7 @@ struct CameraSettings {
   std::optional<double> scale_px_per_m;
   std::optional<double> height_m;  ///< of the camera above the floor, with scale_px_per_m
   double readout_s = 0.0;          ///< rolling shutter: first to last row
+  std::optional<double> rows;      ///< image height [px], for fitting the readout without a file
   std::optional<double> frame_rate_hz;  ///< overrides the container's time stamps
   std::optional<double> exposure_s;
 };
