@@ -1,7 +1,11 @@
 #pragma once
+#include <span>
+
 #include "problem.hpp"
 #include "statistics.hpp"
 #include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
 
 namespace trochoid::fitting {
 
@@ -27,5 +31,13 @@ struct Squares {
 /// scatter.
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            data::Fit& fit);
+
+/// How far the centre of a body held at a pivot strays from its mean place [m] (rms of a
+/// coordinate); 0 without positions in metres.
+[[nodiscard]] double straying_m(std::span<const data::Track> tracks);
+
+/// Whether it strays further than a disc that turns face-on about a pivot near its middle: 5 times
+/// the sigmas and a twentieth of the body's radius.
+[[nodiscard]] bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene);
 
 }  // namespace trochoid::fitting

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <set>
 
+#include "adequacy.hpp"
 #include "arcs.hpp"
 #include "ladder.hpp"
 #include "retrograde.hpp"
@@ -372,14 +373,21 @@ std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const L
       "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
       chosen.name, chosen.parameters, chosen.fit.whiteness_p > 0.01 ? "white" : "not white",
       chosen.held_back_rms_sigma);
-  std::vector<const Rung*> alike, worse;
+  std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
   for (const Rung& rung : rungs) {
-    if (!rung.fitted || &rung == &chosen || contains(rung.terms, chosen.terms)) continue;
-    (rung.bic - chosen.bic < kVeryStrong ? alike : worse).push_back(&rung);
+    if (!rung.fitted || &rung == &chosen) continue;
+    const bool near = rung.bic - chosen.bic < kVeryStrong;
+    if (!contains(rung.terms, chosen.terms))
+      (near ? alike : worse).push_back(&rung);
+    else if (near)
+      more.push_back(&rung);
   }
   const auto by_bic = [](const Rung* a, const Rung* b) { return a->bic < b->bic; };
   std::sort(alike.begin(), alike.end(), by_bic);
   std::sort(worse.begin(), worse.end(), by_bic);
+  std::sort(more.begin(), more.end(), by_bic);
+  if (!more.empty())
+    words += fmt::format("; neither needed nor ruled out: {}", listed(more, chosen.bic));
   if (!alike.empty())
     words += fmt::format("; the data do not rule out {}", listed(alike, chosen.bic));
   else if (!worse.empty())
@@ -400,6 +408,9 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
                    const FitOptions& options) {
   data::Scene named = scene;
   if (!options.model.empty()) named.model.name = options.model;
+  // A body held at a pivot that leans there is a top, one that lies on it only turns.
+  const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
+  if (open && leaves_pivot(tracks, named)) named.model.name = "top";
   const Ladder ladder = ladder_of(named);
   const std::vector<Rung> rungs = climb(ladder, tracks, options);
   const Rung* chosen = simplest_sufficient(rungs);

@@ -92,6 +92,20 @@ void warn_short_top(const Problem& problem, data::Fit& fit) {
       periods));
 }
 
+// A rolling body's nutation is about as fast as its node line turns.
+void warn_short_rim(const Problem& problem, data::Fit& fit) {
+  const auto* w2 = fit.find("w2_rad_s");
+  const auto* theta = fit.find("theta_rad");
+  if (w2 == nullptr || theta == nullptr) return;
+  const double rate = std::abs(w2->value) / std::max(std::sin(theta->value), 1e-6);
+  const double turns = problem.arcs[0].duration_s() * rate / (2.0 * std::numbers::pi);
+  if (turns >= 1.0) return;
+  fit.warnings.push_back(fmt::format(
+      "the track is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and "
+      "losses are hardly separable, and error bars may be too small",
+      turns));
+}
+
 void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit) {
   const Criteria score = criteria(problem, u, error.whiteness.inflation);
@@ -124,6 +138,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   describe_arcs(problem, fit);
   warn(problem, error, fit);
   tell_whether_one_friction(problem, fit);
+  warn_short_rim(problem, fit);
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);
   warn_short_top(problem, fit);

@@ -1,5 +1,7 @@
 #include "trochoid/fitting/fit.hpp"
 
+#include <fmt/core.h>
+
 #include <memory>
 #include <optional>
 
@@ -132,6 +134,14 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   }
   describe(problem, solution, error, scene, fit);
   judge(problem, solution, error, fit);
+  if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
+    fit.converged = false;
+    fit.outcome = fit.verdict = "unexplained";
+    fit.reason = fit.verdict_words = fmt::format(
+        "the body's centre strays by {:.2g} m rms: a disc that only turns on its pivot stays where "
+        "it is; is it a top?",
+        straying_m(tracks));
+  }
   add_what_was_asked_for(problem, solution, error, options, fit);
   return fit;
 }

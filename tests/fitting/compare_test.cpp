@@ -107,6 +107,29 @@ TEST(Compare, SaysWhetherATopNeedsDrag) {
             4.0 * found.fit.find("gamma1_1_s")->sigma);
 }
 
+// A disc on a pivot with nothing said of its tilt: turning face-on, or a top?
+TEST(Compare, TakesABodyThatStraysFromItsPivotForATop) {
+  const Values start{{"a_1_s2", 3.0},    {"b_1_s", 5.0},      {"l_m", 0.1},
+                     {"theta_rad", 0.8}, {"dphi_rad_s", 0.3}, {"psi_rad", 0.1}};
+  data::Track track = track_of(top(), start, 6.0, 200, 5e-4, 8);
+  data::Scene scene = top();
+  scene.model.name = "auto";
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::disc;
+  body.radius_m = 0.04;
+  body.thickness_m = 0.004;
+  const Comparison found = compare_one(track, scene);
+  EXPECT_EQ(found.fit.model, "top") << found.fit.recommendation;
+  EXPECT_TRUE(found.fit.converged) << found.fit.reason;
+  // The other law, named against the evidence, has nothing to say of where the body is.
+  for (data::TrackSample& sample : track.samples)
+    sample.psi = data::MeasuredAngle{20.0 * sample.t_s, 0.01};
+  scene.model.name = "pivot";
+  const data::Fit turning = fit(std::span(&track, 1), scene);
+  EXPECT_EQ(turning.verdict, "unexplained") << turning.verdict_words;
+  EXPECT_THAT(turning.verdict_words, testing::HasSubstr("strays"));
+}
+
 data::Scene ring() {
   data::Scene scene;
   data::Body& body = scene.body.emplace();
@@ -126,6 +149,7 @@ TEST(Compare, TellsWhichFrictionSlowsARing) {
   const Comparison found = compare_one(track_of(truth, start, 1.5, 150, 2e-4, 5), ring());
   EXPECT_TRUE(found.scene.model.pivoting_friction_m) << found.fit.recommendation;
   EXPECT_FALSE(found.scene.model.air_linear_N_m_s) << found.fit.recommendation;
+  EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("neither needed nor ruled out"));
   const data::FitParameter* friction = found.fit.find("pivoting_friction_m");
   ASSERT_NE(friction, nullptr);
   EXPECT_LT(std::abs(friction->value - 2e-4), 4.0 * friction->sigma);

@@ -101,6 +101,10 @@ TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
   other.slide({1.0, 0.3}, 0.3).with_friction(0.3).slide({-0.2, 0.9}, 0.25);
   const data::Fit two = fitting::fit(std::span(&other.track(), 1), puck_scene());
   EXPECT_THAT(two.warnings, testing::Contains(testing::HasSubstr("does not explain")));
+  // The common value is no better known than the arcs agree.
+  const data::FitParameter* common = two.find("friction");
+  for (const double own : {kFriction, 0.3})
+    EXPECT_LT(std::abs(common->value - own), 4.0 * common->sigma);
 }
 
 TEST(PuckFit, LeavesOutWhatAHandDoes) {

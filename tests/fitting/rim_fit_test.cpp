@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -151,6 +152,13 @@ TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
   EXPECT_LT(pull(fit, "theta_rad", 0.9599310885968813), kFar);
   EXPECT_LT(pull(fit, "w2_rad_s", 19.659649062935802), kFar);
   EXPECT_LT(fit.find("friction")->sigma, 0.01);
+}
+
+TEST_F(RimFit, WarnsOfATrackShorterThanANutation) {
+  const Case brief = noisy("s06_roll_disc", 0.12, 2e-4), whole = noisy("s06_roll_disc", 1.0, 2e-4);
+  const auto warned = testing::Contains(testing::HasSubstr("turns of the node line"));
+  EXPECT_THAT(fitting::fit(std::span(&brief.track, 1), brief.scene).warnings, warned);
+  EXPECT_THAT(fitting::fit(std::span(&whole.track, 1), whole.scene).warnings, testing::Not(warned));
 }
 
 // (theta, phi) and (pi - theta, phi + pi) are one attitude of a plain disc.
