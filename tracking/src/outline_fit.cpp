@@ -87,19 +87,55 @@ std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start
                  : std::nullopt;
 }
 
+// How steeply a body must be seen for its face and wall together to look about as long as it is
+// wide, as from straight above: R cos t + h sin t = R for t = 2 atan(h / R). Below, one silhouette
+// belongs to several attitudes.
+double steepest_alike(const data::Body& body) {
+  constexpr double kBeyond_rad = 0.1, kNearly_rad = 0.25;
+  return std::max(kNearly_rad,
+                  kBeyond_rad + 2.0 * std::atan2(body.half_thickness_m(), body.radius_m));
+}
+
+// Where several attitudes explain a picture about as well, the one chosen is no better known than
+// they are apart.
+void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
+  constexpr double kAsGood = 0.97;
+  RobustSolution& solution = chosen.refined.solution;
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(solution.common.rows(), solution.common.cols());
+  double count = 1.0;
+  for (const Fitted& other : others) {
+    if (other.evidence < kAsGood * chosen.evidence) continue;
+    const PoseMotion::Step off = motion.step_between(chosen.refined.pose, other.refined.pose);
+    square += off * off.transpose();
+    count += 1.0;
+  }
+  solution.common += square / count;
+  solution.covariance += square / count;
+}
+
 // Seen nearly face on, the attitude mirrored at the line of sight is so near that a prediction may
-// lead to either.
-std::optional<Fitted> of_both_tilts(const Scenery& scenery, std::optional<Fitted> fitted) {
-  constexpr double kNearly_rad = 0.25;
-  constexpr double kNoticeably = 1.04;
+// lead to either, and so is the one seen from straight above.
+std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted> fitted) {
+  constexpr double kNoticeably = 1.04, kNearly_rad = 0.25;
   if (!fitted || scenery.motion.rotation() < 0 || scenery.motion.pivoted()) return fitted;
-  const data::Pose<>& pose = fitted->refined.pose;
+  const data::Pose<> pose = fitted->refined.pose;
   const double facing =
       axis_towards(scenery.camera, pose).dot(direction_to(scenery.camera, pose.centre_m));
-  if (facing < std::cos(kNearly_rad)) return fitted;
-  auto other = fit_exactly(scenery, mirrored(scenery.camera, scenery.motion, pose),
-                           fitted->refined.outline_px, fitted->blur_px);
-  return other && other->evidence > kNoticeably * fitted->evidence ? other : fitted;
+  if (facing < std::cos(steepest_alike(scenery.body))) return fitted;
+  const double outline_px = fitted->refined.outline_px;
+  std::vector<Fitted> others;
+  const auto mirror = mirrored(scenery.camera, scenery.motion, pose);
+  if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px)) {
+    if (facing > std::cos(kNearly_rad) && other->evidence > kNoticeably * fitted->evidence)
+      std::swap(*fitted, *other);
+    others.push_back(std::move(*other));
+  }
+  data::Pose<> level = pose;
+  level.theta_rad = pose.theta_rad > 0.5 * std::numbers::pi ? std::numbers::pi : 0.0;
+  if (auto other = fit_exactly(scenery, scenery.motion.settled(level), outline_px, fitted->blur_px))
+    others.push_back(std::move(*other));
+  spread_over(scenery.motion, others, *fitted);
+  return fitted;
 }
 
 double outline_length_px(const Scenery& scenery, const data::Pose<>& pose) {
@@ -134,7 +170,7 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
   }
   if (!fitted || fitted->score < kSure)
     fitted = better(std::move(fitted), fit_from(scenery, predicted));
-  return of_both_tilts(scenery, std::move(fitted));
+  return of_near_tilts(scenery, std::move(fitted));
 }
 
 // From afar: each start is drawn towards edges, those that then lie on edges are fitted.

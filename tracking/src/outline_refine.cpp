@@ -138,17 +138,17 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
 // What edges of a whole side of the body may be wrong by alike [px]: light beside them that is not
 // known by some share of it, and colours that luma mixes wrongly.
 double common_sd_px(const Scenery& scenery, const StretchProfile& look) {
-  constexpr double kUnknownPx = 0.025;        // beside an edge as strong as its mean level
+  constexpr double kUnknownPx = 0.03;         // beside an edge as strong as its mean level
   const double step_px = 2.5 * look.blur_px;  // of a Gaussian edge: shift per share of its step
   const ProfileEdge& e = look.edge;
   const double tone = tone_of(e);
-  constexpr double kMostMixing = 0.3;
+  constexpr double kMostMixing = 0.3, kMixingShare = 0.85;  // the rest shading takes up
   const double mixing = scenery.tints
                             ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
                                            e.mean_level + 0.5 * e.contrast)
                             : 0.0;
   return std::hypot(kUnknownPx / std::pow(tone, 1.5),
-                    step_px * std::min(kMostMixing, std::abs(mixing)));
+                    kMixingShare * step_px * std::min(kMostMixing, std::abs(mixing)));
 }
 
 EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, bool colour) {

@@ -63,6 +63,7 @@ void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bo
 /// about the frame, partly hidden maybe, as about luck.
 std::vector<double> smoothed_inflations(const BodyPath& path) {
   constexpr std::size_t kReach = 10;
+  constexpr double kUsualScatter = 0.7;  // of the logarithm; more is the frame's own
   std::vector<double> logs;
   for (const auto& [index, at] : path.frames)
     logs.push_back(at.seen.pose ? std::log(at.seen.pose->inflation) : 0.0);
@@ -72,7 +73,7 @@ std::vector<double> smoothed_inflations(const BodyPath& path) {
     double sum = 0.0;
     for (std::size_t k = from; k < to; ++k) sum += logs[k];
     const double around = sum / static_cast<double>(to - from);
-    smoothed.push_back(std::exp(std::max(around, 0.5 * (around + logs[i]))));
+    smoothed.push_back(std::exp(std::max(around, logs[i] - kUsualScatter)));
   }
   return smoothed;
 }
