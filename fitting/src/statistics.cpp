@@ -324,6 +324,16 @@ Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
   return seen;
 }
 
+// The noise is known from its few residuals only: 97.5 % quantile of Student's distribution over
+// that of the normal one (Abramowitz and Stegun 26.7.5), so that two sigmas hold what they promise.
+double student_factor(double degrees_of_freedom) {
+  constexpr double z = 1.959963984540054;
+  const double n = std::max(degrees_of_freedom, 5.0);  // fewer say nothing of the noise at all
+  const double first = (z * z * z + z) / 4.0;
+  const double second = (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / 96.0;
+  return 1.0 + (first + second / n) / (n * z);
+}
+
 // How residuals that hang together widen each row, and the offsets they may share.
 struct Correlation {
   Eigen::VectorXd row_scale;
@@ -333,7 +343,13 @@ struct Correlation {
 
 Correlation correlation_of(const Problem& problem, const Linearised& all, Uncertainty& result) {
   Correlation found{Eigen::VectorXd::Ones(all.jacobian.rows()), {}, false};
+  const double share_taken =
+      static_cast<double>(problem.free.size()) / std::max(1.0, static_cast<double>(problem.rows()));
   for (int c = 0; c < kChannels; ++c) {
+    const auto rows = static_cast<double>(
+        std::count_if(all.channel.begin(), all.channel.begin() + problem.rows(),
+                      [&](Channel channel) { return channel == static_cast<Channel>(c); }));
+    if (rows == 0.0) continue;
     const Whiteness one = channel_whiteness(problem, all, static_cast<Channel>(c));
     found.present |= one.inflation > 1.0;
     if (one.inflation > 1.0)
@@ -341,7 +357,8 @@ Correlation correlation_of(const Problem& problem, const Linearised& all, Uncert
         found.offsets.push_back(common_offset(problem, all, static_cast<Channel>(c), axis));
     for (std::size_t row = 0; row < all.arc.size(); ++row)
       if (all.arc[row] >= 0 && all.channel[row] == static_cast<Channel>(c))
-        found.row_scale[row] = std::sqrt(one.inflation);
+        found.row_scale[row] =
+            std::sqrt(one.inflation) * student_factor(rows / one.inflation - rows * share_taken);
     if (one.p_value < result.whiteness.p_value) result.whiteness.p_value = one.p_value;
     if (one.inflation > result.whiteness.inflation) {
       result.whiteness.inflation = one.inflation;
@@ -355,13 +372,14 @@ Correlation correlation_of(const Problem& problem, const Linearised& all, Uncert
 Eigen::MatrixXd widened(const Problem& problem, const Linearised& all, Correlation correlation,
                         const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread,
                         double inflation) {
-  if (!correlation.present) return bread;
-  // What the parameters take from few independent samples makes the residuals too small.
-  const double rows = problem.rows(), taken = static_cast<double>(scaled.cols());
-  const double left = std::max(rows - taken * inflation, 0.1 * rows);
-  const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
-  for (std::size_t row = 0; row < all.arc.size(); ++row)
-    if (all.arc[row] >= 0) correlation.row_scale[row] *= wider;
+  if (correlation.present) {
+    // What the parameters take from few independent samples makes the residuals too small.
+    const double rows = problem.rows(), taken = static_cast<double>(scaled.cols());
+    const double left = std::max(rows - taken * inflation, 0.1 * rows);
+    const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
+    for (std::size_t row = 0; row < all.arc.size(); ++row)
+      if (all.arc[row] >= 0) correlation.row_scale[row] *= wider;
+  }
   const Eigen::MatrixXd filling = correlation.row_scale.asDiagonal() * scaled * bread;
   Eigen::MatrixXd covariance = filling.transpose() * filling;
   for (const Eigen::VectorXd& offset : correlation.offsets) {

@@ -34,10 +34,11 @@ struct Uncertainty {
   std::vector<std::string> remarks;
 };
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank;
-/// correlated residuals widen the covariance by their effective sample size, channel by channel
-/// (a sandwich of the channels' information matrices), and a constant offset of half a sample's
-/// sigma is allowed for in every filmed channel whose residuals hang together. Where the valley of
-/// chi-square bends within a standard deviation, the second moment of the bend is added.
+/// correlated residuals widen the covariance by their effective sample size, few residuals by
+/// Student's quantile, channel by channel (a sandwich of the channels' information matrices), and a
+/// constant offset of half a sample's sigma is allowed for in every filmed channel whose residuals
+/// hang together. Where the valley of chi-square bends within a standard deviation, the second
+/// moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer.

@@ -134,6 +134,25 @@ TEST(PuckFit, CarriesScaleAndFrameRateIntoTheFriction) {
   EXPECT_NE(fit.find("friction")->note.find("between clips"), std::string::npos);
 }
 
+// Sixteen residuals less five parameters: the noise is known to a fifth, and two sigmas by the
+// normal distribution's quantile would hold 92.4 %.
+TEST(PuckFit, KeepsItsPromiseWithFewSamples) {
+  constexpr int kDraws = 2000;
+  constexpr double kTolerance = 0.015;  // 3 standard deviations of the count
+  int inside = 0, fitted = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    Throw thrown(1000 + i);
+    thrown.slide({1.0, 0.3}, 8.0 * kStep_s);
+    const data::Fit fit = fitting::fit(std::span(&thrown.track(), 1), puck_scene());
+    const data::FitParameter* friction = fit.find("friction");
+    if (friction == nullptr) continue;
+    ++fitted;
+    inside += std::abs(friction->value - kFriction) < 1.96 * friction->sigma;
+  }
+  ASSERT_GT(fitted, 0.99 * kDraws);
+  EXPECT_NEAR(static_cast<double>(inside) / fitted, 0.95, kTolerance);
+}
+
 TEST(PuckFit, RefusesABodyAtRest) {
   Throw thrown(3);
   thrown.slide({0.0, 0.0}, 1.0);
