@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <set>
+#include <sstream>
 #include <vector>
 
 #include "trochoid/data/error.hpp"
@@ -170,12 +171,9 @@ void write_text(const std::string& text, const fs::path& path) {
   pending.commit();
 }
 
-std::string sha256_of_file(const fs::path& path) {
-  std::error_code code;
-  if (fs::is_directory(path, code))
-    throw InputError(fmt::format("{}: is a folder, expected a file", path.string()));
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(fmt::format("{}: no such file, or it cannot be read", path.string()));
+namespace {
+
+std::string sha256_of_stream(std::istream& in, const std::string& name) {
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
                                                                         EVP_MD_CTX_free);
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
@@ -183,14 +181,30 @@ std::string sha256_of_file(const fs::path& path) {
   bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
   std::vector<char> chunk(std::size_t{1} << 18);
   while (good &&
-         (file.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || file.gcount() > 0))
+         (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || in.gcount() > 0))
     good =
-        EVP_DigestUpdate(context.get(), chunk.data(), static_cast<std::size_t>(file.gcount())) == 1;
+        EVP_DigestUpdate(context.get(), chunk.data(), static_cast<std::size_t>(in.gcount())) == 1;
   good = good && EVP_DigestFinal_ex(context.get(), digest.data(), &length) == 1;
-  if (!good) throw InputError(fmt::format("{}: no SHA-256 could be computed", path.string()));
+  if (!good) throw InputError(fmt::format("{}: no SHA-256 could be computed", name));
   std::string hex;
   for (unsigned int i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
   return hex;
+}
+
+}  // namespace
+
+std::string sha256_of_file(const fs::path& path) {
+  std::error_code code;
+  if (fs::is_directory(path, code))
+    throw InputError(fmt::format("{}: is a folder, expected a file", path.string()));
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(fmt::format("{}: no such file, or it cannot be read", path.string()));
+  return sha256_of_stream(file, path.string());
+}
+
+std::string sha256_of_text(const std::string& text) {
+  std::istringstream in(text);
+  return sha256_of_stream(in, "text");
 }
 
 }  // namespace trochoid::data

@@ -150,6 +150,13 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
     }
     EXPECT_EQ(count, kFrames) << path;
   }
+  // sha256sum of the pictures' own sums, one to a line: the same however the series is named.
+  const std::string digest = sha256_of_recording(folder_);
+  EXPECT_EQ(digest.size(), 64U);
+  EXPECT_EQ(sha256_of_recording(folder_ / "img_%03d.png"), digest);
+  EXPECT_EQ(sha256_of_recording(folder_ / "img_*.png"), digest);
+  fs::remove(folder_ / "img_018.png");
+  EXPECT_NE(sha256_of_recording(folder_), digest);
 }
 
 TEST_F(FrameSourceTest, BadFilesAreRefusedInOneLineThatNamesThem) {

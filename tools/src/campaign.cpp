@@ -10,6 +10,7 @@
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -57,7 +58,7 @@ std::string key_of(const Campaign& campaign, const CampaignItem& item) {
       fmt::format("{} {}", TROCHOID_VERSION, fmt::join(command_of(campaign, item), " "));
   for (const fs::path& file : inputs_of(item)) {
     std::error_code code;
-    const auto size = fs::file_size(file, code);
+    const auto size = fs::is_directory(file, code) ? 0 : fs::file_size(file, code);
     const auto time = fs::last_write_time(file, code);
     key += code ? " missing" : fmt::format(" {}@{}", size, time.time_since_epoch().count());
   }
@@ -143,7 +144,7 @@ CampaignRecord run_item(const Campaign& campaign, const CampaignItem& item) {
     if (record.done) {
       read_answer(answer.path(), record);
       for (const fs::path& file : inputs_of(item))
-        record.inputs.emplace_back(file.string(), data::sha256_of_file(file));
+        record.inputs.emplace_back(file.string(), tracking::sha256_of_recording(file));
     }
   } catch (const InputError& error) {
     record.done = false;

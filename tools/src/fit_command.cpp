@@ -9,6 +9,7 @@
 #include "fit_job.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
+#include "provenance.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -76,7 +77,8 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
   std::vector<data::Track> tracks;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
-    provenance.inputs[std::filesystem::path(path).filename().string()] = data::sha256_of_file(path);
+    add_checksum(provenance.inputs, path);
+    if (!file.source_sha256.empty()) provenance.inputs[file.source] = file.source_sha256;
     for (const data::Track& track : file.tracks)
       if (!command.object || track.object == *command.object) tracks.push_back(track);
   }
@@ -94,8 +96,7 @@ void run(const FitCommand& command) {
   data::Scene scene;
   if (!command.scene.empty()) {
     scene = data::read_scene(command.scene);
-    provenance.inputs[std::filesystem::path(command.scene).filename().string()] =
-        data::sha256_of_file(command.scene);
+    add_checksum(provenance.inputs, command.scene);
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }

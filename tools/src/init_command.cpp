@@ -12,6 +12,7 @@
 
 #include "commands.hpp"
 #include "json_summary.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -28,6 +29,7 @@ using tracking::Inspection;
 struct Options {
   fs::path video, output;
   double radius_mm = 0.0;
+  std::optional<double> rate_hz;
   bool force = false, json = false;
 };
 
@@ -88,13 +90,15 @@ std::string support_words(const Inspection& seen) {
   return text;
 }
 
-std::string camera_words(const Inspection& seen) {
+std::string camera_words(const Inspection& seen, const std::optional<double>& rate_hz) {
   std::string text =
       "\n[camera]                   # without file or scale the radius gives the scale\n";
   text += "# file = \"camera.json\"     # from trochoid calibrate\n";
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
   const auto captured = seen.video.capture_rate_hz;
-  if (captured && std::abs(*captured - seen.video.frame_rate_hz) > 0.05 * *captured)
+  if (rate_hz)
+    text += fmt::format("frame_rate_hz = {:<9g}# as given\n", *rate_hz);
+  else if (captured && std::abs(*captured - seen.video.frame_rate_hz) > 0.05 * *captured)
     text += fmt::format(
         "frame_rate_hz = {:<9g}# the file says it was filmed at this rate and plays at {:.4g}\n",
         *captured, seen.video.frame_rate_hz);
@@ -113,14 +117,15 @@ std::string camera_words(const Inspection& seen) {
 std::string scene_text(const Options& options, const Inspection& seen, double radius_mm) {
   std::string text = fmt::format(
       "# {}: what a first look tells. Read it, correct it, then\n#   trochoid run {} --scene {}\n",
-      options.video.filename().string(), options.video.string(), options.output.string());
+      options.video.filename().string(), shell_quoted(options.video.string()),
+      shell_quoted(options.output.string()));
   text += video_words(seen.video);
   if (!seen.body) text += "# NO MOVING BODY FOUND: point at it with [tracking] at_px\n";
   if (seen.restless > 0.3)
     text += fmt::format("# {:.0f} % of the picture changes all the time: does the camera move?\n",
                         100.0 * seen.restless);
   text += "# Every key: docs/formats.md\n\n" + body_words(seen, radius_mm) + support_words(seen) +
-          camera_words(seen);
+          camera_words(seen, options.rate_hz);
   text +=
       "\n# [tracking]\n# objects = 2              # more than one body\n# from = 0.5               "
       "# seconds, or \"f120\"\n";
@@ -134,7 +139,7 @@ void run(Options options) {
     throw InputError(
         fmt::format("{}: exists already; name another with -o or replace it with --force",
                     options.output.string()));
-  const Inspection seen = tracking::inspect_video(options.video);
+  const Inspection seen = tracking::inspect_video(options.video, options.rate_hz);
   const double radius_mm = options.radius_mm > 0.0 ? options.radius_mm : ask_radius_mm();
   const std::string text = scene_text(options, seen, radius_mm);
   (void)data::parse_scene(text, options.output.string());  // what is written can be read
@@ -164,6 +169,10 @@ void add_init_command(CLI::App& app) {
   command->add_option("video", options->video, "Recording")->required();
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
   command->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known")
+      ->check(positive_number());
+  command
+      ->add_option("--rate", options->rate_hz,
+                   "True frame rate [Hz]: of slow motion, or of an image folder or series")
       ->check(positive_number());
   command->add_flag("--force", options->force, "Replace the scene if it exists");
   add_json_flag(*command, options->json);

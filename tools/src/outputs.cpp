@@ -47,4 +47,12 @@ void check_written_video(const fs::path& written, std::int64_t frames, const fs:
 }
 #endif
 
+std::string shell_quoted(const std::string& word) {
+  const bool plain = word.find_first_of(" \t\n\"'\\$`!*?[](){}<>|&;#~") == std::string::npos;
+  if (plain) return word;
+  std::string result = "'";
+  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
 }  // namespace trochoid::tools

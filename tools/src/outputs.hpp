@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace trochoid::tools {
@@ -10,6 +11,9 @@ namespace trochoid::tools {
 /// @throws InputError naming the output.
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);
+
+/// A word as a shell would take it: with anything but plain characters it goes into quotes.
+[[nodiscard]] std::string shell_quoted(const std::string& word);
 
 #ifdef TROCHOID_HAS_TRACKING
 /// The encoder behind cv::VideoWriter tells nobody when the disk is full: looks at the file again.

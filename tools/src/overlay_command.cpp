@@ -12,9 +12,11 @@
 #include "outputs.hpp"
 #include "overlay.hpp"
 #include "progress.hpp"
+#include "provenance.hpp"
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/tracking/frame_source.hpp"
 #include "validators.hpp"
 
 namespace trochoid::tools {
@@ -27,11 +29,24 @@ struct Options {
   bool json = false;
 };
 
+/// What was tracked elsewhere would be drawn beside the bodies.
+void check_recording(const data::TrackFile& track, const Options& options) {
+  if (track.source_sha256.empty() ||
+      track.source_sha256 == tracking::sha256_of_recording(options.video))
+    return;
+  throw InputError(fmt::format("{}: was tracked in another recording than {}; track this one",
+                               options.track, options.video));
+}
+
 OverlayInput read_inputs(const Options& options) {
   OverlayInput input;
   input.video = options.video;
   input.tracks = data::read_track(options.track);
-  if (!options.fit.empty()) input.fit = data::read_fit(options.fit);
+  check_recording(input.tracks, options);
+  if (!options.fit.empty()) {
+    input.fit = data::read_fit(options.fit);
+    check_made_from(*input.fit, options.fit, options.track);
+  }
   if (!options.scene.empty())
     input.scene = data::read_scene(options.scene);
   else if (input.fit)

@@ -8,6 +8,7 @@
 #include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
+#include "provenance.hpp"
 #include "report.hpp"
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
@@ -28,10 +29,10 @@ ReportInput inputs(const Options& options) {
   ReportInput input;
   input.tracks = data::read_track(options.track);
   input.title = input.tracks.source.empty() ? options.track : input.tracks.source;
-  input.checksums[std::filesystem::path(options.track).filename().string()] =
-      data::sha256_of_file(options.track);
+  add_checksum(input.checksums, options.track);
   if (!options.fit.empty()) {
     input.fit = data::read_fit(options.fit);
+    check_made_from(*input.fit, options.fit, options.track);
     input.scene = scene_of_fit(*input.fit, options.fit);
   }
   return input;

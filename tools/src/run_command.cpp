@@ -8,8 +8,10 @@
 
 #include "commands.hpp"
 #include "json_summary.hpp"
+#include "outputs.hpp"
 #include "overlay.hpp"
 #include "progress.hpp"
+#include "provenance.hpp"
 #include "report.hpp"
 #include "report_parts.hpp"
 #include "run_folder.hpp"
@@ -159,9 +161,9 @@ void write_data(Run& run, const Options& options, const fs::path& folder) {
   run.fit->scene_toml = data::to_toml(kept);
   run.fit->versions["trochoid"] = TROCHOID_VERSION;
   run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(folder / (stem + ".track.csv"));
-  if (!options.scene.empty())
-    run.fit->inputs[fs::path(options.scene).filename().string()] =
-        data::sha256_of_file(options.scene);
+  run.fit->inputs[run.tracked.file.source] = run.tracked.file.source_sha256;
+  if (!options.scene.empty()) add_checksum(run.fit->inputs, options.scene);
+  if (run.camera) add_checksum(run.fit->inputs, folder / "camera.json");
   data::write_fit(*run.fit, folder / (stem + ".fit.json"));
 }
 
@@ -198,19 +200,10 @@ void show(Run& run, const Options& options, const fs::path& folder) {
   run.overlay = write_overlay(input, how, folder / "overlay.mp4");
 }
 
-// As a shell would take it: a name with anything but plain characters goes into quotes.
-std::string quoted(const std::string& word) {
-  const bool plain = word.find_first_of(" \t\n\"'\\$`!*?[](){}<>|&;#~") == std::string::npos;
-  if (plain) return word;
-  std::string result = "'";
-  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
-
 std::string command_line(const Options& options) {
-  std::string line = "trochoid run " + quoted(options.video);
+  std::string line = "trochoid run " + shell_quoted(options.video);
   const auto add = [&](const char* name, const std::string& value) {
-    if (!value.empty()) line += fmt::format(" {} {}", name, quoted(value));
+    if (!value.empty()) line += fmt::format(" {} {}", name, shell_quoted(value));
   };
   add("--scene", options.scene);
   add("--camera", options.camera);

@@ -12,6 +12,7 @@
 #include "libav_handles.hpp"
 #include "luma.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -279,6 +280,15 @@ class LibavSource final : public FrameSource {
 };
 
 }  // namespace
+
+std::string sha256_of_recording(const fs::path& path) {
+  const ImageSequence sequence = find_image_sequence(path);
+  if (!sequence.is_sequence()) return data::sha256_of_file(path);
+  std::string list;
+  for (const fs::path& picture : pictures_of(sequence))
+    list += data::sha256_of_file(picture) + "\n";
+  return data::sha256_of_text(list);
+}
 
 std::unique_ptr<FrameSource> open_video(const fs::path& path, const SourceOptions& options) {
   return std::make_unique<LibavSource>(path, options);

@@ -1,11 +1,13 @@
 #include "image_sequence.hpp"
 
 #include <fmt/core.h>
+#include <glob.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <climits>
+#include <cstdlib>
 #include <map>
 #include <string_view>
 
@@ -76,6 +78,28 @@ ImageSequence find_image_sequence(const fs::path& path) {
   if (text.find_first_of("*?[") != std::string::npos)
     return {ImageSequence::Kind::pattern, text, 0};
   return {ImageSequence::Kind::file, text, 0};
+}
+
+std::vector<fs::path> pictures_of(const ImageSequence& sequence) {
+  std::vector<fs::path> pictures;
+  if (sequence.kind == ImageSequence::Kind::pattern) {
+    glob_t found{};
+    if (::glob(sequence.url.c_str(), 0, nullptr, &found) == 0)
+      pictures.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+    ::globfree(&found);
+  } else if (sequence.kind == ImageSequence::Kind::numbered) {
+    const std::size_t percent = sequence.url.rfind('%'), d = sequence.url.find('d', percent);
+    const int digits = std::atoi(sequence.url.substr(percent + 1, d - percent - 1).c_str());
+    for (int number = sequence.first_number;; ++number) {
+      pictures.emplace_back(sequence.url.substr(0, percent) +
+                            fmt::format("{:0{}d}", number, digits) + sequence.url.substr(d + 1));
+      if (!fs::exists(pictures.back())) break;
+    }
+    pictures.pop_back();
+  } else {
+    pictures.emplace_back(sequence.url);
+  }
+  return pictures;
 }
 
 InputHandle open_input(const ImageSequence& sequence, std::optional<double> frame_rate_hz,

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "libav_handles.hpp"
 
@@ -21,6 +22,9 @@ struct ImageSequence {
 /// A folder becomes the pattern of the image type it holds most of.
 /// @throws InputError if a folder or series holds no image.
 [[nodiscard]] ImageSequence find_image_sequence(const std::filesystem::path& path);
+
+/// The pictures of a sequence in the order they are read.
+[[nodiscard]] std::vector<std::filesystem::path> pictures_of(const ImageSequence& sequence);
 
 /// @param frame_rate_hz rate given to a sequence.  @throws InputError in libav's words.
 [[nodiscard]] InputHandle open_input(const ImageSequence& sequence,

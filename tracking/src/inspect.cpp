@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "body_search.hpp"
+#include "path_motion.hpp"
 #include "recording.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -42,8 +43,11 @@ struct Watch {
   std::vector<double> radii, ratios, bore;
   cv::Rect2d box;
   Plate plate;
+  BodyPath path;
 
-  void add(const Frame& frame, const Background& background, const Ellipse& rim) {
+  void add(const Frame& frame, const Background& background, const Sighting& seen) {
+    path.frames[frame.index] = {frame.t_s, seen};
+    const Ellipse& rim = seen.rim;
     radii.push_back(rim.semi_major_px());
     ratios.push_back(rim.semi_minor_px() / rim.semi_major_px());
     const cv::Rect2d point(rim.centre_px.x(), rim.centre_px.y(), 1e-9, 1e-9);
@@ -56,19 +60,23 @@ struct Watch {
   }
 };
 
-Inspection::Body watch(const std::vector<Frame>& held, const Background& background,
-                       const BodyFinder& finder, const Seed& seed) {
+Watch watch(const std::vector<Frame>& held, const Background& background, const BodyFinder& finder,
+            const Seed& seed) {
   Watch seen;
-  seen.add(held[seed.held_index], background, seed.seen.rim);
+  seen.add(held[seed.held_index], background, seed.seen);
   for (const int step : {1, -1}) {
     Follower follower(finder, background, nullptr);
     follower.start(held[seed.held_index], seed.seen);
     for (auto i = static_cast<std::ptrdiff_t>(seed.held_index) + step;
          i >= 0 && i < static_cast<std::ptrdiff_t>(held.size()); i += step) {
       const Frame& frame = held[static_cast<std::size_t>(i)];
-      if (const auto next = follower.follow(frame)) seen.add(frame, background, next->rim);
+      if (const auto next = follower.follow(frame)) seen.add(frame, background, *next);
     }
   }
+  return seen;
+}
+
+Inspection::Body body_of(const Watch& seen) {
   // The floor seen through a tilted ring is hidden by its wall: the flattest third decides.
   constexpr double kRobust = 0.05, kBore = 0.5;
   return {.radius_px = quantile(seen.radii, 1.0 - kRobust),
@@ -79,10 +87,30 @@ Inspection::Body watch(const std::vector<Frame>& held, const Background& backgro
           .frames = static_cast<int>(seen.radii.size())};
 }
 
+/// What looks most like a body, unless it hardly moves and one that turns in place explains more.
+std::optional<Inspection::Body> most_plainly_moving(const std::vector<Frame>& held,
+                                                    const Background& background,
+                                                    const BodyFinder& finder) {
+  constexpr double kHardly_radii = 0.5;
+  const std::vector<Follower::Others> nothing(held.size());
+  const auto seed = find_seed(held, background, finder, nothing);
+  if (!seed) return std::nullopt;
+  Watch seen = watch(held, background, finder, *seed);
+  if (travel_in_radii(seen.path) < kHardly_radii)
+    if (const auto turning = find_seed_turning(held, background, finder)) {
+      Watch other = watch(held, background, finder, *turning);
+      if (changes_explained(other.path, background.active()) >
+          changes_explained(seen.path, background.active()))
+        seen = std::move(other);
+    }
+  return body_of(seen);
+}
+
 }  // namespace
 
-Inspection inspect_video(const std::filesystem::path& path) {
+Inspection inspect_video(const std::filesystem::path& path, std::optional<double> frame_rate_hz) {
   SourceOptions how;
+  how.frame_rate_hz = frame_rate_hz;
   how.chroma = true;
   Recording recording(path, how, TrackOptions{}.held_bytes);
   const auto finder = make_rim_finder(false);
@@ -93,9 +121,7 @@ Inspection inspect_video(const std::filesystem::path& path) {
     const Background background = Background::from_samples(recording.samples());
     result.watched_s = window.back().t_s;
     result.restless = background.restless();
-    const std::vector<Follower::Others> nothing(window.size());
-    if (const auto seed = find_seed(window, background, *finder, nothing))
-      result.body = watch(window, background, *finder, *seed);
+    result.body = most_plainly_moving(window, background, *finder);
   }
   result.video = recording.info();
   return result;

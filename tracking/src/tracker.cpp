@@ -374,7 +374,7 @@ TrackResult track_video(const fs::path& video, const data::Scene& scene,
                         const std::optional<data::Camera>& camera, const TrackOptions& options) {
   Tracking tracking(video, scene, camera, options);
   TrackResult result = tracking.run();
-  result.file.source_sha256 = data::sha256_of_file(video);
+  result.file.source_sha256 = sha256_of_recording(video);
   return result;
 }
 

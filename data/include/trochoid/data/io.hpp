@@ -41,6 +41,7 @@ void write_table(const Table& table, const std::filesystem::path& path);
 void write_text(const std::string& text, const std::filesystem::path& path);
 /// Hex SHA-256 of a file's bytes.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+[[nodiscard]] std::string sha256_of_text(const std::string& text);
 
 /// A name beside `target`, hidden and this process' own, for a file or folder that is to become it.
 /// What killed processes left beside the same target is swept away. Ends in exactly one of

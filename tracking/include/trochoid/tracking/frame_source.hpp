@@ -54,6 +54,9 @@ class FrameSource {
 /// @throws InputError (missing, not a video, no picture stream) before any frame is handed out.
 [[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,
                                                       const SourceOptions& options = {});
+/// SHA-256 of a video file; of an image sequence, of the list of its pictures' own in the order
+/// they are read, one to a line.  @throws InputError if it is not there.
+[[nodiscard]] std::string sha256_of_recording(const std::filesystem::path& path);
 /// The same source decoded ahead in its own thread, with a bounded queue.
 [[nodiscard]] std::unique_ptr<FrameSource> decode_ahead(std::unique_ptr<FrameSource> source,
                                                         int queue_length = 8);

@@ -22,8 +22,10 @@ struct Inspection {
   std::optional<Body> body;  ///< the body that moves most plainly, if any
 };
 
-/// Looks at the first part of a recording (what fits in memory, seconds to a minute).
+/// Looks at a recording until a moving body was seen: mostly its first part, what fits in memory.
+/// @param frame_rate_hz overrides the time stamps; an image sequence has none.
 /// @throws InputError as open_video does.
-[[nodiscard]] Inspection inspect_video(const std::filesystem::path& path);
+[[nodiscard]] Inspection inspect_video(const std::filesystem::path& path,
+                                       std::optional<double> frame_rate_hz = {});
 
 }  // namespace trochoid::tracking
