@@ -187,6 +187,11 @@ class Chain {
     guess.pose->pose = node.poses[1];
     auto seen = measure(*glimpses_[node.at].frame, guess, near(i, node.poses[1]));
     if (!seen || !seen->pose) return std::nullopt;
+    // The centres of the two readings are apart by the thickness of the body at most.
+    constexpr double kApart = 0.12;
+    const Sighting& ours = *glimpses_[node.at].seen;
+    if ((seen->centre_px - ours.centre_px).norm() > kApart * ours.rim.semi_major_px())
+      return std::nullopt;
     const Eigen::Vector3d axis = axis_of(seen->pose->pose);
     if (between_axes(axis, axis_of(node.poses[1]), alike_) >
         between_axes(axis, axis_of(node.poses[0]), alike_))
@@ -216,7 +221,9 @@ class Chain {
     turning.theta_rad += ahead * (pb.theta_rad - pa.theta_rad);
     const double off =
         std::min(between_axes(straight, is, alike_), between_axes(axis_of(turning), is, alike_));
-    const double step = between_axes(from, to, alike_);
+    // Of the two steps the smaller: a reading that leaps must not allow for itself.
+    const double step = std::min(between_axes(from, to, alike_),
+                                 between_axes(to, is, alike_) / std::max(ahead, 1e-9));
     const double allowed = kLeast + kOfStep * step;
     return std::min(kMost, 0.5 * off * off / (allowed * allowed)) +
            kPerRadian * between_axes(to, is, alike_);
