@@ -100,7 +100,8 @@ Found search_path(const Problem& problem, const Quest& quest) {
       continue;
     }
     Problem easier = for_predictor(problem, *relative.model);
-    easier.rough = true;
+    // From positions alone neighbouring valleys are many, and a start has to be near the right one.
+    easier.rough = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
     const bool rolls = relative.model->model_name() == "rolling";
     const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
     if (!rough.solution.usable || rough.unexplained > kRoughly) continue;

@@ -55,6 +55,15 @@ std::vector<int> window_sizes(const Problem& problem) {
 
 namespace {
 
+// Positions of a body on its rim that move little more than they scatter: several motions pass the
+// gate, and only the best of all counts.
+bool buried(const Problem& problem, const Found& best) {
+  constexpr double kClear = 0.02;  // of the variance
+  return problem.predictor->index_of("w1_rad_s") >= 0 &&
+         problem.arcs[0].observable_index(model::Observable::phi_rad) < 0 &&
+         best.unexplained > kClear;
+}
+
 // A few quick tries: most tracks need no more.
 Found search_briefly(const Problem& problem, const Starter& starter) {
   // Where the angles were seen, starts differ little and a good one is known by its result.
@@ -66,10 +75,11 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
+    std::vector<double> valleys;
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
-      Found found = grow(problem, starts[i], window);
+      Found found = grow(problem, starts[i], window, 1.5, &valleys);
       if (better(found, best)) best = std::move(found);
-      if (best.passed && (seen || best.reduced_chi2 < sure)) return best;
+      if (best.passed && (seen || best.reduced_chi2 < sure) && !buried(problem, best)) return best;
       if (seen && best.unexplained < kExplained) return best;
     }
     if (best.unexplained < kExplained) return best;
@@ -134,7 +144,9 @@ Found search_widely(const Problem& problem, const Starter& starter, Found best) 
       else if (gain > -kSameValley)
         ++reached;
       if (better(found, best)) best = std::move(found);
-      if (best.passed || best.unexplained < kExplained || reached >= kOftenEnough) return best;
+      if ((best.passed && !buried(problem, best)) || best.unexplained < kExplained ||
+          reached >= kOftenEnough)
+        return best;
     }
   }
   return best;
@@ -150,7 +162,9 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   // A sliding body's derivatives are dear, and few of its starts lead anywhere.
   const bool brief = seen || !slides || effort == Effort::brief;
   if (brief) best = search_briefly(problem, starter);
-  if (best.passed || !rim || effort == Effort::brief || best.unexplained < kExplained) return best;
+  if ((best.passed && !buried(problem, best)) || !rim || effort == Effort::brief ||
+      best.unexplained < kExplained)
+    return best;
   return search_widely(problem, starter, std::move(best));
 }
 

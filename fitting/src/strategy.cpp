@@ -118,7 +118,9 @@ double chi2_gate(int rows) {
   return 1.1 + 4.0 * std::sqrt(2.0 / std::max(1, rows));
 }
 
-Found grow(const Problem& problem, const Start& start, int first_window, double growth) {
+Found grow(const Problem& problem, const Start& start, int first_window, double growth,
+           std::vector<double>* valleys) {
+  constexpr double kSameValley = 1e-3;  // of chi-square
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
@@ -135,6 +137,13 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     if (!solution.usable) return {};
     part.set_base(solution.u);
     current.base = part.base;
+    if (first && window < all && valleys != nullptr) {
+      const bool known = std::any_of(valleys->begin(), valleys->end(), [&](double chi2) {
+        return std::abs(solution.chi2 - chi2) < kSameValley * chi2;
+      });
+      if (known) return {};
+      valleys->push_back(solution.chi2);
+    }
     // A window that is far from explained will not lead anywhere.
     if (window < all && solution.chi2 / free_rows(part) > 30.0 * chi2_gate(part.rows())) return {};
     if (window == all) break;

@@ -40,8 +40,10 @@ void apply(const Start& start, Problem& problem);
 /// all samples.
 /// @param first_window samples of the first window.
 /// @param growth       of a window over the one before.
+/// @param valleys      chi-squares at which other starts ended on the first window, this one's is
+///                     added: a start that ends where one before it did is not followed further.
 [[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window,
-                         double growth = 1.5);
+                         double growth = 1.5, std::vector<double>* valleys = nullptr);
 
 /// Where a cost has ripples, as events that come and go with the parameters make them: steps off
 /// the best known point, as far as the misfit lets the linearised problem, and downhill again,

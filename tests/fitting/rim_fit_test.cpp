@@ -10,6 +10,7 @@
 
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "trochoid/model/predictor.hpp"
 
 // Bodies on their rim, from reference trajectories of an independent integrator with noise added.
 namespace trochoid::fitting {
@@ -152,6 +153,52 @@ TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
   EXPECT_LT(pull(fit, "theta_rad", 0.9599310885968813), kFar);
   EXPECT_LT(pull(fit, "w2_rad_s", 19.659649062935802), kFar);
   EXPECT_LT(fit.find("friction")->sigma, 0.01);
+}
+
+// Half a millimetre of noise on as much motion: other motions come near enough to pass for right
+// ones, and only the best of all is the answer.
+TEST(BuriedRimFit, FindsTheBestMotionNotTheFirstThatPasses) {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::disc;
+  body.radius_m = 0.035;
+  body.thickness_m = 0.008;
+  scene.model.name = "rolling";
+  const std::map<std::string, double> truth{
+      {"theta_rad", 0.15}, {"phi_rad", 0.3}, {"w1_rad_s", 0.0}, {"w2_rad_s", 7.5},
+      {"w3_rad_s", 0.1},   {"x_m", 0.01},    {"y_m", -0.02}};
+  const auto predictor = model::make_predictor(scene);
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const auto& info = predictor->parameters()[i];
+    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
+  }
+  constexpr int kSamples = 200;
+  constexpr double kSigma_m = 5e-4;
+  std::vector<double> t_s;
+  for (int i = 0; i < kSamples; ++i) t_s.push_back(i / 200.0);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  const Eigen::VectorXd path = predictor->predict(values, request).values;
+  FitOptions from_truth;
+  from_truth.strategy = "single";
+  from_truth.start = truth;
+  for (int seed = 1; seed <= 5; ++seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal(0.0, kSigma_m);
+    data::Track track;
+    for (int i = 0; i < kSamples; ++i) {
+      data::TrackSample sample;
+      sample.t_s = t_s[static_cast<std::size_t>(i)];
+      sample.centre_m =
+          path.segment<2>(2 * i) + Eigen::Vector2d(normal(generator), normal(generator));
+      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+      track.samples.push_back(sample);
+    }
+    const data::Fit found = fitting::fit(std::span(&track, 1), scene);
+    const data::Fit best = fitting::fit(std::span(&track, 1), scene, from_truth);
+    EXPECT_LT(found.chi2, best.chi2 + 0.5) << "seed " << seed;
+  }
 }
 
 TEST_F(RimFit, WarnsOfATrackShorterThanANutation) {
