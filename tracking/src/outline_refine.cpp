@@ -28,6 +28,8 @@ double clear_of_next(double next_px, double extent_px, double blur_px) {
 }
 
 // The edge of an outline that sweeps over the picture during the exposure.
+static_assert(Sweep::kMost <= StretchProfile::kMostSteps);
+
 void set_sweep(const Sweep& sweep, double own_blur_px, StretchProfile& look) {
   const double mean = sweep.mean_px(), step = sweep.step_px();
   look.steps = sweep.count;
