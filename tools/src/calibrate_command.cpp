@@ -239,19 +239,17 @@ void add_calibrate_command(CLI::App& app) {
                       "Picture in which the board lies on the floor [the first]");
   command->add_option("--floor-height-mm", options->floor_height_mm,
                       "Height of that board, of the points or of the circle above the floor [0]");
-  command
-      ->add_option("--floor-points", options->floor_points,
-                   "CSV with x_px, y_px, x_m, y_m of four or more points of the floor")
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("--circle-points", options->circle_points,
-                   "CSV with x_px, y_px of points on the rim of a body at rest on its face")
-      ->check(CLI::ExistingFile);
+  command->add_option("--floor-points", options->floor_points,
+                      "CSV with x_px, y_px, x_m, y_m of four or more points of the floor");
+  command->add_option("--circle-points", options->circle_points,
+                      "CSV with x_px, y_px of points on the rim of a body at rest on its face");
   command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
       ->check(positive_number());
   command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   add_json_flag(*command, options->json);
+  command->footer(
+      "Example: trochoid calibrate board/*.png --pattern 9x6 --square-mm 20 -o camera.json");
   command->callback([options] { run(*options); });
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "campaign.hpp"
+#include "track_options.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {
@@ -110,6 +111,9 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
       if (table.contains(option.key)) {
         item.options.emplace_back(option.option);
         item.options.push_back(text(option.key));
+        if (std::string_view(option.key) == "effort" && !is_effort(item.options.back()))
+          fail(campaign.manifest, *table.get(option.key),
+               fmt::format("effort = '{}': it is quick, normal or exact", item.options.back()));
       }
     campaign.items.push_back(std::move(item));
   }

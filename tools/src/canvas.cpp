@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string_view>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -50,8 +51,33 @@ struct TextMask {
   cv::Point baseline;  // of the left end of the base line inside the mask
 };
 
+// The font knows ASCII alone: accented Latin letters lose their accents, any other character
+// becomes one question mark.
+std::string plain_letters(const std::string& text) {
+  // U+00C0 to U+017F
+  static constexpr std::string_view kBase =
+      "AAAAAAACEEEEIIIIDNOOOOOxOUUUUYTsaaaaaaaceeeeiiiidnooooo:ouuuuyty"
+      "AaAaAaCcCcCcCcDdDdEeEeEeEeEeGgGgGgGgHhHhIiIiIiIiIiIiJjKkkLlLlLlL"
+      "lLlNnNnNnnNnOoOoOoOoRrRrRrSsSsSsSsTtTtTtUuUuUuUuUuUuWwYyYZzZzZzs";
+  std::string plain;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const int more = byte < 0xC0 ? 0 : byte < 0xE0 ? 1 : byte < 0xF0 ? 2 : 3;
+    unsigned code = more == 0 ? byte : byte & (0x3FU >> more);
+    std::size_t next = i + 1;
+    for (; next < text.size() && next <= i + static_cast<std::size_t>(more); ++next)
+      code = code << 6U | (static_cast<unsigned char>(text[next]) & 0x3FU);
+    i = next;
+    plain += code < 0x80                                  ? static_cast<char>(code)
+             : code >= 0xC0 && code < 0xC0 + kBase.size() ? kBase[code - 0xC0]
+                                                          : '?';
+  }
+  return plain;
+}
+
 // Drawn kSupersample times larger and averaged down; `shift_*` is the sub-pixel part of the place.
-TextMask text_mask(const std::string& text, double height_px, double shift_x, double shift_y) {
+TextMask text_mask(const std::string& words, double height_px, double shift_x, double shift_y) {
+  const std::string text = plain_letters(words);
   const double scale = kSupersample * height_px / kCapitalAtScaleOne;
   const int thickness = std::max(1, static_cast<int>(std::lround(0.14 * kSupersample * height_px)));
   int below = 0;
@@ -191,7 +217,8 @@ void draw_text_with_halo(cv::Mat& picture, const std::string& text, const cv::Po
 double text_width_px(const std::string& text, double height_px) {
   int baseline = 0;
   const double scale = kSupersample * height_px / kCapitalAtScaleOne;
-  return static_cast<double>(cv::getTextSize(text, kFont, scale, 1, &baseline).width) /
+  return static_cast<double>(
+             cv::getTextSize(plain_letters(text), kFont, scale, 1, &baseline).width) /
          kSupersample;
 }
 

@@ -123,10 +123,8 @@ void add_fit_command(CLI::App& app) {
   auto* fit = app.add_subcommand("fit", "Fit model parameters to one or more tracks of a body");
   fit->add_option("track", command->tracks,
                   "Track CSV files (docs/formats.md); t_s,x_m,y_m will do")
-      ->required()
-      ->check(CLI::ExistingFile);
-  fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors")
-      ->check(CLI::ExistingFile);
+      ->required();
+  fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors");
   fit->add_option("--model,-m", command->options.model,
                   "top, rolling, sliding, puck, pivot or auto (compare, as where the scene names "
                   "none); overrides the scene's");
@@ -146,6 +144,7 @@ void add_fit_command(CLI::App& app) {
       ->check(non_negative_number());
   fit->add_option("--seed", command->options.seed, "Seed of everything random");
   fit->add_flag("--json", command->json, "Print the fit as its file holds it (JSON)");
+  fit->footer("Example: trochoid fit ring.track.csv --scene ring.toml -o ring.fit.json");
   fit->callback([command] { run(*command); });
 }
 

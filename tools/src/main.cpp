@@ -15,11 +15,33 @@ namespace {
 
 enum ExitStatus { kDone = 0, kError = 1, kUsage = 2, kNotGood = 3 };
 
+/// "trochoid study fits", as far as the words were understood.
+std::string understood(const CLI::App& app) {
+  std::string words = app.get_name();
+  for (const CLI::App* command : app.get_subcommands()) words += " " + understood(*command);
+  return words;
+}
+
+/// One line: what was wrong and where to look.
+std::string usage_error(const CLI::App* app, const CLI::Error& error) {
+  const std::string words = understood(*app);
+  const std::vector<std::string> left = app->remaining(true);
+  const bool unknown = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
+                       !left.empty() && !left.front().starts_with('-') &&
+                       std::string_view(error.what()).find("subcommand") != std::string_view::npos;
+  return fmt::format("trochoid: {}; {} --help tells more\n",
+                     unknown ? fmt::format("'{}' is no subcommand of {}", left.front(), words)
+                             : std::string(error.what()),
+                     words);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "Track spinning and rolling discs and rings in video, fit a rigid-body model to the "
       "path, and show prediction and observation together."};
   app.set_version_flag("--version", "trochoid " TROCHOID_VERSION);
+  app.name("trochoid");
+  app.failure_message(usage_error);
   app.require_subcommand(1);
   app.fallthrough();  // --quiet and --verbose may stand before or after the command
   app.add_flag_callback(

@@ -75,7 +75,8 @@ OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int heig
     : tracks_(input.tracks), scene_(scene_of(input)), camera_(input.camera) {
   if (!camera_ && scene_) camera_ = camera_of(*scene_);
   if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
-  if (input.fit) prediction_ = replay(*input.fit, tracks_, input.fit_track);
+  if (input.fit && !input.fit->parameters.empty())
+    prediction_ = replay(*input.fit, tracks_, input.fit_track);
   for (const data::Track& track : tracks_.tracks) collect(track);
   if (has_prediction()) {
     auto lists = residuals(tracks_, prediction_, input.fit->noise_scale);

@@ -222,7 +222,7 @@ double rms_m(const std::vector<Residual>& residuals) {
   if (residuals.empty()) return kNaN;
   double sum_m2 = 0.0;
   for (const Residual& residual : residuals) sum_m2 += residual.value_m.squaredNorm();
-  return std::sqrt(sum_m2 / static_cast<double>(residuals.size()));
+  return std::sqrt(0.5 * sum_m2 / static_cast<double>(residuals.size()));
 }
 
 }  // namespace trochoid::tools

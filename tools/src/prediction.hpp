@@ -56,7 +56,7 @@ struct Residual {
 [[nodiscard]] std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
                                                            const PredictedPath& path,
                                                            double noise_scale);
-/// Root mean square length of the residual vectors [m]; NaN for an empty list.
+/// Root mean square of the residuals per axis [m]; NaN for an empty list.
 [[nodiscard]] double rms_m(const std::vector<Residual>& residuals);
 
 }  // namespace trochoid::tools

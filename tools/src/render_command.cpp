@@ -228,7 +228,8 @@ nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& mo
                                {"angle_deg", mark.angle_rad * 180.0 / std::numbers::pi},
                                {"faces", faces}});
   }
-  json["dynamics"] = {{"model", model}, {"g", scene.model.gravity_m_s2}};
+  json["dynamics"] = {
+      {"model", model}, {"g", scene.model.gravity_m_s2}, {"scene_toml", data::to_toml(scene)}};
   return json;
 }
 
@@ -238,6 +239,10 @@ struct Targets {
 };
 Targets targets_of(const fs::path& output, bool lossless) {
   const std::string ending = lossless ? ".mkv" : ".mp4";
+  const std::string given = output.extension().string();
+  if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
+    throw InputError(fmt::format("{}: name a folder, a {}.mkv", output.string(),
+                                 lossless ? "or (it is to be lossless) a " : "a .mp4 or a "));
   if (output.extension().empty()) {
     fs::create_directories(output);
     return {output / ("video" + ending), output / "truth.csv", output / "camera.json",
@@ -269,6 +274,9 @@ void run(const Options& options) {
   const model::Trajectory trajectory = model::simulate(scene);
   const Motion motion(trajectory, scene.run.rate_hz);
   data::Camera camera = camera_of(options, scene, motion);
+  if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
+    throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
+                                 camera.width_px, camera.height_px));
   const RenderStyle style = style_of(options);
   camera.frame_rate_hz = rate_hz;
   camera.exposure_fraction = style.exposure_fraction;
@@ -353,12 +361,14 @@ void add_render_command(CLI::App& app) {
                    "Clip to write (.mp4, .mkv), or a folder for video.mp4, truth.csv, camera.json "
                    "and object.json")
       ->required();
-  command->add_option("--camera", options->camera, "Camera file [the scene's, else from above]")
-      ->check(CLI::ExistingFile);
+  CLI::Option* camera = command->add_option("--camera", options->camera,
+                                            "Camera file [the scene's, else from above]");
   command->add_option("--width", options->width_px, "Of the picture [px, 640]")
-      ->check(CLI::Range(32, 8192));
+      ->check(CLI::Range(32, 8192))
+      ->excludes(camera);
   command->add_option("--height", options->height_px, "Of the picture [px, 480]")
-      ->check(CLI::Range(32, 8192));
+      ->check(CLI::Range(32, 8192))
+      ->excludes(camera);
   command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
       ->check(positive_number());
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
@@ -367,6 +377,8 @@ void add_render_command(CLI::App& app) {
   command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)");
   add_look_options(*command, *options);
   add_json_flag(*command, options->json);
+  command->footer(
+      "Example: trochoid render --scene disc_rolling -o planned.mp4 --blur 1 --noise 2");
   command->callback([options] { run(*options); });
 }
 

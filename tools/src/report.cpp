@@ -341,7 +341,8 @@ std::string make_report(const ReportInput& input) {
       "report</title>\n<style>{1}</style>\n<style>{2}</style></head><body><main><h1>{0}</h1>\n",
       escaped(input.title), assets::plot_library_css, assets::report_css);
   html += verdict_section(judge(facts)) + picture_section(facts);
-  if (input.fit) html += parameter_section(*input.fit) + identifiability_section(*input.fit);
+  if (input.fit && !input.fit->parameters.empty())
+    html += parameter_section(*input.fit) + identifiability_section(*input.fit);
   html += series_section(series) + residual_section(facts);
   if (input.fit) html += comparison_section(*input.fit);
   html += quality_section(facts) + origin_section(input);

@@ -41,6 +41,9 @@ ReportInput inputs(const Options& options) {
 void run(const Options& options) {
   for (const std::string& output : {options.output, options.path_svg})
     check_output(output, {options.track, options.fit});
+  if (const std::string ending = std::filesystem::path(options.output).extension().string();
+      ending != ".html" && ending != ".htm")
+    throw InputError(fmt::format("-o {}: the report is a page, name it .html", options.output));
   const ReportInput input = inputs(options);
   const std::string html = make_report(input);
   data::write_text(html, options.output);

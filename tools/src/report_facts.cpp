@@ -62,7 +62,7 @@ ReportFacts gather(const ReportInput& input) {
     }
   }
   facts.median_sigma_m = median_of(std::move(sigmas_m));
-  if (input.fit) {
+  if (input.fit && !input.fit->parameters.empty()) {
     facts.prediction = replay(*input.fit, input.tracks, input.fit_track);
     facts.residuals = residuals(input.tracks, facts.prediction, input.fit->noise_scale);
     measure_residuals(facts, input.fit->noise_scale);

@@ -158,7 +158,7 @@ void ResidualStrip::draw_row(const ObjectPaths& paths, const Row& row, const std
   const std::string bands = "bands: 1, 2 sigma";
   const double words_left = right_px_ - text_width_px(bands, text_px_);
   draw_text(picture_,
-            fmt::format("{}observed - predicted [mm]   rms {:.3g}", name,
+            fmt::format("{}observed - predicted [mm]   rms per axis {:.3g}", name,
                         rms_m(paths.residuals) * kMmPerM),
             {left_px_, base}, text_px_, kWords);
   draw_text(picture_, "x", {words_left - 3.4 * text_px_, base}, text_px_, palette::residual_x);

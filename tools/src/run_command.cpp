@@ -15,7 +15,7 @@
 #include "report.hpp"
 #include "report_parts.hpp"
 #include "run_folder.hpp"
-#include "track_effort.hpp"
+#include "track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/compare.hpp"
@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string video, scene, camera, output, model, from, to;
+  std::string video, scene, camera, output, model, from, to, at;
   tracking::Effort effort = tracking::Effort::normal;
   int objects = 0;
   double rate_hz = 0.0, slow = 0.0;
@@ -72,6 +72,7 @@ Run prepared(const Options& options) {
   if (!options.scene.empty()) run.scene = data::read_scene(options.scene);
   if (!options.model.empty()) run.scene.model.name = options.model;
   if (options.objects > 0) run.scene.tracking.objects = options.objects;
+  if (!options.at.empty()) run.scene.tracking.at_px = parse_point(options.at);
   if (options.rate_hz > 0.0) run.scene.camera.frame_rate_hz = options.rate_hz;
   if (!options.camera.empty()) {
     run.camera = data::read_camera(options.camera);
@@ -208,6 +209,7 @@ std::string command_line(const Options& options) {
   add("--scene", options.scene);
   add("--camera", options.camera);
   add("--model", options.model);
+  add("--at", options.at);
   add("--from", options.from);
   add("--to", options.to);
   if (options.objects > 0) add("--objects", std::to_string(options.objects));
@@ -325,6 +327,7 @@ void add_run_command(CLI::App& app) {
                       "top, rolling, sliding, puck, pivot or auto; overrides the scene's");
   command->add_option("--objects", options->objects, "Number of moving bodies")
       ->check(CLI::Range(1, 64));
+  add_at(*command, options->at);
   command->add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
   command->add_option("--to", options->to, "Last moment: seconds or a frame");
   command

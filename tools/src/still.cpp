@@ -134,18 +134,10 @@ std::string figures(const OverlayContent& content, const ObjectPaths& paths) {
   if (content.objects().size() > 1) words = fmt::format("object {}: {}", paths.object, words);
   if (paths.residuals.empty()) return words + "; no fit";
   const double rms_mm = rms_m(paths.residuals) * 1000.0;
-  words += fmt::format("; residual rms {:.3g} mm", rms_mm);
+  words += fmt::format("; residuals {:.3g} mm", rms_mm);
   if (content.scale_px_per_m())
     words += fmt::format(" = {:.3g} px", rms_mm * 1e-3 * *content.scale_px_per_m());
-  double sum = 0.0;
-  int known = 0;
-  for (const Residual& residual : paths.residuals)
-    for (int axis = 0; axis < 2; ++axis)
-      if (residual.sigma_m[axis] > 0.0) {
-        sum += std::pow(residual.value_m[axis] / residual.sigma_m[axis], 2);
-        ++known;
-      }
-  if (known > 0) words += fmt::format(" = {:.2f} sigma per axis", std::sqrt(sum / known));
+  words += " rms per axis";
   return words;
 }
 

@@ -7,6 +7,7 @@ void add_study_command(CLI::App& app) {
       "study",
       "Measure the program itself: error against run time, and what survives the extremes");
   study->require_subcommand(1);
+  study->footer("Example: trochoid study fits --count 100");
   add_study_chain(*study);
   add_study_fits(*study);
   add_study_reference(*study);

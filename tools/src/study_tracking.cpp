@@ -197,6 +197,7 @@ void add_study_tracking(CLI::App& study_command) {
   command->add_option("--out", options->out, "Folder for <name>.track.csv")->capture_default_str();
   command->add_flag("--baselines", options->baselines,
                     "Also score OpenCV's usual ways: background subtraction, HoughCircles");
+  command->footer("Example: trochoid study tracking data/samples/*/");
   command->callback([options] { run(*options); });
 }
 

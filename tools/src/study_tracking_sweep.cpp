@@ -293,6 +293,7 @@ void add_study_tracking_sweep(CLI::App& study) {
   command->add_option("--seed", options->seed, "Of pictures and starts [1]");
   command->add_option("-o,--output", options->output, "Table to write [tracking_sweep.csv]");
   command->add_option("--plot", options->plot, "Plot to write (.svg, .png)");
+  command->footer("Example: trochoid study tracking-sweep");
   command->callback([options] { run(*options); });
 }
 

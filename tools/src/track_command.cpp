@@ -9,7 +9,7 @@
 #include "json_summary.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
-#include "track_effort.hpp"
+#include "track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/smooth.hpp"
@@ -29,14 +29,6 @@ struct Options {
   tracking::Effort effort = tracking::Effort::normal;
   bool json = false;
 };
-
-Eigen::Vector2d parse_point(const std::string& text) {
-  double x = 0.0, y = 0.0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
-    throw InputError(fmt::format("--at {}: give a point in pixels as x,y", text));
-  return {x, y};
-}
 
 data::Scene scene_of(const Options& options) {
   data::Scene scene;
@@ -130,15 +122,13 @@ void add_track_command(CLI::App& app) {
   CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
   track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
       ->required();
-  track->add_option("--scene", options->scene, "Scene file (docs/formats.md)")
-      ->check(CLI::ExistingFile);
-  track->add_option("--camera", options->camera, "Camera file; replaces the scene's")
-      ->check(CLI::ExistingFile);
+  track->add_option("--scene", options->scene, "Scene file (docs/formats.md)");
+  track->add_option("--camera", options->camera, "Camera file; replaces the scene's");
   track->add_option("--objects", options->objects, "Number of moving bodies")
       ->check(CLI::Range(1, 64));
   track->add_option("--from", options->from, "First frame to use: seconds (1.5) or frame (f120)");
   track->add_option("--to", options->to, "Last frame to use: seconds or frame");
-  track->add_option("--at", options->at, "A point x,y [px] on the body in the first frame used");
+  add_at(*track, options->at);
   track->add_option("--edges", options->edges, "Also write the accepted edge points (CSV)");
   track->add_option("--smooth", options->smooth,
                     "Also write smoothed positions and velocities (CSV); never fit these");
@@ -151,6 +141,7 @@ void add_track_command(CLI::App& app) {
       "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
   track->add_option("-o,--output", options->output, "Track CSV to write")->required();
   add_json_flag(*track, options->json);
+  track->footer("Example: trochoid track ring.mp4 --scene ring.toml -o ring.track.csv");
   track->callback([options] { run(*options); });
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <Eigen/Core>
 #include <string>
 
 #include "trochoid/tracking/effort.hpp"
@@ -9,5 +10,11 @@ namespace trochoid::tools {
 /// --effort quick|normal|exact.
 void add_effort(CLI::App& command, tracking::Effort& effort, const std::string& words);
 [[nodiscard]] std::string effort_name(tracking::Effort effort);
+[[nodiscard]] bool is_effort(const std::string& name);
+
+/// --at x,y: a point on the body, for recordings in which it is not found by itself.
+void add_at(CLI::App& command, std::string& at);
+/// @throws InputError unless the text is x,y [px].
+[[nodiscard]] Eigen::Vector2d parse_point(const std::string& text);
 
 }  // namespace trochoid::tools

@@ -1,6 +1,11 @@
-#include "track_effort.hpp"
+#include "track_options.hpp"
 
+#include <fmt/core.h>
+
+#include <cstdio>
 #include <map>
+
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -18,10 +23,26 @@ void add_effort(CLI::App& command, tracking::Effort& effort, const std::string& 
       ->check(CLI::IsMember(kEfforts));
 }
 
+bool is_effort(const std::string& name) {
+  return kEfforts.contains(name);
+}
+
 std::string effort_name(tracking::Effort effort) {
   for (const auto& [name, value] : kEfforts)
     if (value == effort) return name;
   return {};
+}
+
+void add_at(CLI::App& command, std::string& at) {
+  command.add_option("--at", at, "A point x,y [px] on the body in the first frame used");
+}
+
+Eigen::Vector2d parse_point(const std::string& text) {
+  double x = 0.0, y = 0.0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
+    throw InputError(fmt::format("--at {}: give a point in pixels as x,y", text));
+  return {x, y};
 }
 
 }  // namespace trochoid::tools
