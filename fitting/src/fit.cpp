@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 
 #include "adequacy.hpp"
+#include "body_doubt.hpp"
 #include "bootstrap.hpp"
 #include "describe.hpp"
 #include "find.hpp"
@@ -89,10 +91,20 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
   }
   if (options.profile)
     fit.profiles = profiles(problem, solution, error.covariance.diagonal().cwiseSqrt(),
-                            error.whiteness.inflation, options.threads);
+                            error.plain_variance, options.threads);
   if (options.bootstrap > 0)
     fit.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
                               options.bootstrap, options.seed, options.threads);
+  constexpr double kNarrower = 0.5;
+  const auto narrow = [&](const data::BootstrapSpread& spread) {
+    const data::FitParameter* parameter = fit.find(spread.parameter);
+    return parameter != nullptr && spread.sigma < kNarrower * parameter->sigma;
+  };
+  const auto& spreads = fit.bootstrap.parameters;
+  if (std::any_of(spreads.begin(), spreads.end(), narrow))
+    fit.warnings.push_back(
+        "the bootstrap is narrower than the error bars: it shuffles what varies within the record "
+        "and does not see what is common to all of it; the error bars count");
 }
 
 // Median time between samples.
@@ -102,6 +114,29 @@ double frame_time_s(std::span<const data::Track> tracks) {
     for (std::size_t i = 1; i < track.samples.size(); ++i)
       steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
   return median(std::move(steps_s));
+}
+
+// What the model takes for given is known as well as its priors say, and no better.
+void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
+                 double frame_s, Uncertainty& error, data::Fit& fit) {
+  for (const Doubt& doubt : body_doubts(problem, solution.u, scene, frame_s)) {
+    error.covariance += doubt.shift * doubt.shift.transpose();
+    const data::Prior& prior = scene.fit.prior.at(doubt.name);
+    fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
+                                       prior.value, prior.sigma));
+  }
+  for (const std::string& name : idle_priors(problem, scene))
+    fit.warnings.push_back(fmt::format(
+        "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
+}
+
+// A coefficient that is to be found needs no first value.
+void give_friction_a_start(data::Scene& scene) {
+  constexpr double kTypical = 0.2;
+  const std::string& name = scene.model.name;
+  const bool needed = name == "sliding" || name == "puck" ||
+                      (name == "auto" && scene.support.kind == data::SupportKind::flat);
+  if (needed && !scene.model.friction) scene.model.friction = kTypical;
 }
 
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
@@ -132,6 +167,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     // A finer tolerance can run into the step limit where a coarse one did not.
     return refuse(problem, failure.what(), fit);
   }
+  heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
   describe(problem, solution, error, scene, fit);
   judge(problem, solution, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
@@ -157,6 +193,8 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scen
               const FitOptions& options) {
   data::Scene scene = given_scene;
   if (!options.model.empty()) scene.model.name = options.model;
+  give_friction_a_start(scene);
+  take_priors_for_given(scene);
   const auto predictor = model::make_predictor(scene);
   const auto relatives = relatives_of(scene);
   std::vector<Relative> plain;

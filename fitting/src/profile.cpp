@@ -141,11 +141,17 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
 }  // namespace
 
 std::vector<data::Profile> profiles(const Problem& problem, const Solution& solution,
-                                    const Eigen::VectorXd& sigma, double inflation, int threads) {
+                                    const Eigen::VectorXd& sigma,
+                                    const Eigen::VectorXd& plain_variance, int threads) {
   std::vector<int> chosen;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
     if (tells_of_the_body(problem, i)) chosen.push_back(i);
   constexpr double kFourDecades = 9.210340371976184;
+  // Chi-square takes residuals for independent: it rises so many times too fast.
+  const auto inflation = [&](int index) {
+    const double ratio = sigma[index] * sigma[index] / plain_variance[index];
+    return std::isfinite(ratio) ? std::max(1.0, ratio) : 1.0;
+  };
   std::vector<Side> sides(2 * chosen.size());
   in_parallel(static_cast<int>(sides.size()), threads, [&](int i) {
     const int index = chosen[static_cast<std::size_t>(i / 2)];
@@ -157,14 +163,14 @@ std::vector<data::Profile> profiles(const Problem& problem, const Solution& solu
     const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(solution.u[index]), 1e-3);
     if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
     const double farthest = logarithmic ? kFourDecades : 100.0 * sd;
-    const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd * std::sqrt(inflation);
+    const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd;
     sides[static_cast<std::size_t>(i)] =
-        walk(problem, solution, index, step, farthest, kQuantile95 * inflation);
+        walk(problem, solution, index, step, farthest, kQuantile95 * inflation(index));
   });
   std::vector<data::Profile> result;
   for (std::size_t c = 0; c < chosen.size(); ++c)
-    result.push_back(
-        assemble(problem, solution, chosen[c], sides[2 * c], sides[2 * c + 1], inflation));
+    result.push_back(assemble(problem, solution, chosen[c], sides[2 * c], sides[2 * c + 1],
+                              inflation(chosen[c])));
   return result;
 }
 

@@ -445,6 +445,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
+  result.plain_variance = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   return result;

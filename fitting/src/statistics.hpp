@@ -25,7 +25,8 @@ struct Whiteness {
 
 /// What the data say about the free parameters at a solution.
 struct Uncertainty {
-  Eigen::MatrixXd covariance;  ///< of the values (not of u), order of Problem::free
+  Eigen::MatrixXd covariance;      ///< of the values (not of u), order of Problem::free
+  Eigen::VectorXd plain_variance;  ///< were all residuals independent: what chi-square says
   std::vector<bool> identifiable;
   int rank = 0;  ///< directions known to better than 100 % (1 rad for angles)
   double condition = 0.0;

@@ -99,9 +99,40 @@ TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
   EXPECT_LT(fit.find("air_linear_N_m_s[1]")->sigma, 0.02 * 2.5e-6);
 }
 
+// How far a value follows what the model takes for given, a fit with another given tells.
+TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
+  constexpr double kDoubt = 0.005;
+  const Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  const double mass_kg = *c.scene.body->mass_kg;
+  data::Scene doubtful = c.scene, heavier = c.scene;
+  doubtful.fit.prior["mass_kg"] = {mass_kg, kDoubt * mass_kg};
+  heavier.body->mass_kg = (1.0 + kDoubt) * mass_kg;
+  const auto fitted = [&](const data::Scene& scene) {
+    return fitting::fit(std::span(&c.track, 1), scene);
+  };
+  const data::Fit plain = fitted(c.scene), with = fitted(doubtful), moved = fitted(heavier);
+  EXPECT_GT(with.find("air_linear_N_m_s[3]")->sigma, 1.3 * plain.find("air_linear_N_m_s[3]")->sigma)
+      << "else the test tests nothing";
+  for (const char* name : {"air_linear_N_m_s[1]", "air_linear_N_m_s[3]"}) {
+    const double before = plain.find(name)->sigma, sigma = with.find(name)->sigma;
+    // The step is not small for the straight line it is compared with.
+    const double follows = moved.find(name)->value - plain.find(name)->value;
+    EXPECT_NEAR(sigma, std::hypot(before, follows), 0.1 * sigma) << name;
+  }
+  EXPECT_THAT(with.warnings, testing::Contains(testing::HasSubstr("error bars allow for mass_kg")));
+}
+
+TEST_F(RimFit, APriorThatMeansNothingIsSaidToMeanNothing) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  c.scene.fit.prior["mass_gk"] = {0.05, 0.001};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("has no 'mass_gk'")));
+}
+
 TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
   Case c = noisy("s08_slide_disc", 0.6, 1e-4);
-  c.scene.model.friction = 0.18;  // 0.3 in truth
+  c.scene.model.name = "sliding";
+  c.scene.model.friction.reset();  // 0.3 in truth; no first value is needed
   c.scene.fit.fixed = {{"air_linear_N_m_s[1]", 1e-6},
                        {"air_linear_N_m_s[3]", 2e-7},
                        {"rolling_friction_m", 5e-5},

@@ -138,7 +138,7 @@ void add_fit_command(CLI::App& app) {
   fit->add_flag("--profile", command->options.profile,
                 "Profile likelihood of the body's and the table's parameters");
   fit->add_option("--bootstrap", command->options.bootstrap,
-                  "Fits to resampled residuals, for error bars without assumptions; 0: none")
+                  "Fits to residuals resampled in blocks, for the shape of the error bars; 0: none")
       ->check(CLI::Range(0, 100000));
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
       ->check(non_negative_number());

@@ -1,0 +1,164 @@
+#include "body_doubt.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "observed.hpp"
+#include "strategy.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+/// A quantity of the scene that is not a parameter of any fit.
+struct Given {
+  const char* name;
+  std::function<void(data::Scene&, double value)> set;
+};
+
+const std::array<Given, 7>& givens() {
+  static const std::array<Given, 7> all{
+      {{"mass_kg", [](data::Scene& s, double v) { s.body->mass_kg = v; }},
+       {"radius_m", [](data::Scene& s, double v) { s.body->radius_m = v; }},
+       {"inner_radius_m", [](data::Scene& s, double v) { s.body->inner_radius_m = v; }},
+       {"thickness_m", [](data::Scene& s, double v) { s.body->thickness_m = v; }},
+       {"I_kg_m2", [](data::Scene& s, double v) { s.body->I_kg_m2 = v; }},
+       {"Is_kg_m2", [](data::Scene& s, double v) { s.body->Is_kg_m2 = v; }},
+       {"gravity_m_s2", [](data::Scene& s, double v) { s.model.gravity_m_s2 = v; }}}};
+  return all;
+}
+
+bool gave_the_scale(const data::Scene& scene, const std::string& name) {
+  return name == "radius_m" && scene.camera.file.empty() && !scene.camera.scale_px_per_m;
+}
+
+// Residuals of all arcs and, if asked for, their derivatives by u, priors as further rows.
+bool residuals_of(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
+                  Eigen::MatrixXd* jacobian) {
+  const auto count = static_cast<Eigen::Index>(problem.free.size());
+  residuals.setZero(problem.rows() + count);
+  if (jacobian != nullptr) jacobian->setZero(residuals.size(), count);
+  Eigen::Index first = 0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    if (!evaluate(problem, arc, u, r, jacobian != nullptr ? &j : nullptr)) return false;
+    residuals.segment(first, r.size()) = r;
+    const std::vector<int> columns = problem.columns_of(arc);
+    for (std::size_t c = 0; jacobian != nullptr && c < columns.size(); ++c)
+      jacobian->col(columns[c]).segment(first, r.size()) = j.col(static_cast<Eigen::Index>(c));
+    first += r.size();
+  }
+  for (Eigen::Index i = 0; jacobian != nullptr && i < count; ++i) {
+    const FreeParameter& parameter = problem.free[static_cast<std::size_t>(i)];
+    if (parameter.prior)
+      (*jacobian)(first + i, i) = parameter.transform.slope(u[i]) / parameter.prior->sigma;
+  }
+  return true;
+}
+
+}  // namespace
+
+void take_priors_for_given(data::Scene& scene) {
+  for (const Given& given : givens())
+    if (const auto prior = scene.fit.prior.find(given.name);
+        prior != scene.fit.prior.end() && scene.body && !gave_the_scale(scene, given.name))
+      given.set(scene, prior->second.value);
+}
+
+namespace {
+
+// Residuals with a given quantity off by some standard deviations of its prior; empty if the model
+// has no prediction there.
+class Moved {
+ public:
+  Moved(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
+        const Given& given, const data::Prior& prior, double frame_time_s)
+      : problem_(problem),
+        u_(u),
+        scene_(scene),
+        given_(given),
+        prior_(prior),
+        frame_time_s_(frame_time_s) {}
+
+  [[nodiscard]] Eigen::VectorXd by(double deviations) const {
+    data::Scene scene = scene_;
+    scene.model.name = problem_.predictor->model_name();
+    given_.set(scene, prior_.value + deviations * prior_.sigma);
+    const auto plain = model::make_predictor(scene);
+    const auto wrapped = observed(*plain, scene, frame_time_s_);
+    const Problem other = for_predictor(problem_, wrapped ? *wrapped : *plain);
+    Eigen::VectorXd residuals;
+    if (other.free.size() != problem_.free.size() || !residuals_of(other, u_, residuals, nullptr))
+      return {};
+    return residuals;
+  }
+
+  // Derivative of the residuals by the deviation. A track may see the thousandth part of a prior's:
+  // the step moves the residuals by about their noise, where they are straight and well above the
+  // integration error.
+  [[nodiscard]] Eigen::VectorXd derivative(const Eigen::VectorXd& here) const {
+    constexpr double kFirst = 1e-2, kLeast = 1e-6;
+    const Eigen::VectorXd there = by(kFirst);
+    if (there.size() == 0) return {};
+    const double moved = (there - here).norm(), noise = std::sqrt(static_cast<double>(here.size()));
+    const double step = std::clamp(kFirst * noise / std::max(moved, 1e-300), kLeast, 1.0);
+    const Eigen::VectorXd up = by(step), down = by(-step);
+    if (up.size() == 0 || down.size() == 0) return {};
+    return (up - down) / (2.0 * step);
+  }
+
+ private:
+  const Problem& problem_;
+  const Eigen::VectorXd& u_;
+  const data::Scene& scene_;
+  const Given& given_;
+  const data::Prior& prior_;
+  double frame_time_s_;
+};
+
+}  // namespace
+
+std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
+                               const data::Scene& scene, double frame_time_s) {
+  std::vector<Doubt> doubts;
+  Eigen::VectorXd here;
+  Eigen::MatrixXd jacobian;
+  for (const Given& given : givens()) {
+    const auto prior = scene.fit.prior.find(given.name);
+    if (prior == scene.fit.prior.end() || !scene.body || gave_the_scale(scene, given.name) ||
+        problem.predictor->index_of(given.name) >= 0)
+      continue;
+    if (here.size() == 0 && !residuals_of(problem, u, here, &jacobian)) return {};
+    const Eigen::VectorXd by_given =
+        Moved(problem, u, scene, given, prior->second, frame_time_s).derivative(here);
+    if (by_given.size() == 0) continue;
+    const Eigen::VectorXd size = jacobian.colwise().norm().cwiseMax(1e-300);
+    const Eigen::MatrixXd scaled = jacobian * size.cwiseInverse().asDiagonal();
+    Eigen::VectorXd shift =
+        -scaled.completeOrthogonalDecomposition().solve(by_given).cwiseQuotient(size);
+    for (Eigen::Index i = 0; i < shift.size(); ++i)
+      shift[i] *= problem.free[static_cast<std::size_t>(i)].transform.slope(u[i]);
+    doubts.push_back({given.name, std::move(shift)});
+  }
+  return doubts;
+}
+
+std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {
+  std::vector<std::string> idle;
+  const auto& infos = problem.predictor->parameters();
+  for (const auto& [name, prior] : scene.fit.prior) {
+    const bool of_body = std::any_of(givens().begin(), givens().end(),
+                                     [&](const Given& given) { return name == given.name; });
+    const bool of_model = std::any_of(infos.begin(), infos.end(),
+                                      [&](const auto& info) { return name == info.name; });
+    if (!of_body && !of_model && name != "frame_rate_hz") idle.push_back(name);
+  }
+  return idle;
+}
+
+}  // namespace trochoid::fitting
