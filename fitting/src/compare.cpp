@@ -295,6 +295,18 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   return best;
 }
 
+// The last resort together with the usual losses: a body that slides without any may not even stay
+// on the floor as long as the track. Empty where there is no last resort.
+std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
+  bool resort = false;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
+    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    resort = resort || term.last_resort;
+    if (term.last_resort || term.usual) terms.insert(index);
+  }
+  return resort ? terms : std::set<int>{};
+}
+
 // The plainest model and, one more term at a time, all extensions of the best so far.
 std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
                         const FitOptions& given) {
@@ -305,7 +317,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   options.model.clear();
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
-  rungs.reserve(1 + (kMostTerms + 1) * ladder.terms.size());
+  rungs.reserve(2 + (kMostTerms + 1) * ladder.terms.size());
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options, rungs[0]);
   score(rungs);
@@ -318,8 +330,17 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
     if (!worth) break;
     current = best;
   }
-  const bool unexplained = !rungs[current].fitted || rungs[current].fit.whiteness_p < kWhite;
-  if (unexplained) (void)step_up(ladder, tracks, options, true, current, rungs);
+  const auto explains = [&](std::size_t i) {
+    return rungs[i].fitted && rungs[i].fit.whiteness_p >= kWhite;
+  };
+  if (explains(current)) return rungs;
+  const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
+  if (last != current && explains(last)) return rungs;
+  if (const auto all = all_that_usually_acts(ladder, rungs[current].terms); !all.empty()) {
+    rungs.push_back(rung_with(ladder, all));
+    fit_rung(tracks, nullptr, nullptr, options, rungs.back());
+    score(rungs);
+  }
   return rungs;
 }
 

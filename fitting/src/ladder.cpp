@@ -1,6 +1,7 @@
 #include "ladder.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "trochoid/model/inertia.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -46,6 +47,7 @@ void add_floor_terms(const Scene& scene, Ladder& ladder) {
   if (inertia.mass_known) {
     ladder.terms.push_back(
         air_couple("air couple", &ModelSettings::air_linear_N_m_s, scene, kTypical * unit_N_m_s));
+    ladder.terms.back().usual = true;
     ladder.terms.push_back(air_couple("quadratic air couple", &ModelSettings::air_quadratic_N_m_s2,
                                       scene, kTypical * unit_N_m_s / rate_rad_s));
     constexpr double kAir_Pa_s = 1.8e-5;
@@ -57,8 +59,12 @@ void add_floor_terms(const Scene& scene, Ladder& ladder) {
   const auto friction = [&](const char* name, std::optional<double> ModelSettings::*field) {
     ladder.terms.push_back(single(name, field, scene, kTypical * R));
   };
-  friction("rolling friction", &ModelSettings::rolling_friction_m);
-  friction("pivoting friction", &ModelSettings::pivoting_friction_m);
+  for (const auto& [name, field] :
+       {std::pair{"rolling friction", &ModelSettings::rolling_friction_m},
+        {"pivoting friction", &ModelSettings::pivoting_friction_m}}) {
+    friction(name, field);
+    ladder.terms.back().usual = true;
+  }
   friction("contour friction", &ModelSettings::contour_friction_m);
   Term sliding = single("sliding", &ModelSettings::friction, scene, 0.3);
   sliding.switch_on = [set = sliding.switch_on](Scene& s) {

@@ -14,6 +14,7 @@ struct Term {
   std::function<void(data::Scene&)> switch_on;
   std::map<std::string, double> start;  ///< starting values of its parameters
   bool last_resort = false;  ///< costly: tried only where nothing else explains the track
+  bool usual = false;  ///< acts on nearly every body: tried with the last resort where that fails
 };
 
 /// A scene's possible models: the plainest one and the terms it may take on.

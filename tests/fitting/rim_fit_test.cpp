@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "trochoid/data/reference_case.hpp"
+#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -152,6 +153,27 @@ TEST_F(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(pull(fit, "air_linear_N_m_s[1]", 2.5e-6), kFar);
   EXPECT_LT(pull(fit, "air_linear_N_m_s[3]", 1.5e-5), kFar);
+}
+
+// No plain model predicts such a track to its end, and none with a single loss.
+TEST_F(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
+  constexpr double kAngle_rad = 0.005;
+  Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
+  const auto columns = columns_of(reference_folder() + "s08_slide_disc.csv");
+  std::mt19937_64 generator(8);
+  std::normal_distribution<double> normal(0.0, kAngle_rad);
+  for (std::size_t i = 0; i < c.track.samples.size(); ++i) {
+    c.track.samples[i].theta = {columns.at("theta")[2 * i] + normal(generator), kAngle_rad};
+    c.track.samples[i].phi = {columns.at("phi")[2 * i] + normal(generator), kAngle_rad};
+  }
+  data::ModelSettings nothing;
+  nothing.slip_regularisation_m_s = c.scene.model.slip_regularisation_m_s;
+  nothing.couple_regularisation_rad_s = c.scene.model.couple_regularisation_rad_s;
+  c.scene.model = nothing;
+  const Comparison found = compare(std::span(&c.track, 1), c.scene, {});
+  ASSERT_TRUE(found.fit.converged) << found.fit.reason;
+  ASSERT_TRUE(found.scene.model.friction) << found.fit.recommendation;
+  EXPECT_LT(pull(found.fit, "friction", 0.3), kFar);
 }
 
 // With friction that sets in and stops, neighbouring valleys leave several times the noise.
