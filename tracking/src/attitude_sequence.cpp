@@ -342,6 +342,12 @@ struct Neighbours {
   }
 };
 
+/// What speaks for a fit. A wrong pose may have the longer outline and so the more evidence: how
+/// much of it is plainly seen counts as well.
+double worth(const Sighting& seen) {
+  return seen.pose->evidence * seen.accepted;
+}
+
 /// Frames in which clearly less speaks for the fit than in those around: it may have settled
 /// beside the body.
 std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
@@ -359,13 +365,12 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
     around.clear(), off.clear();
     for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
          ++k)
-      if (const Glimpse& g = glimpses[k]; g.seen && g.seen->pose)
-        around.push_back(g.seen->pose->evidence);
+      if (const Glimpse& g = glimpses[k]; g.seen && g.seen->pose) around.push_back(worth(*g.seen));
     if (around.size() < kFewest) continue;
     const double usual = median(around);
-    for (const double evidence : around) off.push_back(std::abs(evidence - usual));
-    poor[i] = glimpses[i].seen->pose->evidence <
-              usual - std::max(kOfUsual * usual, kDeviations * median(off));
+    for (const double value : around) off.push_back(std::abs(value - usual));
+    poor[i] =
+        worth(*glimpses[i].seen) < usual - std::max(kOfUsual * usual, kDeviations * median(off));
   }
   return poor;
 }
@@ -480,10 +485,8 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
                            static_cast<double>(around->b.frame->index - around->a.frame->index);
     auto seen = measure(*was[i].frame, guess, around->at(was[i].frame->t_s - frame_s, alike));
     if (!seen || !seen->pose || off(*seen) > kNear + 0.5 * step) return;
-    const double least = !before        ? kUsualShare * usual
-                         : contradicted ? kAsGood * before->pose->evidence
-                                        : kBetter * before->pose->evidence;
-    if (seen->pose->evidence < least) return;
+    if (!before && seen->pose->evidence < kUsualShare * usual) return;
+    if (before && worth(*seen) < (contradicted ? kAsGood : kBetter) * worth(*before)) return;
     if (before) seen->turned_rad = before->turned_rad;
     glimpses[i].seen = std::move(seen);
   });
