@@ -53,6 +53,31 @@ Complex amplitude(const Slow& slow, const Eigen::VectorXd& series, double nu_rad
   return 2.0 * sum / static_cast<double>(series.size());
 }
 
+double power_at(const Slow& slow, double nu_rad_s) {
+  return std::norm(amplitude(slow, slow.radial_m, nu_rad_s)) +
+         std::norm(amplitude(slow, slow.across_m, nu_rad_s));
+}
+
+// The highest of the powers at evenly spaced frequencies: cosines and sines go on by rotation from
+// one frequency to the next.
+double highest_of_scan(const Slow& slow, double from, double to, double step) {
+  Eigen::ArrayXd cosine = (from * slow.t_s).array().cos(), sine = (from * slow.t_s).array().sin();
+  const Eigen::ArrayXd turn_cos = (step * slow.t_s).array().cos(),
+                       turn_sin = (step * slow.t_s).array().sin();
+  double best = 0.0, highest = 0.0;
+  Eigen::ArrayXd next(cosine.size());
+  for (double nu = from; nu < to; nu += step) {
+    double power = 0.0;
+    for (const Eigen::VectorXd* series : {&slow.radial_m, &slow.across_m})
+      power += std::pow(series->dot(cosine.matrix()), 2) + std::pow(series->dot(sine.matrix()), 2);
+    if (power > highest) highest = power, best = nu;
+    next = cosine * turn_cos - sine * turn_sin;
+    sine = sine * turn_cos + cosine * turn_sin;
+    cosine = next;
+  }
+  return best;
+}
+
 // The strongest line above the precession; 0 if there is none above the noise.
 double strongest_line(const Slow& slow) {
   const auto n = static_cast<double>(slow.t_s.size());
@@ -60,12 +85,12 @@ double strongest_line(const Slow& slow) {
   const double least =
       std::max(3.0 * std::abs(slow.rate_rad_s), 8.0 * std::numbers::pi / duration_s);
   const double most = std::numbers::pi * (n - 1.0) / duration_s;
+  const double quarter = 0.25 * 2.0 * std::numbers::pi / duration_s;  // of a line's width
+  const double coarse = highest_of_scan(slow, least, most, 2.0 * quarter);
   double best = 0.0, highest = 0.0;
-  for (double nu = least; nu < most; nu += 0.25 * 2.0 * std::numbers::pi / duration_s) {
-    const double power = std::norm(amplitude(slow, slow.radial_m, nu)) +
-                         std::norm(amplitude(slow, slow.across_m, nu));
-    if (power > highest) highest = power, best = nu;
-  }
+  for (const double nu : {coarse - quarter, coarse, coarse + quarter})
+    if (const double power = power_at(slow, nu); nu > 0.0 && power > highest)
+      highest = power, best = nu;
   // White noise of variance v gives each line a power of 4 v / n on average; the highest of n lines
   // stays below log(n) + 3 times that nineteen times in twenty.
   const double variance =
