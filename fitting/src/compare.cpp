@@ -330,8 +330,10 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
     if (!worth) break;
     current = best;
   }
+  // Residuals that hang together but stay within the track's own noise are the tracker's.
   const auto explains = [&](std::size_t i) {
-    return rungs[i].fitted && rungs[i].fit.whiteness_p >= kWhite;
+    return rungs[i].fitted &&
+           (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= 1.0);
   };
   if (explains(current)) return rungs;
   const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
