@@ -92,9 +92,8 @@ TEST(SceneFile, SurvivesBeingWrittenAndReadAgain) {
   EXPECT_EQ(again.body, parse_scene(kFullScene, "ring.toml").body);
 }
 
-// Every listed key holds a value other than the default once, so that none can be lost unnoticed.
-TEST(SceneFile, WritesEveryKeyThatDiffersFromItsDefault) {
-  const std::string all = R"([body]
+// Every key holds a value other than the default once, so that none can be lost unnoticed.
+constexpr const char* kEveryKey = R"([body]
 kind = "top"
 radius_m = 0.5
 inner_radius_m = 0.25
@@ -178,6 +177,9 @@ bounds = { "I_kg_m2" = [0.5, inf] }
 free_pivot = true
 free_scale = true
 )";
+
+TEST(SceneFile, WritesEveryKeyThatDiffersFromItsDefault) {
+  const std::string all = kEveryKey;
   EXPECT_EQ(to_toml(parse_scene(all, "all.toml")), all);
 }
 

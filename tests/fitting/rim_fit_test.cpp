@@ -78,6 +78,14 @@ double pull(const data::Fit& fit, const std::string& name, double truth) {
   return std::abs(parameter->value - truth) / parameter->sigma;
 }
 
+// Planted in s08 and s10 alike.
+std::map<std::string, double> losses_of_the_sliding_disc() {
+  return {{"air_linear_N_m_s[1]", 1e-6},
+          {"air_linear_N_m_s[3]", 2e-7},
+          {"rolling_friction_m", 5e-5},
+          {"pivoting_friction_m", 3e-4}};
+}
+
 // 4 sigma of a few numbers: once in some thousand seeds.
 constexpr double kFar = 4.0;
 
@@ -134,10 +142,7 @@ TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
   Case c = noisy("s08_slide_disc", 0.6, 1e-4);
   c.scene.model.name = "sliding";
   c.scene.model.friction.reset();  // 0.3 in truth; no first value is needed
-  c.scene.fit.fixed = {{"air_linear_N_m_s[1]", 1e-6},
-                       {"air_linear_N_m_s[3]", 2e-7},
-                       {"rolling_friction_m", 5e-5},
-                       {"pivoting_friction_m", 3e-4}};
+  c.scene.fit.fixed = losses_of_the_sliding_disc();
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(pull(fit, "friction", 0.3), kFar);
@@ -195,10 +200,7 @@ TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
 TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
   Case c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
   c.scene.model.friction = 0.2;  // 0.3 in truth
-  c.scene.fit.fixed = {{"air_linear_N_m_s[1]", 1e-6},
-                       {"air_linear_N_m_s[3]", 2e-7},
-                       {"rolling_friction_m", 5e-5},
-                       {"pivoting_friction_m", 3e-4}};
+  c.scene.fit.fixed = losses_of_the_sliding_disc();
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(fit.chi2 / fit.dof, 1.4);

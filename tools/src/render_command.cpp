@@ -241,8 +241,9 @@ Targets targets_of(const fs::path& output, bool lossless) {
   const std::string ending = lossless ? ".mkv" : ".mp4";
   const std::string given = output.extension().string();
   if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
-    throw InputError(fmt::format("{}: name a folder, a {}.mkv", output.string(),
-                                 lossless ? "or (it is to be lossless) a " : "a .mp4 or a "));
+    throw InputError(fmt::format("{}: name {}", output.string(),
+                                 lossless ? "a folder or, as it is to be lossless, a .mkv file"
+                                          : "a folder, an .mp4 or an .mkv file"));
   if (output.extension().empty()) {
     fs::create_directories(output);
     return {output / ("video" + ending), output / "truth.csv", output / "camera.json",
