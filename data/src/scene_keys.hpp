@@ -105,8 +105,11 @@ void model_keys(Visit&& visit) {
   visit("drag_transverse_N_m_s", &M::drag_transverse_N_m_s, kNonNegative);
   visit("drag_spin_N_m_s", &M::drag_spin_N_m_s, kNonNegative);
   visit("spin_down_dry_rad_s2", &M::spin_down_dry_rad_s2, kNonNegative);
+  visit("spin_down_weakening_s_rad", &M::spin_down_weakening_s_rad, kNonNegative);
   visit("spin_down_viscous_1_s", &M::spin_down_viscous_1_s, kNonNegative);
   visit("spin_down_quadratic_1_rad", &M::spin_down_quadratic_1_rad, kNonNegative);
+  visit("spin_down_imbalance_sin_rad_s2", &M::spin_down_imbalance_sin_rad_s2, kAny);
+  visit("spin_down_imbalance_cos_rad_s2", &M::spin_down_imbalance_cos_rad_s2, kAny);
 }
 
 template <class Visit>

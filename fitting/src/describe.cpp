@@ -72,6 +72,12 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
       fit.warnings.push_back("the track has no covariances: sigma is estimated from the residuals");
       break;
     }
+  for (const ArcData& arc : problem.arcs)
+    if (arc.held)
+      fit.warnings.push_back(fmt::format(
+          "track {} begins at rest: fitted from {:.4g} s, where the body is let go; --from sets "
+          "another start",
+          arc.track + 1, arc.t_s.front()));
   if (error.whiteness.inflation > 1.0)
     fit.warnings.push_back(
         fmt::format("residuals hang together over {:.3g} s: error bars widened by {:.2f}",

@@ -79,7 +79,21 @@ void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
   ladder.terms = {
       single("dry couple", &ModelSettings::spin_down_dry_rad_s2, scene, 0.1),
       single("viscous couple", &ModelSettings::spin_down_viscous_1_s, scene, 0.1),
-      single("quadratic couple", &ModelSettings::spin_down_quadratic_1_rad, scene, 0.01)};
+      single("quadratic couple", &ModelSettings::spin_down_quadratic_1_rad, scene, 0.01),
+      {"imbalance",
+       [](Scene& s) {
+         s.model.spin_down_imbalance_sin_rad_s2 = 0.0;
+         s.model.spin_down_imbalance_cos_rad_s2 = 0.0;
+       },
+       {}}};
+  Term weakening =
+      single("weakening with speed", &ModelSettings::spin_down_weakening_s_rad, scene, 0.1);
+  weakening.switch_on = [set = weakening.switch_on,
+                         dry = ladder.terms.front().switch_on](Scene& s) {
+    if (!s.model.spin_down_dry_rad_s2) dry(s);
+    set(s);
+  };
+  ladder.terms.push_back(std::move(weakening));
 }
 
 }  // namespace

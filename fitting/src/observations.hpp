@@ -34,6 +34,7 @@ struct ArcData {
   int rows = 0;
   bool folded = false;  ///< faces look alike: theta measured as min(theta, pi - theta)
   bool filmed = false;  ///< has pixel positions: measured in images, with their common errors
+  bool held = false;    ///< samples before these were left out: the body was held or pushed
   bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
 
   [[nodiscard]] int observable_index(model::Observable observable) const;  ///< -1 if absent

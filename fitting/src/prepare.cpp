@@ -19,13 +19,15 @@ ChannelChoice channels_of(const std::string& model) {
   return {.position = true, .theta = true, .phi = true, .psi = true};
 }
 
-// A puck's track falls apart at impacts and rest; other bodies are followed throughout.
+// A puck's track falls apart at impacts and rest; a disc on a pivot has to be let go first; other
+// bodies are followed throughout.
 std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& model,
                                    const FitOptions& options) {
   const SampleRange chosen = chosen_range(track, options.from, options.to);
   const SampleRange kept{chosen.first,
                          kept_samples(chosen.first, chosen.second, options.hold_back)};
   if (model == "puck") return sliding_ranges(track, kept);
+  if (model == "pivot") return {{released_at(track, kept), kept.second}};
   return {kept};
 }
 
@@ -39,6 +41,8 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
     for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
       ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
       arc.track = static_cast<int>(i);
+      arc.held =
+          model == "pivot" && first > chosen_range(tracks[i], options.from, options.to).first;
       if (arc.readings.empty())
         throw InputError(fmt::format(
             "track {}: no sample has positions in metres; track with a scale or a camera file",

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "smoothing.hpp"
 
@@ -170,6 +171,36 @@ std::vector<SampleRange> sliding_ranges(const data::Track& track, SampleRange ra
     ranges.emplace_back(path.sample[first], path.sample[last - 1] + 1);
   }
   return ranges;
+}
+
+int released_at(const data::Track& track, SampleRange range) {
+  constexpr int kHalfWidth = 4;                 // samples a speed is taken from
+  constexpr std::size_t kHeld = 5;              // at rest for longer than a pendulum at its turn
+  constexpr double kStill = 0.05, kFast = 0.5;  // of the greatest speed
+  std::vector<double> t_s, psi;
+  std::vector<int> sample;
+  for (int i = range.first; i < range.second; ++i) {
+    const data::TrackSample& one = track.samples[i];
+    if (!one.psi) continue;
+    const double before = psi.empty() ? one.psi->value_rad : psi.back();
+    psi.push_back(before + std::remainder(one.psi->value_rad - before, 2.0 * std::numbers::pi));
+    t_s.push_back(one.t_s);
+    sample.push_back(i);
+  }
+  if (psi.size() < 4 * kHeld) return range.first;
+  const Eigen::Map<const Eigen::VectorXd> angle(psi.data(), static_cast<Eigen::Index>(psi.size()));
+  const Eigen::VectorXd speed = smooth(t_s, angle, kHalfWidth).first.col(0).cwiseAbs();
+  const double greatest = speed.maxCoeff();
+  std::size_t i = 0;
+  while (i < sample.size() && speed[i] < kStill * greatest) ++i;
+  if (i < kHeld) return range.first;
+  while (i < sample.size() && speed[i] < kFast * greatest) ++i;
+  while (i + 1 < sample.size() &&
+         speed[i] <
+             speed.segment(i + 1, std::min<Eigen::Index>(2 * kHalfWidth, speed.size() - i - 1))
+                 .maxCoeff())
+    ++i;
+  return sample[std::min(i + kHalfWidth, sample.size() - 1)];
 }
 
 }  // namespace trochoid::fitting

@@ -15,4 +15,8 @@ namespace trochoid::fitting {
 /// @returns ranges into track.samples, in time order; empty if the body never slides freely.
 [[nodiscard]] std::vector<SampleRange> sliding_ranges(const data::Track& track, SampleRange range);
 
+/// Where a spin angle that begins at rest is let go: samples before were held or driven by a hand,
+/// whose push ends with the first peak of the speed. range.first if it does not begin at rest.
+[[nodiscard]] int released_at(const data::Track& track, SampleRange range);
+
 }  // namespace trochoid::fitting

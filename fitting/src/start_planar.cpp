@@ -1,7 +1,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "smoothing.hpp"
 #include "starts.hpp"
@@ -41,24 +43,40 @@ Eigen::MatrixXd polynomial(const std::vector<double>& t_s, double t0, const Eige
   return c;
 }
 
-// Non-negative least squares for few columns: the best subset with all entries positive.
-Eigen::VectorXd non_negative(const Eigen::MatrixXd& m, const Eigen::VectorXd& right) {
+// Least squares with the first `losses` coefficients not negative: the best subset of those with
+// all entries positive.
+Eigen::VectorXd non_negative(const Eigen::MatrixXd& m, const Eigen::VectorXd& right, int losses) {
   const int columns = static_cast<int>(m.cols());
   Eigen::VectorXd best = Eigen::VectorXd::Zero(columns);
-  double least = right.squaredNorm();
-  for (int subset = 1; subset < (1 << columns); ++subset) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int subset = 0; subset < (1 << losses); ++subset) {
     std::vector<int> used;
     for (int c = 0; c < columns; ++c)
-      if (subset & (1 << c)) used.push_back(c);
+      if (c >= losses || (subset & (1 << c))) used.push_back(c);
     const Eigen::MatrixXd part = m(Eigen::all, used);
     const Eigen::VectorXd x = part.colPivHouseholderQr().solve(right);
     const double squares = (right - part * x).squaredNorm();
-    if (x.minCoeff() < 0.0 || squares >= least) continue;
+    const int positive = static_cast<int>(used.size()) - (columns - losses);
+    if ((positive > 0 && x.head(positive).minCoeff() < 0.0) || squares >= least) continue;
     least = squares;
     best.setZero();
     for (std::size_t c = 0; c < used.size(); ++c) best[used[c]] = x[static_cast<int>(c)];
   }
   return best;
+}
+
+// Twice the integral from the first time, by trapezoids.
+Eigen::VectorXd twice_integrated(const std::vector<double>& t_s, Eigen::VectorXd y) {
+  for (int round = 0; round < 2; ++round) {
+    double sum = 0.0, before = y[0];
+    y[0] = 0.0;
+    for (Eigen::Index i = 1; i < y.size(); ++i) {
+      const auto n = static_cast<std::size_t>(i);
+      sum += 0.5 * (t_s[n] - t_s[n - 1]) * (before + y[i]);
+      before = std::exchange(y[i], sum);
+    }
+  }
+  return y;
 }
 
 }  // namespace
@@ -88,30 +106,48 @@ std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2) {
   return starts;
 }
 
-std::vector<Start> pivot_starts(const ArcData& window) {
+// Integral matching: the angle is linear in the first state and in the couples' double integrals
+// along the measured motion; nothing noisy is differentiated twice.
+std::vector<Start> pivot_starts(const ArcData& window, bool unbalanced) {
   const Series spin = spin_series(window);
   const int n = static_cast<int>(spin.t_s.size());
   if (n < 12) return {};
-  const Eigen::MatrixXd psi =
-      Eigen::Map<const Eigen::VectorXd>(spin.value.data(), static_cast<int>(spin.value.size()));
-  // Rates over long pieces: dw/dt is a second derivative of noisy angles.
-  const SmoothCurve curve = smooth(spin.t_s, psi, std::max(3, n / 8));
-  const Eigen::VectorXd w = curve.first.col(0);
-  Eigen::MatrixXd laws(n, 3);
-  laws.col(0) = w.unaryExpr([](double x) { return x < 0.0 ? -1.0 : 1.0; });
-  laws.col(1) = w;
-  laws.col(2) = w.cwiseProduct(w.cwiseAbs());
-  const Eigen::VectorXd t = non_negative(laws, -curve.second.col(0));
+  const Eigen::VectorXd psi = Eigen::Map<const Eigen::VectorXd>(spin.value.data(), n);
+  // A window turns by a fraction of a radian only, so that it does not level out what swings.
+  constexpr double kFraction_rad = 0.3;
+  std::vector<double> turns;
+  for (int i = 1; i < n; ++i) turns.push_back(std::abs(psi[i] - psi[i - 1]));
+  const double reach = kFraction_rad / std::max(median(std::move(turns)), 1e-9);
+  const int half_width = static_cast<int>(std::clamp(reach, 3.0, std::max(3.0, n / 8.0)));
+  const Eigen::VectorXd w = smooth(spin.t_s, psi, half_width).first.col(0);
+  constexpr int kLosses = 3;
+  Eigen::MatrixXd laws(n, unbalanced ? 7 : 5);
+  const auto couple = [&](const Eigen::VectorXd& size) -> Eigen::VectorXd {
+    return -twice_integrated(spin.t_s, size);
+  };
+  laws.col(0) = couple(w.unaryExpr([](double x) { return x < 0.0 ? -1.0 : 1.0; }));
+  laws.col(1) = couple(w);
+  laws.col(2) = couple(w.cwiseProduct(w.cwiseAbs()));
+  laws.col(3).setOnes();
+  laws.col(4) = Eigen::Map<const Eigen::VectorXd>(spin.t_s.data(), n).array() - window.start_s;
+  if (unbalanced) {
+    laws.col(5) = couple(psi.array().sin());
+    laws.col(6) = couple(psi.array().cos());
+  }
+  const Eigen::VectorXd t = non_negative(laws, psi, kLosses);
   const double typical = std::max(w.cwiseAbs().maxCoeff(), 1e-9);
   const double duration = std::max(spin.t_s.back() - spin.t_s.front(), 1e-9);
   // Laws that came out zero start small, not at the logarithm of nothing.
   const double least = 1e-3 / duration;
-  return {{"windows",
-           {{"psi_rad", curve.value(0, 0)},
-            {"w3_rad_s", w[0]},
+  return {{"integrals",
+           {{"psi_rad", t[3]},
+            {"w3_rad_s", t[4]},
             {"spin_down_dry_rad_s2", std::max(t[0], least * typical)},
+            {"spin_down_weakening_s_rad", 0.1 / typical},
             {"spin_down_viscous_1_s", std::max(t[1], least)},
-            {"spin_down_quadratic_1_rad", std::max(t[2], least / typical)}}}};
+            {"spin_down_quadratic_1_rad", std::max(t[2], least / typical)},
+            {"spin_down_imbalance_sin_rad_s2", unbalanced ? t[5] : 0.0},
+            {"spin_down_imbalance_cos_rad_s2", unbalanced ? t[6] : 0.0}}}};
 }
 
 }  // namespace trochoid::fitting

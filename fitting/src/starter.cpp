@@ -47,7 +47,10 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
     const double gravity_m_s2 = scene.model.gravity_m_s2;
     return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };
   }
-  if (model == "pivot") return pivot_starts;
+  if (model == "pivot") {
+    const bool unbalanced = predictor.index_of("spin_down_imbalance_sin_rad_s2") >= 0;
+    return [=](const ArcData& window) { return pivot_starts(window, unbalanced); };
+  }
   return [](const ArcData&) { return std::vector<Start>{}; };
 }
 

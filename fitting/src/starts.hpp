@@ -50,8 +50,9 @@ struct RimShape {
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
 [[nodiscard]] std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2);
 
-/// Starts for a disc spinning down on a pivot, from its angle: dw/dt = -(t0 sgn w + t1 w + t2 w|w|)
-/// by non-negative least squares.
-[[nodiscard]] std::vector<Start> pivot_starts(const ArcData& window);
+/// Starts for a disc spinning down on a pivot, from its angle and the double integrals of
+/// dw/dt = -(t0 sgn w + t1 w + t2 w|w|) - Gs sin psi - Gc cos psi along it, by least squares with
+/// the losses not negative. Unbalanced: with the last two terms.
+[[nodiscard]] std::vector<Start> pivot_starts(const ArcData& window, bool unbalanced);
 
 }  // namespace trochoid::fitting

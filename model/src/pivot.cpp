@@ -17,28 +17,46 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using Role = ParameterInfo::Role;
 using Dual8 = Dual<8>;
 
-enum Parameter : int { kPsi, kW3, kDry, kViscous, kQuadratic, kParameters };
+enum Parameter : int {
+  kPsi,
+  kW3,
+  kDry,
+  kWeakening,
+  kViscous,
+  kQuadratic,
+  kSine,
+  kCosine,
+  kParameters
+};
+static_assert(kParameters <= Dual8::kLanes);
 
 struct PivotScene {
   double value[kParameters] = {};
-  bool present[kParameters] = {true, true, false, false, false};
+  bool present[kParameters] = {true, true};
   Eigen::Vector3d pivot_m = Eigen::Vector3d::Zero();
 };
 
 PivotScene pivot_scene(const data::Scene& scene) {
   const data::ModelSettings& model = scene.model;
   PivotScene pivot;
-  const std::optional<double> terms[] = {model.spin_down_dry_rad_s2, model.spin_down_viscous_1_s,
-                                         model.spin_down_quadratic_1_rad};
-  const char* const names[] = {"spin_down_dry_rad_s2", "spin_down_viscous_1_s",
-                               "spin_down_quadratic_1_rad"};
-  for (int i = 0; i < 3; ++i) {
-    pivot.present[kDry + i] = terms[i].has_value();
-    pivot.value[kDry + i] = terms[i].value_or(0.0);
-    if (!(pivot.value[kDry + i] >= 0.0) || !std::isfinite(pivot.value[kDry + i]))
-      throw InputError(fmt::format("model.{} = {} must be 0 or greater: a loss takes energy",
-                                   names[i], pivot.value[kDry + i]));
-  }
+  const auto take = [&](Parameter which, const std::optional<double>& term) {
+    pivot.present[which] = term.has_value();
+    pivot.value[which] = term.value_or(0.0);
+  };
+  const auto take_loss = [&](Parameter which, const char* name, const std::optional<double>& term) {
+    take(which, term);
+    if (!(pivot.value[which] >= 0.0) || !std::isfinite(pivot.value[which]))
+      throw InputError(fmt::format("model.{} = {} must be 0 or greater: a loss takes energy", name,
+                                   pivot.value[which]));
+  };
+  take_loss(kDry, "spin_down_dry_rad_s2", model.spin_down_dry_rad_s2);
+  take_loss(kWeakening, "spin_down_weakening_s_rad", model.spin_down_weakening_s_rad);
+  take_loss(kViscous, "spin_down_viscous_1_s", model.spin_down_viscous_1_s);
+  take_loss(kQuadratic, "spin_down_quadratic_1_rad", model.spin_down_quadratic_1_rad);
+  if (pivot.present[kWeakening] && !pivot.present[kDry])
+    throw InputError("model.spin_down_weakening_s_rad weakens spin_down_dry_rad_s2: give that too");
+  take(kSine, model.spin_down_imbalance_sin_rad_s2);
+  take(kCosine, model.spin_down_imbalance_cos_rad_s2);
   const data::StartSettings& start = scene.start;
   pivot.value[kPsi] = start.psi_rad.value_or(0.0);
   pivot.value[kW3] =
@@ -56,58 +74,97 @@ struct PivotPath {
   RunEnd end = RunEnd::reached_end;
 };
 
-template <class S>
-PivotPath<S> run_pivot(const S (&p)[kParameters], std::span<const double> t_s, double tolerance,
-                       int max_steps = 0) {
-  using P = Pivot<S>;
-  const double sense = value_of(p[kW3]) < 0.0 ? -1.0 : 1.0;
+template <bool Unbalanced, class S>
+PivotPath<S> run_pivot_with(const S (&p)[kParameters], std::span<const double> t_s,
+                            double tolerance, int max_steps) {
+  using P = Pivot<S, Unbalanced>;
   PivotPath<S> path;
   const auto add = [&](const S& turned, const S& speed) {
-    path.rows.push_back({p[kPsi] + sense * turned, sense * speed});
+    path.rows.push_back({p[kPsi] + turned, speed});
   };
-  const P pivot{p[kDry], p[kViscous], p[kQuadratic]};
+  P pivot{p[kPsi], p[kDry], p[kWeakening], p[kViscous], p[kQuadratic], p[kSine], p[kCosine]};
+  const double dry = value_of(p[kDry]);
   auto control = uniform_control<2>(tolerance);
   if (max_steps > 0) control.max_steps = max_steps;
-  DormandPrince<P> stepper(pivot, control);
-  State<S, 2> y{S(0.0), p[kW3] * sense};
+  // Without dry friction a balanced disc's speed only tends to zero; rounding must not stop it.
+  const EventRule stops[] = {{-1, Unbalanced || dry > 0.0}};
   const double end_s = t_s.empty() ? 0.0 : t_s.back();
-  if (value_of(y[P::speed]) > 0.0) {
-    stepper.start(0.0, y);
-    // Without dry friction the speed only tends to zero; rounding must not stop it.
-    const EventRule stops[] = {{-1, value_of(p[kDry]) > 0.0}};
+  State<S, 2> y{S(0.0), p[kW3]};
+  double from_s = 0.0;
+  bool turning = value_of(y[P::speed]) != 0.0;  // else: at an instant of rest
+  if (turning) pivot.sense = value_of(y[P::speed]) < 0.0 ? -1.0 : 1.0;
+  while (true) {
+    if (!turning) {
+      const double pull = pivot.values().weight(value_of(y[P::turned]));
+      if (std::abs(pull) <= dry) {
+        path.rest_s = from_s;
+        break;
+      }
+      P back = pivot;
+      back.sense = pull < 0.0 ? -1.0 : 1.0;
+      if (from_s > 0.0) {
+        const double rate = (pivot.sense * pull - dry);
+        y = across_event(pivot, back, from_s, y, event_delay(y[P::speed] * pivot.sense, rate),
+                         [](const State<S, 2>& at) { return at; });
+      }
+      pivot = back;
+    }
+    DormandPrince<P> stepper(pivot, control);
+    stepper.start(from_s, y);
+    const std::size_t done = path.rows.size();
     const auto result = integrate(
-        stepper, end_s, t_s.data(), static_cast<int>(t_s.size()),
+        stepper, end_s, t_s.data() + done, static_cast<int>(t_s.size() - done),
         [&](auto& s, int first, int last) {
           for (int n = first; n < last; ++n) {
-            const double u = s.fraction(t_s[static_cast<std::size_t>(n)]);
-            add(s.dense(P::psi, u), s.dense(P::speed, u));
+            const double u = s.fraction(t_s[done + static_cast<std::size_t>(n)]);
+            add(s.dense(P::turned, u), s.dense(P::speed, u));
           }
         },
-        DormandPrince<P>::kAll, stops);
-    path.counts = stepper.counts();
+        DormandPrince<P>::kAll, stops, turning ? -1 : 0);
+    path.counts.steps += stepper.counts().steps;
+    path.counts.rejected += stepper.counts().rejected;
+    path.counts.evaluations += stepper.counts().evaluations;
+    control.max_steps -= stepper.counts().steps;
     path.end = result.end;
     y = result.y;
-    if (result.end == RunEnd::event) path.rest_s = result.t_s;
-  } else if (value_of(p[kDry]) > 0.0 || value_of(y[P::speed]) == 0.0) {
-    path.rest_s = 0.0;
+    if (result.end != RunEnd::event) return path;
+    from_s = result.t_s;
+    turning = false;
   }
-  if (std::isfinite(path.rest_s))  // the angle's derivatives do not jump: its rate is zero here
-    while (path.rows.size() < t_s.size()) add(y[P::psi], S(0.0));
+  // The angle's derivatives do not jump: its rate is zero here.
+  while (path.rows.size() < t_s.size()) add(y[P::turned], S(0.0));
   return path;
+}
+
+template <class S>
+PivotPath<S> run_pivot(const PivotScene& scene, const S (&p)[kParameters],
+                       std::span<const double> t_s, double tolerance, int max_steps = 0) {
+  return scene.present[kSine] || scene.present[kCosine]
+             ? run_pivot_with<true>(p, t_s, tolerance, max_steps)
+             : run_pivot_with<false>(p, t_s, tolerance, max_steps);
 }
 
 class PivotPredictor : public Predictor {
  public:
   explicit PivotPredictor(const data::Scene& scene) : scene_(pivot_scene(scene)) {
+    const auto loss = [](const char* name, const char* unit, const char* meaning) {
+      return ParameterInfo{name, unit, Role::dynamics, 0.0, kInfinity, true, 0.0, true, meaning};
+    };
+    const auto any = [](const char* name, const char* unit, Role role, const char* meaning) {
+      return ParameterInfo{name, unit, role, -kInfinity, kInfinity, false, 0.0, true, meaning};
+    };
     const ParameterInfo all[kParameters] = {
-        {"psi_rad", "rad", Role::initial, -kInfinity, kInfinity, false, 0.0, true, "spin angle"},
-        {"w3_rad_s", "rad/s", Role::initial, -kInfinity, kInfinity, false, 0.0, true, "spin"},
-        {"spin_down_dry_rad_s2", "rad/s^2", Role::dynamics, 0.0, kInfinity, true, 0.0, true,
-         "dry couple over axial moment"},
-        {"spin_down_viscous_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, 0.0, true,
-         "viscous couple over axial moment and spin"},
-        {"spin_down_quadratic_1_rad", "1/rad", Role::dynamics, 0.0, kInfinity, true, 0.0, true,
-         "quadratic couple over axial moment and spin squared"}};
+        any("psi_rad", "rad", Role::initial, "spin angle"),
+        any("w3_rad_s", "rad/s", Role::initial, "spin"),
+        loss("spin_down_dry_rad_s2", "rad/s^2", "dry couple over axial moment"),
+        loss("spin_down_weakening_s_rad", "s/rad", "dry couple falls to half at 1 over this"),
+        loss("spin_down_viscous_1_s", "1/s", "viscous couple over axial moment and spin"),
+        loss("spin_down_quadratic_1_rad", "1/rad",
+             "quadratic couple over axial moment and spin squared"),
+        any("spin_down_imbalance_sin_rad_s2", "rad/s^2", Role::dynamics,
+            "couple of the weight over axial moment, against sin(psi)"),
+        any("spin_down_imbalance_cos_rad_s2", "rad/s^2", Role::dynamics,
+            "couple of the weight over axial moment, against cos(psi)")};
     for (int i = 0; i < kParameters; ++i) {
       if (!scene_.present[i]) continue;
       infos_.push_back(all[i]);
@@ -174,7 +231,7 @@ Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& valu
     double p[kParameters] = {};
     for (std::size_t i = 0; i < kinds_.size(); ++i)
       p[kinds_[i]] = values[static_cast<Eigen::Index>(i)];
-    fill(run_pivot(p, t_s, request.tolerance, request.max_steps), request, out);
+    fill(run_pivot(scene_, p, t_s, request.tolerance, request.max_steps), request, out);
     return out;
   }
   Dual8 p[kParameters];
@@ -182,7 +239,7 @@ Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& valu
     p[kinds_[i]] = Dual8(values[static_cast<Eigen::Index>(i)]);
   for (std::size_t c = 0; c < request.derivatives.size(); ++c)
     p[kinds_[static_cast<std::size_t>(request.derivatives[c])]].derivative[c] = 1.0;
-  fill(run_pivot(p, t_s, request.tolerance, request.max_steps), request, out);
+  fill(run_pivot(scene_, p, t_s, request.tolerance, request.max_steps), request, out);
   return out;
 }
 
@@ -195,8 +252,8 @@ std::unique_ptr<Predictor> make_pivot(const data::Scene& scene) {
 Trajectory simulate_pivot(const data::Scene& scene) {
   const PivotScene pivot = pivot_scene(scene);
   const std::vector<double> t_s = output_times_s(scene.run);
-  const auto path = run_pivot(pivot.value, t_s, scene.run.tolerance);
-  const auto check = run_pivot(pivot.value, t_s, finer(scene.run.tolerance));
+  const auto path = run_pivot(pivot, pivot.value, t_s, scene.run.tolerance);
+  const auto check = run_pivot(pivot, pivot.value, t_s, finer(scene.run.tolerance));
   // Without a body of known mass the run has no energy.
   const bool weighed = scene.body && scene.body->kind != data::BodyKind::top && scene.body->mass_kg;
   const double axial = weighed ? central_inertia(*scene.body).axial_kg_m2 : 0.0;
@@ -215,7 +272,9 @@ Trajectory simulate_pivot(const data::Scene& scene) {
     std::vector<double> row{
         t_s[n],           0.0, 0.0, psi, 0.0, 0.0, w, pivot.pivot_m.x(), pivot.pivot_m.y(),
         pivot.pivot_m.z()};
-    if (weighed) row.push_back(0.5 * axial * w * w);
+    const double lift_rad2_s2 =
+        pivot.value[kCosine] * std::sin(psi) - pivot.value[kSine] * std::cos(psi);
+    if (weighed) row.push_back(axial * (0.5 * w * w + lift_rad2_s2));
     row.push_back(w);
     run.values.row(static_cast<Eigen::Index>(n)) =
         Eigen::Map<const Eigen::RowVectorXd>(row.data(), static_cast<Eigen::Index>(row.size()));

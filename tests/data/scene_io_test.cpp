@@ -144,8 +144,11 @@ couple_regularisation_rad_s = 0.01
 drag_transverse_N_m_s = 0.125
 drag_spin_N_m_s = 0.25
 spin_down_dry_rad_s2 = 0.5
+spin_down_weakening_s_rad = 0.375
 spin_down_viscous_1_s = 0.75
 spin_down_quadratic_1_rad = 0.0625
+spin_down_imbalance_sin_rad_s2 = -0.03125
+spin_down_imbalance_cos_rad_s2 = 0.046875
 
 [start]
 theta_rad = 0.5

@@ -82,6 +82,55 @@ TEST(Compare, FindsTheLawsOfASpinDownAndLeavesTheOthersOut) {
             1);
 }
 
+TEST(Compare, FindsTheWeightBesideTheAxisAndFrictionThatWeakens) {
+  data::Scene truth = spin_down();
+  truth.model.spin_down_dry_rad_s2 = 0.12;
+  truth.model.spin_down_weakening_s_rad = 0.2;
+  truth.model.spin_down_imbalance_sin_rad_s2 = 0.03;
+  truth.model.spin_down_imbalance_cos_rad_s2 = -0.02;
+  const data::Track track = track_of(truth, {{"w3_rad_s", 3.0}}, 35.0, 1000, 1e-3, 5);
+  const Comparison found = compare_one(track, spin_down());
+  EXPECT_EQ(found.fit.verdict, "good");
+  for (const auto& [name, value] : Values{{"spin_down_dry_rad_s2", 0.12},
+                                          {"spin_down_weakening_s_rad", 0.2},
+                                          {"spin_down_imbalance_sin_rad_s2", 0.03},
+                                          {"spin_down_imbalance_cos_rad_s2", -0.02}}) {
+    const data::FitParameter* parameter = found.fit.find(name);
+    ASSERT_NE(parameter, nullptr) << name;
+    EXPECT_NEAR(parameter->value, value, 4.0 * parameter->sigma) << name;
+    EXPECT_LT(parameter->sigma, 0.02 * std::abs(value)) << name;
+  }
+}
+
+// Held for a second, brought to speed by hand within half a second, then let go.
+TEST(Compare, LeavesOutWhatComesBeforeTheRelease) {
+  data::Scene truth = spin_down();
+  truth.model.spin_down_dry_rad_s2 = 0.8;
+  const data::Track free = track_of(truth, {{"w3_rad_s", -20.0}}, 12.0, 300, 0.01, 6);
+  const double step_s = free.samples[1].t_s, push_s = 0.5, held_s = 1.0;
+  data::Track track;
+  for (int i = 0; i * step_s < held_s + push_s; ++i) {
+    data::TrackSample sample = free.samples[0];
+    sample.t_s = i * step_s;
+    const double pushed_s = std::max(0.0, sample.t_s - held_s);
+    sample.psi->value_rad += 10.0 * push_s - 20.0 * pushed_s * pushed_s / (2.0 * push_s);
+    track.samples.push_back(sample);
+  }
+  for (data::TrackSample sample : free.samples) {
+    sample.t_s += held_s + push_s;
+    if (sample.t_s > track.samples.back().t_s) track.samples.push_back(sample);
+  }
+  data::Scene plain = truth;
+  plain.model.spin_down_dry_rad_s2 = 0.1;
+  const data::Fit fitted = fit(std::span(&track, 1), plain, {});
+  EXPECT_TRUE(fitted.converged) << fitted.reason;
+  EXPECT_GE(fitted.arcs.at(0).from_s, held_s + push_s - step_s);
+  EXPECT_LT(fitted.arcs.at(0).from_s, held_s + push_s + 1.0);
+  EXPECT_NEAR(fitted.find("spin_down_dry_rad_s2")->value, 0.8,
+              4.0 * fitted.find("spin_down_dry_rad_s2")->sigma);
+  EXPECT_THAT(fitted.warnings, testing::Contains(testing::HasSubstr("begins at rest")));
+}
+
 data::Scene top() {
   data::Scene scene;
   scene.support.kind = data::SupportKind::pivot;

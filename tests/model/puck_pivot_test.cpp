@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "trochoid/model/puck.hpp"
 #include "trochoid/model/simulate.hpp"
@@ -213,7 +214,7 @@ data::Scene pivot_scene() {
   return scene;
 }
 
-// The closed form of the Riccati equation (pivot.md (2)): with
+// The closed form of the Riccati equation (pivot.md (3)): with
 // y = exp(-t1 t/2) (cosh st + (t1/2 + t2 w0) sinh(st)/s), s^2 = t1^2/4 - t0 t2: psi = ln(y)/t2.
 TEST(Pivot, FollowsTheClosedFormUntilItStops) {
   data::Scene scene = pivot_scene();
@@ -251,12 +252,88 @@ TEST(Pivot, NeverStopsWithoutDryFriction) {
   EXPECT_NEAR(column(run, 200, "psi_rad"), 20.0, 1e-7);
 }
 
+// The pendulum's period for an amplitude A is 4 K(sin(A/2))/omega; a body of known mass tells its
+// energy.
+TEST(Pivot, SwingsLikeAPendulumWithAWeightBesideItsAxis) {
+  constexpr double kAmplitude_rad = 2.0, kGs = 9.0;
+  data::Scene scene = pivot_scene();
+  scene.body->mass_kg = 0.1;
+  scene.body->thickness_m = 0.01;
+  scene.model.spin_down_imbalance_sin_rad_s2 = kGs;
+  scene.start.psi_rad = kAmplitude_rad;
+  scene.start.w3_rad_s = 0.0;
+  const double period_s = 4.0 * std::comp_ellint_1(std::sin(0.5 * kAmplitude_rad)) / std::sqrt(kGs);
+  scene.run.rate_hz = 2.0 / period_s;
+  scene.run.until_s = 5.0 * period_s;
+  scene.run.tolerance = 1e-11;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::reached_end);
+  for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
+    EXPECT_NEAR(column(run, n, "psi_rad"), n % 2 == 0 ? kAmplitude_rad : -kAmplitude_rad, 1e-8);
+    EXPECT_NEAR(column(run, n, "energy_J") / column(run, 0, "energy_J"), 1.0, 1e-9);
+  }
+}
+
+// Each half swing of a pendulum with dry friction loses d per radian, (5): psi_(n+1) solves
+// Gs (cos psi_n - cos psi_(n+1)) = -d |psi_(n+1) - psi_n|; it stays where Gs |sin psi| <= d.
+TEST(Pivot, StopsWhereDryFrictionHoldsTheWeight) {
+  constexpr double kGs = 9.0, kDry = 0.7;
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_imbalance_sin_rad_s2 = kGs;
+  scene.model.spin_down_dry_rad_s2 = kDry;
+  scene.start.psi_rad = 1.2;
+  scene.start.w3_rad_s = 0.0;
+  scene.run.until_s = 60.0;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::at_rest);
+  double at = 1.2;
+  while (kGs * std::abs(std::sin(at)) > kDry) {
+    const double sense = at > 0.0 ? -1.0 : 1.0;
+    double near = at + 1e-3 * sense, far = sense * std::abs(at);  // brackets of the next turn
+    for (int i = 0; i < 100; ++i) {
+      const double middle = 0.5 * (near + far);
+      const double energy = kGs * (std::cos(middle) - std::cos(at)) - kDry * std::abs(middle - at);
+      (energy > 0.0 ? near : far) = middle;
+    }
+    at = near;
+  }
+  EXPECT_NEAR(column(run, run.values.rows() - 1, "psi_rad"), at, 1e-7);
+}
+
+// dw/dt = -d/(1 + k w): w + k w^2/2 falls linearly in time.
+TEST(Pivot, WeakensWithSpeedAsItsLawSays) {
+  constexpr double kDry = 8.0, k = 0.05, w0 = 40.0;
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_dry_rad_s2 = kDry;
+  scene.model.spin_down_weakening_s_rad = k;
+  const Trajectory run = simulate(scene);
+  const double whole = w0 + 0.5 * k * w0 * w0;
+  EXPECT_NEAR(run.events.at(0).t_s, whole / kDry, 1e-8);
+  for (const Eigen::Index n : {20, 60, 90}) {
+    const double w = column(run, n, "w3_rad_s");
+    EXPECT_NEAR(w + 0.5 * k * w * w, whole - kDry * 0.1 * static_cast<double>(n), 1e-7);
+  }
+}
+
 TEST(Pivot, DifferentiatesByEveryParameter) {
   data::Scene scene = pivot_scene();
   scene.model.spin_down_dry_rad_s2 = 0.8;
   scene.model.spin_down_viscous_1_s = 0.15;
   scene.model.spin_down_quadratic_1_rad = 0.004;
   expect_derivatives(*make_predictor(scene), std::vector{0.5, 5.0, 30.0}, {Observable::psi_rad});
+  scene.model.spin_down_weakening_s_rad = 0.02;
+  scene.model.spin_down_imbalance_sin_rad_s2 = 9.0;
+  scene.model.spin_down_imbalance_cos_rad_s2 = -4.0;
+  scene.start.w3_rad_s = 8.0;
+  // Turns over a few times, then swings back and forth, then rests.
+  expect_derivatives(*make_predictor(scene), std::vector{0.5, 1.0, 3.0, 4.0, 5.0, 60.0},
+                     {Observable::psi_rad});
+}
+
+TEST(Pivot, NeedsDryFrictionForWeakening) {
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_weakening_s_rad = 0.1;
+  EXPECT_THROW((void)simulate(scene), InputError);
 }
 
 }  // namespace

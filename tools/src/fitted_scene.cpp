@@ -38,8 +38,11 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
     {"pivoting_friction_m", &ModelSettings::pivoting_friction_m},
     {"contour_friction_m", &ModelSettings::contour_friction_m},
     {"spin_down_dry_rad_s2", &ModelSettings::spin_down_dry_rad_s2},
+    {"spin_down_weakening_s_rad", &ModelSettings::spin_down_weakening_s_rad},
     {"spin_down_viscous_1_s", &ModelSettings::spin_down_viscous_1_s},
-    {"spin_down_quadratic_1_rad", &ModelSettings::spin_down_quadratic_1_rad}};
+    {"spin_down_quadratic_1_rad", &ModelSettings::spin_down_quadratic_1_rad},
+    {"spin_down_imbalance_sin_rad_s2", &ModelSettings::spin_down_imbalance_sin_rad_s2},
+    {"spin_down_imbalance_cos_rad_s2", &ModelSettings::spin_down_imbalance_cos_rad_s2}};
 
 /// The fit's value of a parameter in one arc; initial states of later arcs are marked "@arc".
 std::optional<double> value_of(const data::Fit& fit, const std::string& name, std::size_t arc) {

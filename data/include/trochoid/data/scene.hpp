@@ -56,19 +56,22 @@ struct ModelSettings {
   std::optional<double> drag_transverse_N_m_s;          ///< c1 of the top
   std::optional<double> drag_spin_N_m_s;                ///< c3 of the top
   std::optional<double> spin_down_dry_rad_s2;           ///< t0/C of the fixed-pivot disc
+  std::optional<double> spin_down_weakening_s_rad;      ///< k: dry/(1 + k |w|)
   std::optional<double> spin_down_viscous_1_s;          ///< t1/C
   std::optional<double> spin_down_quadratic_1_rad;      ///< t2/C
+  /// Weight out of balance: -sin(psi) and -cos(psi) parts of its couple, over C.
+  std::optional<double> spin_down_imbalance_sin_rad_s2, spin_down_imbalance_cos_rad_s2;
 };
 
-/// Initial state: for simulate the truth, for fit only a hint. Of each pair (w2, dphi), (w1, dtheta),
-/// (w3, dpsi) at most one is given.
+/// Initial state: for simulate the truth, for fit only a hint. Of each pair (w2, dphi), (w1,
+/// dtheta), (w3, dpsi) at most one is given.
 struct StartSettings {
   std::optional<double> theta_rad, phi_rad, psi_rad;
   std::optional<double> w1_rad_s, w2_rad_s, w3_rad_s;
   std::optional<double> dtheta_rad_s, dphi_rad_s, dpsi_rad_s;
   std::optional<double> omega_s_rad_s;  ///< spin about the own axis of a top
   std::optional<double> x_m, y_m, vx_m_s, vy_m_s;
-  std::optional<Eigen::Vector3d> w_body_rad_s;  ///< free body: angular velocity in body axes
+  std::optional<Eigen::Vector3d> w_body_rad_s;   ///< free body: angular velocity in body axes
   std::optional<Eigen::Vector3d> moments_kg_m2;  ///< free body: principal moments
 };
 
@@ -87,7 +90,7 @@ struct Prior {
 };
 
 struct FitSettings {
-  std::vector<std::string> free;           ///< parameter names or groups; empty = the model's choice
+  std::vector<std::string> free;  ///< parameter names or groups; empty = the model's choice
   std::map<std::string, Prior> prior;
   std::map<std::string, double> fixed;
   std::map<std::string, std::pair<double, double>> bounds;

@@ -16,8 +16,10 @@ struct Comparison {
 
 /// Fits the rungs of the ladder that make sense for the scene's support. Starts from the model
 /// without losses and adds, one at a time, the loss that lowers BIC most (floor: linear and
-/// quadratic air couple, gap layer, rolling, pivoting and contour friction, and sliding; pivot: drag; puck: air force; spin-down:
-/// dry, viscous and quadratic couple). Terms the scene names beforehand give starting values only.
+/// quadratic air couple, gap layer, rolling, pivoting and contour friction, and sliding; pivot:
+/// drag; puck: air force; spin-down: dry, viscous and quadratic couple, a weight out of balance,
+/// and dry friction that weakens with speed). Terms the scene names beforehand give starting values
+/// only.
 /// Every rung is judged by AICc and BIC (with the effective number of samples of the best one, so
 /// that they can be compared), whiteness of residuals and the prediction of the last third of the
 /// track from the first two. Recommended is the rung with the fewest parameters within 2 of the
