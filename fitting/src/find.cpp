@@ -71,13 +71,13 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
   return start;
 }
 
-// Without angles a sliding body's neighbouring valleys explain its path nearly as well.
+// Without angles neighbouring valleys explain the path nearly as well as the right one.
 Found look_about(const Problem& problem, Found found) {
   constexpr int kMisses = 3;
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
-  if (seen || !rim || (found.passed && !slides)) return found;
+  if (seen || !rim || (!slides && surely_explained(problem, found))) return found;
   return hop(problem, std::move(found), kMisses);
 }
 

@@ -98,9 +98,15 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
                                   [&](const auto& p) { return p.index == contact; });
   if (puck && contact >= 0 && spin_seen && !listed && scene.fit.free.empty() &&
       !scene.fit.fixed.contains("contact_radius_m")) {
+    // Where they do not, it lies somewhere within the face: at its bounds it would bend the spin.
+    constexpr double kAnywhere = 0.5;
     const double radius_m = problem.predictor->parameters()[contact].value;
+    const auto given = scene.fit.prior.find("contact_radius_m");
+    const data::Prior prior = given != scene.fit.prior.end()
+                                  ? given->second
+                                  : data::Prior{radius_m, kAnywhere * radius_m};
     problem.free.push_back(
-        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, {}, {}, radius_m});
+        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, prior, {}, radius_m});
   }
   std::stable_sort(problem.free.begin(), problem.free.end(),
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });

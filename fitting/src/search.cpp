@@ -55,13 +55,15 @@ std::vector<int> window_sizes(const Problem& problem) {
 
 namespace {
 
-// Positions of a body on its rim that move little more than they scatter: several motions pass the
-// gate, and only the best of all counts.
-bool buried(const Problem& problem, const Found& best) {
+// Where the angles were seen, a good solution is known by its chi-square. From positions alone a
+// neighbouring valley can pass the gate as well, and where a body on its rim moves little more than
+// its positions scatter only the best of all counts.
+bool settles_it(const Problem& problem, const Found& best) {
   constexpr double kClear = 0.02;  // of the variance
-  return problem.predictor->index_of("w1_rad_s") >= 0 &&
-         problem.arcs[0].observable_index(model::Observable::phi_rad) < 0 &&
-         best.unexplained > kClear;
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
+  if (seen) return best.passed;
+  return surely_explained(problem, best) && !(rim && best.unexplained > kClear);
 }
 
 // A few quick tries: most tracks need no more.
@@ -69,9 +71,6 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
   // Where the angles were seen, starts differ little and a good one is known by its result.
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const std::size_t tried = seen ? 2 : 5;
-  // From positions alone a neighbouring valley can pass the gate as well: above half a standard
-  // deviation of the chi-square distribution the other starts of the window get their turn.
-  const double sure = 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
@@ -79,7 +78,7 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, 1.5, &valleys);
       if (better(found, best)) best = std::move(found);
-      if (best.passed && (seen || best.reduced_chi2 < sure) && !buried(problem, best)) return best;
+      if (settles_it(problem, best)) return best;
       if (seen && best.unexplained < kExplained) return best;
     }
     if (best.unexplained < kExplained) return best;
@@ -144,8 +143,7 @@ Found search_widely(const Problem& problem, const Starter& starter, Found best) 
       else if (gain > -kSameValley)
         ++reached;
       if (better(found, best)) best = std::move(found);
-      if ((best.passed && !buried(problem, best)) || best.unexplained < kExplained ||
-          reached >= kOftenEnough)
+      if (settles_it(problem, best) || best.unexplained < kExplained || reached >= kOftenEnough)
         return best;
     }
   }
@@ -162,8 +160,7 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   // A sliding body's derivatives are dear, and few of its starts lead anywhere.
   const bool brief = seen || !slides || effort == Effort::brief;
   if (brief) best = search_briefly(problem, starter);
-  if ((best.passed && !buried(problem, best)) || !rim || effort == Effort::brief ||
-      best.unexplained < kExplained)
+  if (settles_it(problem, best) || !rim || effort == Effort::brief || best.unexplained < kExplained)
     return best;
   return search_widely(problem, starter, std::move(best));
 }

@@ -50,12 +50,16 @@ bool better(const Found& a, const Found& b) {
   return a.solution.usable && (!b.solution.usable || a.reduced_chi2 < b.reduced_chi2);
 }
 
+bool surely_explained(const Problem& problem, const Found& best) {
+  return best.passed &&
+         best.reduced_chi2 < 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
+}
+
 bool surely_found(const Problem& problem, const Found& best) {
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   if (seen || !slides) return best.passed || best.unexplained < kExplained;
-  return best.passed &&
-         best.reduced_chi2 < 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
+  return surely_explained(problem, best);
 }
 
 Problem for_predictor(const Problem& problem, const model::Predictor& predictor) {

@@ -82,9 +82,12 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// Whether a is usable and explains more than b.
 [[nodiscard]] bool better(const Found& a, const Found& b);
 
-/// Whether looking on is idle: the path is explained but for a per cent, or the gate is passed.
-/// From positions alone a sliding body's neighbouring valleys pass the gate as well: there
-/// chi-square has to be within half a standard deviation of its distribution.
+/// Whether chi-square is within half a standard deviation of its distribution: from positions alone
+/// neighbouring valleys pass the gate as well.
+[[nodiscard]] bool surely_explained(const Problem& problem, const Found& best);
+
+/// Whether looking on is idle: the path is explained but for a per cent, or the gate is passed;
+/// for a sliding body's positions alone, surely explained.
 [[nodiscard]] bool surely_found(const Problem& problem, const Found& best);
 
 /// `unexplained` of a path that is explained but for a per cent of its amplitude.

@@ -153,6 +153,24 @@ TEST(PuckFit, KeepsItsPromiseWithFewSamples) {
   EXPECT_NEAR(static_cast<double>(inside) / fitted, 0.95, kTolerance);
 }
 
+// Without spin nothing tells how far inside the rim a crowned face rests: somewhere within it.
+TEST(PuckFit, DoesNotMeasureAContactRadiusThatNothingShows) {
+  data::Track track = Throw(11).slide({0.9, 0.2}, 0.4).track();
+  std::mt19937_64 generator(12);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  for (data::TrackSample& sample : track.samples)
+    sample.psi = data::MeasuredAngle{0.3 + normal(generator), 0.01};
+  const data::Scene scene = puck_scene();
+  const data::Fit result = fit(std::span(&track, 1), scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  const data::FitParameter* contact = result.find("contact_radius_m");
+  ASSERT_NE(contact, nullptr);
+  EXPECT_EQ(contact->status, data::ParameterStatus::prior);
+  EXPECT_NEAR(contact->sigma, 0.5 * scene.body->radius_m, 0.1 * scene.body->radius_m);
+  for (const auto& [name, truth] : {std::pair{"friction", kFriction}, {"w3_rad_s", 0.0}})
+    EXPECT_NEAR(result.find(name)->value, truth, 4.0 * result.find(name)->sigma) << name;
+}
+
 TEST(PuckFit, RefusesABodyAtRest) {
   Throw thrown(3);
   thrown.slide({0.0, 0.0}, 1.0);
