@@ -32,16 +32,13 @@ namespace fs = std::filesystem;
 constexpr double kA = 0.098, kB = 0.75, kL = 0.1, kTheta = std::numbers::pi / 3.0;
 constexpr double kEnd_s = 60.0;
 constexpr int kOutputs = 6001;
+constexpr const char *kOurs = "trochoid", *kOursWithDerivatives = "with 7 derivatives",
+                     *kAdams = "CVODE Adams", *kDop853 = "scipy DOP853", *kOde45 = "Octave ode45";
 
 /// x and y by turns, and the fastest time it took.
 struct Path {
   Eigen::VectorXd xy_m;
   double time_us = 0.0;
-};
-
-struct Row {
-  std::string who;
-  double tolerance, error_over_l, time_us;
 };
 
 double fastest_us(int repeats, const std::function<void()>& work) {
@@ -195,22 +192,22 @@ class Comparison {
 
   void run(const fs::path& scratch) {
     for (const double tolerance : {1e-9, 1e-10, 1e-11, 1e-12})
-      add("trochoid", tolerance, by_trochoid(tolerance, false, repeats_));
+      add(kOurs, tolerance, by_trochoid(tolerance, false, repeats_));
     for (const double tolerance : {1e-10})
-      add("with 7 derivatives", tolerance, by_trochoid(tolerance, true, repeats_));
+      add(kOursWithDerivatives, tolerance, by_trochoid(tolerance, true, repeats_));
     for (const double tolerance : {1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13})
-      add("CVODE Adams", tolerance, by_adams(tolerance, std::min(repeats_, 5)));
+      add(kAdams, tolerance, by_adams(tolerance, std::min(repeats_, 5)));
     constexpr int kSlow = 2;
     for (const double tolerance : {1e-8, 1e-10, 1e-12})
       for (const char* python : {"python3", "/usr/bin/python3"})
         if (const auto path = by_other({python, "-c"}, kScipy, tolerance, kSlow, scratch)) {
-          add("scipy DOP853", tolerance, *path);
+          add(kDop853, tolerance, *path);
           break;
         }
     for (const double tolerance : {1e-6, 1e-8, 1e-10})
       if (const auto path = by_other({"octave-cli", "--norc", "--quiet", "--eval"}, kOctave,
                                      tolerance, 1, scratch))
-        add("Octave ode45", tolerance, *path);
+        add(kOde45, tolerance, *path);
     fs::remove(scratch);
   }
 
@@ -218,23 +215,16 @@ class Comparison {
     fmt::print("\nThe thesis' base case: 60 s, x and y at {} times, as a fit asks for them\n",
                kOutputs);
     fmt::print("{:<20} {:>9} {:>12} {:>12}\n", "by", "tolerance", "error/l", "time_us");
-    for (const Row& row : rows_)
+    for (const SolverRow& row : rows_)
       fmt::print("{:<20} {:>9.0e} {:>12.1e} {:>12.1f}\n", row.who, row.tolerance, row.error_over_l,
                  row.time_us);
     fmt::print("\n{:<52} {:>18} {:>9}\n", "bar", "", "measured");
-    const Row& ours = row_of("trochoid", 1e-10);
-    for (const auto& [who, required] :
-         {std::pair{"CVODE Adams", 60.0}, {"scipy DOP853", 500.0}, {"Octave ode45", 10000.0}})
-      bar(fmt::format("time of {} over trochoid's, at equal error", who), Bound::at_least, required,
-          time_at(who, ours.error_over_l) / ours.time_us);
-    bar("time with 7 derivatives over that without", Bound::at_most, 3.5,
-        row_of("with 7 derivatives", 1e-10).time_us / ours.time_us);
-    bar("error/l of trochoid at 1e-10", Bound::at_most, 1e-9, ours.error_over_l);
+    for (const SolverBar& bar : solver_bars(rows_)) print(bar);
   }
 
   void write(const fs::path& csv) const {
     std::string text = "by,tolerance,error_over_l,time_us\n";
-    for (const Row& row : rows_)
+    for (const SolverRow& row : rows_)
       text += fmt::format("{},{},{},{}\n", row.who, row.tolerance, row.error_over_l, row.time_us);
     data::write_text(text, csv);
   }
@@ -245,48 +235,65 @@ class Comparison {
     rows_.push_back({who, tolerance, error, path.time_us});
   }
 
-  [[nodiscard]] const Row& row_of(const std::string& who, double tolerance) const {
-    return *std::find_if(rows_.begin(), rows_.end(), [&](const Row& row) {
-      return row.who == who && row.tolerance == tolerance;
-    });
-  }
-
-  /// Interpolated between the rows on either side in error; beyond them the nearest row's. NaN if
-  /// there is none.
-  [[nodiscard]] double time_at(const std::string& who, double error) const {
-    std::vector<std::pair<double, double>> points;
-    for (const Row& row : rows_)
-      if (row.who == who) points.emplace_back(std::log(row.error_over_l), std::log(row.time_us));
-    if (points.empty()) return std::numeric_limits<double>::quiet_NaN();
-    std::sort(points.begin(), points.end());
-    const double at = std::log(error);
-    if (at <= points.front().first) return std::exp(points.front().second);
-    for (std::size_t i = 1; i < points.size(); ++i)
-      if (at <= points[i].first) {
-        const auto& [e0, t0] = points[i - 1];
-        const auto& [e1, t1] = points[i];
-        return std::exp(t0 + (t1 - t0) * (at - e0) / (e1 - e0));
-      }
-    return std::exp(points.back().second);
-  }
-
-  enum class Bound { at_least, at_most };
-  static void bar(const std::string& what, Bound bound, double required, double measured) {
+  static void print(const SolverBar& bar) {
     const std::string limit =
-        fmt::format("{} {:.4g}", bound == Bound::at_least ? "at least" : "at most", required);
-    const bool held = bound == Bound::at_least ? measured >= required : measured <= required;
-    if (std::isnan(measured))
-      fmt::print("{:<52} {:>18} {:>9}  not installed\n", what, limit, "-");
+        fmt::format("{} {:.4g}", bar.at_least ? "at least" : "at most", bar.required);
+    if (std::isnan(bar.measured))
+      fmt::print("{:<52} {:>18} {:>9}  not installed\n", bar.what, limit, "-");
     else
-      fmt::print("{:<52} {:>18} {:>9.4g}  {}\n", what, limit, measured, held ? "held" : "NOT HELD");
+      fmt::print("{:<52} {:>18} {:>9.4g}  {}\n", bar.what, limit, bar.measured,
+                 bar.held() ? "held" : "NOT HELD");
   }
 
   int repeats_;
   Eigen::VectorXd exact_m_;
-  std::vector<Row> rows_;
+  std::vector<SolverRow> rows_;
 };
 
+const SolverRow& row_of(const std::vector<SolverRow>& rows, const std::string& who,
+                        double tolerance) {
+  const auto row = std::find_if(rows.begin(), rows.end(), [&](const SolverRow& candidate) {
+    return candidate.who == who && candidate.tolerance == tolerance;
+  });
+  if (row == rows.end()) throw NumericalError(fmt::format("no row of {} at {}", who, tolerance));
+  return *row;
+}
+
 }  // namespace
+
+bool SolverBar::held() const {
+  return at_least ? measured >= required : measured <= required;
+}
+
+double time_at_error_us(const std::vector<SolverRow>& rows, const std::string& who,
+                        double error_over_l) {
+  std::vector<std::pair<double, double>> points;
+  for (const SolverRow& row : rows)
+    if (row.who == who) points.emplace_back(std::log(row.error_over_l), std::log(row.time_us));
+  if (points.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(points.begin(), points.end());
+  const double at = std::log(error_over_l);
+  if (at <= points.front().first) return std::exp(points.front().second);
+  for (std::size_t i = 1; i < points.size(); ++i)
+    if (at <= points[i].first) {
+      const auto& [e0, t0] = points[i - 1];
+      const auto& [e1, t1] = points[i];
+      return std::exp(t0 + (t1 - t0) * (at - e0) / (e1 - e0));
+    }
+  return std::exp(points.back().second);
+}
+
+std::vector<SolverBar> solver_bars(const std::vector<SolverRow>& rows) {
+  const SolverRow& ours = row_of(rows, kOurs, 1e-10);
+  std::vector<SolverBar> bars;
+  for (const auto& [who, required] : {std::pair{kAdams, 60.0}, {kDop853, 500.0}, {kOde45, 10000.0}})
+    bars.push_back({fmt::format("time of {} over trochoid's, at equal error", who), true, required,
+                    time_at_error_us(rows, who, ours.error_over_l) / ours.time_us});
+  bars.push_back({"time with 7 derivatives over that without", false, 3.5,
+                  row_of(rows, kOursWithDerivatives, 1e-10).time_us / ours.time_us});
+  bars.push_back({"error/l of trochoid at 1e-10", false, 1e-9, ours.error_over_l});
+  return bars;
+}
 
 void study_solver_bars(int repeats, const fs::path& csv) {
   Comparison comparison(std::max(repeats, 20));

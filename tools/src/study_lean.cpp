@@ -18,6 +18,7 @@
 #include "trochoid/model/counted.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "trochoid/model/rolling.hpp"
+#include "trochoid/model/sliding.hpp"
 #include "trochoid/model/top.hpp"
 #ifdef TROCHOID_HAS_TRACKING
 #include "trochoid/tracking/frame_source.hpp"
@@ -70,6 +71,13 @@ double predict_us(const data::Scene& scene, const model::PredictRequest& request
   return fastest_us([&] { (void)predictor->predict(values, request); });
 }
 
+template <int N>
+model::State<model::Counted, N> counted_state(const model::State<double, N>& state) {
+  model::State<model::Counted, N> counted;
+  for (int i = 0; i < N; ++i) counted[i] = state[i];
+  return counted;
+}
+
 template <template <class> class... Terms>
 long rolling_operations() {
   const model::Rolling<model::Counted, Terms...> system{
@@ -96,6 +104,38 @@ void add_terms(std::vector<Row>& rows) {
   add("all air, contact couples",
       rolling_operations<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
                          PivotingFriction, ContourFriction>());
+}
+
+/// What the state has to hold, by what can change: the spin of a top without drag, the slip of a
+/// body that rolls, are no components of it.
+void add_states(std::vector<Row>& rows) {
+  using namespace model;
+  constexpr int kEvaluations = 1000;
+  const auto add = [&](const char* part, const char* has, const auto& counted, const auto& system,
+                       auto state) {
+    const long operations = operations_of(counted, counted_state(state)).total();
+    auto rate = state;
+    const double time_us = fastest_us([&] {
+      for (int i = 0; i < kEvaluations; ++i) {
+        system.derivative(0.0, state, rate);
+        state[0] += 1e-12 * rate[0];  // each evaluation waits for the one before
+      }
+    });
+    rows.push_back({part, has, operations, time_us});
+  };
+  constexpr const char *kTop = "state of a top, x 1000", *kFloor = "state on a floor, x 1000";
+  add(kTop, "5: the spin is constant", Top<Counted>{20.0, 3.0, 5.0}, Top<double>{20.0, 3.0, 5.0},
+      State<double, 5>{{0.3, 0.1, 0.2, 0.5, 0.8}});
+  add(kTop, "7: drag slows it", TopWithDrag<Counted>{20.0, 0.1, 0.2},
+      TopWithDrag<double>{20.0, 0.1, 0.2}, State<double, 7>{{0.3, 0.1, 3.0, 0.2, 0.5, 0.8, 5.0}});
+  const RimBody disc{.m = 0.2, .A = 5e-5, .C = 1e-4, .R = 0.03, .h = 0.002};
+  add(kFloor, "8: it rolls", Rolling<Counted>{.body = disc, .losses = {}},
+      Rolling<double>{.body = disc, .losses = {}},
+      State<double, 8>{{0.1, 1.0, 0.2, 0.3, 4.0, -10.0, 0.0, 0.0}});
+  add(kFloor, "10: it slips",
+      Sliding<Counted, Coulomb>{.body = disc, .losses = {}, .friction = {0.2}},
+      Sliding<double, Coulomb>{.body = disc, .losses = {}, .friction = {0.2}},
+      State<double, 10>{{0.1, 1.0, 0.2, 0.3, 4.0, -10.0, 0.0, 0.0, 0.05, 0.02}});
 }
 
 void add_outputs(std::vector<Row>& rows) {
@@ -139,6 +179,23 @@ double decode_us(const fs::path& video, bool colour) {
   return elapsed.count() / std::max(frames, 1);
 }
 
+/// Outlines are projected into the picture as it is; no picture is ever resampled to undistort it.
+void add_undistortion(std::vector<Row>& rows) {
+  constexpr int kPoints = 1000;
+  data::Camera camera = data::Camera::overhead(1280, 720, 2000.0, 1.2);
+  const auto add = [&](const char* has) {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    const double time_us = fastest_us([&] {
+      for (int i = 0; i < kPoints; ++i)
+        sum += camera.image_from_table(Eigen::Vector3d(1e-4 * i + 1e-12 * sum.x(), 0.02, 1e-5 * i));
+    });
+    rows.push_back({"projection, x 1000", has, 0, time_us});
+  };
+  add("a lens without distortion");
+  camera.distortion = {-0.1, 0.02, 1e-4, 1e-4, 0.0};
+  add("distortion, five terms");
+}
+
 void add_decoding(const fs::path& video, std::vector<Row>& rows) {
   rows.push_back({"decoding, per frame", "luma", 0, decode_us(video, false)});
   rows.push_back({"decoding, per frame", "luma and colour", 0, decode_us(video, true)});
@@ -158,14 +215,14 @@ int libraries() {
 }
 
 void print_rows(const std::vector<Row>& rows) {
-  fmt::print("{:<22} {:<28} {:>12} {:>10} {:>9}\n", "part", "the scene has", "operations",
+  fmt::print("{:<27} {:<28} {:>12} {:>10} {:>9}\n", "part", "the scene has", "operations",
              "time_us", "of lean");
   double lean = 0.0;
   std::string part;
   for (const Row& row : rows) {
     if (row.part != part) lean = row.time_us;
     part = row.part;
-    fmt::print("{:<22} {:<28} {:>12} {:>10.1f} {:>8.2f}x\n", row.part, row.has,
+    fmt::print("{:<27} {:<28} {:>12} {:>10.1f} {:>8.2f}x\n", row.part, row.has,
                row.operations > 0 ? std::to_string(row.operations) : "-", row.time_us,
                row.time_us / lean);
   }
@@ -174,8 +231,10 @@ void print_rows(const std::vector<Row>& rows) {
 void run(const Options& options) {
   std::vector<Row> rows;
   add_terms(rows);
+  add_states(rows);
   add_outputs(rows);
 #ifdef TROCHOID_HAS_TRACKING
+  add_undistortion(rows);
   if (!options.video.empty()) add_decoding(options.video, rows);
 #endif
   print_rows(rows);

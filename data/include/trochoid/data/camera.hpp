@@ -12,8 +12,8 @@ struct Ray {
 };
 
 /// Pinhole camera with OpenCV's radial-tangential distortion (k1, k2, p1, p2, k3), or, when only a
-/// scale is known, an orthographic camera looking straight down. Pixel centres are integers, x right,
-/// y down; the table frame has z up and the floor at z = 0, right-handed seen from above.
+/// scale is known, an orthographic camera looking straight down. Pixel centres are integers, x
+/// right, y down; the table frame has z up and the floor at z = 0, right-handed seen from above.
 ///
 ///   X_c = R X_table + t,  u = X_c.x / X_c.z,  v = X_c.y / X_c.z,  r2 = u^2 + v^2,
 ///   d = 1 + k1 r2 + k2 r2^2 + k3 r2^3,  x_px = fx (u d + tangential) + cx,  likewise y_px.
@@ -23,8 +23,8 @@ struct Camera {
   Projection projection = Projection::perspective;
   int width_px = 0;
   int height_px = 0;
-  double fx = 0.0, fy = 0.0;  ///< focal lengths [px], or scale [px/m] when orthographic
-  double cx = 0.0, cy = 0.0;  ///< principal point [px]
+  double fx = 0.0, fy = 0.0;           ///< focal lengths [px], or scale [px/m] when orthographic
+  double cx = 0.0, cy = 0.0;           ///< principal point [px]
   std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3
   Eigen::Matrix3d camera_from_table = Eigen::Vector3d(1, -1, -1).asDiagonal();
   Eigen::Vector3d camera_from_table_m = Eigen::Vector3d::Zero();
@@ -42,16 +42,20 @@ struct Camera {
   template <class Scalar>
   [[nodiscard]] Eigen::Matrix<Scalar, 2, 1> image_from_table(
       const Eigen::Matrix<Scalar, 3, 1>& point_m) const {
-    const Eigen::Matrix<Scalar, 3, 1> c = camera_from_table.cast<Scalar>() * point_m +
-                                          camera_from_table_m.cast<Scalar>();
+    const Eigen::Matrix<Scalar, 3, 1> c =
+        camera_from_table.cast<Scalar>() * point_m + camera_from_table_m.cast<Scalar>();
     if (projection == Projection::orthographic) return {fx * c.x() + cx, fy * c.y() + cy};
     const Scalar u = c.x() / c.z(), v = c.y() / c.z();
+    if (!distorts()) return {fx * u + cx, fy * v + cy};
     const auto [k1, k2, p1, p2, k3] = distortion;
     const Scalar r2 = u * u + v * v;
     const Scalar d = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     return {fx * (u * d + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u)) + cx,
             fy * (v * d + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v) + cy};
   }
+  /// Whether any distortion coefficient differs from zero; a camera without is spared the
+  /// polynomial.
+  [[nodiscard]] bool distorts() const { return distortion != std::array<double, 5>{}; }
   /// Depth of a table point in front of the camera [m]; must be > 0 to be imaged (perspective).
   [[nodiscard]] double depth_m(const Eigen::Vector3d& point_m) const;
   /// Ray of the table frame through a pixel; inverts the distortion by Newton's method.
