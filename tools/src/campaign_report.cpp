@@ -7,6 +7,7 @@
 #include "campaign.hpp"
 #include "report_parts.hpp"
 #include "svg.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -54,12 +55,6 @@ struct Spread {
   std::vector<double> values, sigmas;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-}
-
 /// model -> parameter -> values; only fits that converged and saw the parameter.
 std::map<std::string, std::map<std::string, Spread>> spreads(
     const std::vector<CampaignLine>& lines) {
@@ -83,14 +78,12 @@ std::string spread_table(const std::vector<CampaignLine>& lines) {
       "<th>spread (half the middle 68 %)<th>median of the stated errors<th>unit</tr>\n";
   for (const auto& [model, parameters] : spreads(lines))
     for (const auto& [name, spread] : parameters) {
-      std::vector<double> sorted = spread.values;
-      std::sort(sorted.begin(), sorted.end());
-      const auto at = [&](double share) {
-        return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
-      };
+      const double half_width =
+          0.5 * (data::quantile(spread.values, 0.84) - data::quantile(spread.values, 0.16));
       html += fmt::format("<tr><td>{}<td>{}<td>{}<td>{:.6g}<td>{:.2g}<td>{:.2g}<td>{}</tr>\n",
-                          escaped(model), escaped(name), sorted.size(), median(spread.values),
-                          0.5 * (at(0.84) - at(0.16)), median(spread.sigmas), escaped(spread.unit));
+                          escaped(model), escaped(name), spread.values.size(),
+                          data::median(spread.values), half_width, data::median(spread.sigmas),
+                          escaped(spread.unit));
     }
   return html + "</table>\n";
 }

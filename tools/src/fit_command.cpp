@@ -10,6 +10,7 @@
 #include "outputs.hpp"
 #include "progress.hpp"
 #include "provenance.hpp"
+#include "scene_library.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -102,7 +103,8 @@ void run(const FitCommand& command) {
   }
   fitting::FitOptions options = command.options;
   if (talk() == Talk::verbose) options.log = detail;
-  data::Fit fit = fit_job(tracks, scene, options, command.compare);
+  data::Fit fit =
+      in_scene(command.scene, [&] { return fit_job(tracks, scene, options, command.compare); });
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
   if (command.json)

@@ -255,11 +255,4 @@ Coverage fit_coverage(const MadeTrackOptions& tracks, int draws, std::uint64_t s
   return coverage;
 }
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<std::size_t>(place)];
-}
-
 }  // namespace trochoid::tools

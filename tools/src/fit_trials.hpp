@@ -55,7 +55,4 @@ struct Coverage {
 [[nodiscard]] Coverage fit_coverage(const MadeTrackOptions& tracks, int draws, std::uint64_t seed,
                                     int threads, const std::function<void(int)>& progress = {});
 
-/// @returns NaN for no values.
-[[nodiscard]] double quantile(std::vector<double> values, double share);
-
 }  // namespace trochoid::tools

@@ -55,27 +55,52 @@ std::string video_words(const tracking::VideoInfo& video) {
   return words;
 }
 
-std::string body_words(const Inspection& seen, double radius_mm) {
-  const bool known = radius_mm > 0.0;
-  const double radius_m = 1e-3 * (known ? radius_mm : kPlaceholder_mm);
-  const bool ring = seen.body && seen.body->bore_shows;
+/// Lengths of the body, measured or guessed.
+struct Measures {
+  double radius_m, inner_radius_m, thickness_m;
+  bool measured, ring;  ///< the radius; whether there is a bore
+};
+
+Measures measures_of(const Inspection& seen, double radius_mm) {
+  const bool measured = radius_mm > 0.0;
+  const double radius_m = 1e-3 * (measured ? radius_mm : kPlaceholder_mm);
+  return {radius_m, 0.8 * radius_m, 0.1 * radius_m, measured, seen.body && seen.body->bore_shows};
+}
+
+std::string body_words(const Inspection& seen, const Measures& body) {
   std::string text = "[body]\n";
-  text += ring ? "kind = \"ring\"             # the floor shows through its middle; else \"disc\"\n"
-               : "kind = \"disc\"             # nothing shows through its middle; else \"ring\"\n";
-  text +=
-      fmt::format("radius_m = {:<12g} # {}\n", radius_m,
-                  known ? "outer rim"
-                        : "NOT MEASURED, a placeholder: every length in the result scales with it");
-  if (ring)
-    text +=
-        fmt::format("inner_radius_m = {:<6g} # the bore: a guess, measure it\n", 0.8 * radius_m);
-  text += fmt::format("thickness_m = {:<9g} # a guess, measure it\n", 0.1 * radius_m);
+  text += body.ring
+              ? "kind = \"ring\"             # the floor shows through its middle; else \"disc\"\n"
+              : "kind = \"disc\"             # nothing shows through its middle; else \"ring\"\n";
+  text += fmt::format(
+      "radius_m = {:<12g} # {}\n", body.radius_m,
+      body.measured ? "outer rim"
+                    : "NOT MEASURED, a placeholder: every length in the result scales with it");
+  if (body.ring)
+    text += fmt::format("inner_radius_m = {:<6g} # the bore: a guess, measure it\n",
+                        body.inner_radius_m);
+  text += fmt::format("thickness_m = {:<9g} # a guess, measure it\n", body.thickness_m);
   text += "# mass_kg = 0.03           # from the balance; needed for forces and losses\n";
   if (seen.body)
     text += fmt::format(
         "# seen {:.0f} px in radius, tilted up to about {:.0f} degrees\n", seen.body->radius_px,
         std::acos(std::min(1.0, seen.body->least_axis_ratio)) * 180.0 / std::numbers::pi);
   return text;
+}
+
+/// A guess must not look like a fact in the result: its doubt goes into the error bars.
+std::string prior_words(const Measures& body) {
+  std::string list;
+  if (!body.measured)
+    list += fmt::format("radius_m = [{:g}, {:g}], ", body.radius_m, 0.5 * body.radius_m);
+  if (body.ring)
+    list +=
+        fmt::format("inner_radius_m = [{:g}, {:g}], ", body.inner_radius_m, 0.1 * body.radius_m);
+  list += fmt::format("thickness_m = [{:g}, {:g}]", body.thickness_m, 0.5 * body.thickness_m);
+  return fmt::format(
+      "\n[fit]                      # guess, standard deviation: these widen the error bars; take "
+      "out what you have measured\nprior = {{ {} }}\n",
+      list);
 }
 
 std::string support_words(const Inspection& seen) {
@@ -124,8 +149,9 @@ std::string scene_text(const Options& options, const Inspection& seen, double ra
   if (seen.restless > 0.3)
     text += fmt::format("# {:.0f} % of the picture changes all the time: does the camera move?\n",
                         100.0 * seen.restless);
-  text += "# Every key: docs/formats.md\n\n" + body_words(seen, radius_mm) + support_words(seen) +
-          camera_words(seen, options.rate_hz);
+  const Measures body = measures_of(seen, radius_mm);
+  text += "# Every key: docs/formats.md\n\n" + body_words(seen, body) + support_words(seen) +
+          camera_words(seen, options.rate_hz) + prior_words(body);
   text +=
       "\n# [tracking]\n# objects = 2              # more than one body\n# from = 0.5               "
       "# seconds, or \"f120\"\n";

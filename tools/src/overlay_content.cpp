@@ -8,18 +8,12 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::optional<data::Scene> scene_of(const OverlayInput& input) {
   if (input.scene) return input.scene;
@@ -137,7 +131,7 @@ void OverlayContent::collect_times() {
   for (std::size_t i = 1; i < frame_times_.size(); ++i)
     steps_s.push_back((frame_times_[i].second - frame_times_[i - 1].second) /
                       static_cast<double>(frame_times_[i].first - frame_times_[i - 1].first));
-  frame_s_ = median_of(std::move(steps_s));
+  frame_s_ = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
 }
 
 double OverlayContent::time_of_frame(std::int64_t frame, double fallback_s) const {

@@ -272,7 +272,8 @@ void run(const Options& options) {
   const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : scene.run.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
   scene.run.rate_hz = kPerFrame * rate_hz;
-  const model::Trajectory trajectory = model::simulate(scene);
+  const model::Trajectory trajectory =
+      in_scene(options.scene, [&] { return model::simulate(scene); });
   const Motion motion(trajectory, scene.run.rate_hz);
   data::Camera camera = camera_of(options, scene, motion);
   if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))

@@ -242,6 +242,9 @@ std::string quality_section(const ReportFacts& facts) {
                     facts.last_s - facts.first_s));
   entry("gaps", facts.missing > 0 ? fmt::format("{} frames in {} gaps", facts.missing, facts.gaps)
                                   : "none");
+  entry("doubtful", facts.doubtful > 0
+                        ? fmt::format("{} samples (quality below 0.5)", facts.doubtful)
+                        : "none");
   entry("metres", file.camera.empty()
                       ? (facts.metres ? "as given in the file" : "unknown: pixels only")
                       : file.camera);

@@ -3,18 +3,12 @@
 #include <limits>
 
 #include "report_parts.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return kNaN;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void count_gaps(const data::Track& track, ReportFacts& facts) {
   for (std::size_t i = 1; i < track.samples.size(); ++i) {
@@ -59,9 +53,10 @@ ReportFacts gather(const ReportInput& input) {
         for (int axis = 0; axis < 2; ++axis)
           sigmas_m.push_back(std::sqrt(sample.covariance_m2(axis, axis)));
       ++facts.samples;
+      if (sample.doubtful()) ++facts.doubtful;
     }
   }
-  facts.median_sigma_m = median_of(std::move(sigmas_m));
+  facts.median_sigma_m = data::median(std::move(sigmas_m));
   if (input.fit && !input.fit->parameters.empty()) {
     facts.prediction = replay(*input.fit, input.tracks, input.fit_track);
     facts.residuals = residuals(input.tracks, facts.prediction, input.fit->noise_scale);

@@ -18,8 +18,9 @@ struct ReportFacts {
   std::vector<std::vector<Residual>> residuals;  ///< one list per track
   bool metres = true;                            ///< whether the track has a scale
   int samples = 0;
-  int gaps = 0;     ///< runs of frames without a sample between two samples
-  int missing = 0;  ///< frames in those gaps
+  int gaps = 0;      ///< runs of frames without a sample between two samples
+  int missing = 0;   ///< frames in those gaps
+  int doubtful = 0;  ///< samples of low quality
   double first_s = 0.0, last_s = 0.0;
   double rms_axis_m = 0.0;  ///< residual per axis
   double rms_axis_sigma =

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "canvas.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -26,12 +27,7 @@ double limit_mm(const std::vector<Residual>& list) {
       sizes.push_back(std::abs(residual.value_m[axis]) * kMmPerM);
       if (std::isfinite(residual.sigma_m[axis])) sigmas.push_back(residual.sigma_m[axis] * kMmPerM);
     }
-  const auto quantile = [](std::vector<double>& values, double q) {
-    if (values.empty()) return 0.0;
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-  };
-  const double limit = 1.15 * std::max(quantile(sizes, 0.995), 2.6 * quantile(sigmas, 0.5));
+  const double limit = 1.15 * std::fmax(data::quantile(sizes, 0.995), 2.6 * data::median(sigmas));
   return limit > 0.0 ? limit : 1.0;
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "trochoid/data/error.hpp"
@@ -27,6 +28,15 @@ data::Scene load_scene(const std::string& file_or_name) {
   throw InputError(fmt::format(
       "{}: neither a scene file nor a bundled scene; `trochoid simulate --list` names those",
       file_or_name));
+}
+
+std::string named_by_scene(const std::string& scene, const std::string& message) {
+  constexpr std::array<std::string_view, 9> kPlaces{
+      "[", "body.", "support.", "camera.", "tracking.", "model.", "start.", "run.", "fit."};
+  const bool of_a_key = std::any_of(kPlaces.begin(), kPlaces.end(), [&](std::string_view place) {
+    return message.starts_with(place);
+  });
+  return of_a_key && !scene.empty() ? fmt::format("{}: {}", scene, message) : message;
 }
 
 }  // namespace trochoid::tools

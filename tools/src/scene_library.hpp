@@ -3,6 +3,7 @@
 #include <string_view>
 #include <vector>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/scene.hpp"
 
 namespace trochoid::tools {
@@ -18,5 +19,18 @@ struct BundledScene {
 /// A scene file, or a bundled scene by name.
 /// @throws InputError naming the nearest bundled name if it is neither.
 [[nodiscard]] data::Scene load_scene(const std::string& file_or_name);
+
+/// The message with the scene's name before it where it speaks of one of a scene's keys.
+[[nodiscard]] std::string named_by_scene(const std::string& scene, const std::string& message);
+
+/// Runs `use`; what it finds wrong with a key of the scene is said with the scene's name.
+template <class Use>
+auto in_scene(const std::string& scene, const Use& use) {
+  try {
+    return use();
+  } catch (const InputError& error) {
+    throw InputError(named_by_scene(scene, error.what()));
+  }
+}
 
 }  // namespace trochoid::tools

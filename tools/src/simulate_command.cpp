@@ -111,7 +111,7 @@ void simulate_scene(const Options& options) {
                                           : fitted_scene(data::read_fit(options.fit), options.arc);
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene);
-  const model::Trajectory run = model::simulate(scene);
+  const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
   if (run.values.rows() == 0)
     throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
                                  options.scene, model::sentence(run.outcome)));

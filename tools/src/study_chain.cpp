@@ -16,6 +16,7 @@
 #include "tracking_chain.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // study chain: what each setting on the way from pixels to parameters buys, and what it costs.
@@ -112,10 +113,10 @@ FitOutcome measure(const FitSetting& setting, const Options& options) {
     sigmas.push_back(in_sigmas);
     integration.push_back(fit.integration_error_sigma);
   }
-  outcome.error = quantile(errors, 0.5);
-  outcome.error_sigma = quantile(sigmas, 0.5);
-  outcome.time_ms = quantile(times_ms, 0.5);
-  outcome.integration_sigma = quantile(integration, 0.5);
+  outcome.error = data::median(errors);
+  outcome.error_sigma = data::median(sigmas);
+  outcome.time_ms = data::median(times_ms);
+  outcome.integration_sigma = data::median(integration);
   return outcome;
 }
 

@@ -11,6 +11,7 @@
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "validators.hpp"
 
@@ -30,10 +31,6 @@ struct Options {
   fs::path out = "study-fits";
 };
 
-double median(std::vector<double> values) {
-  return quantile(std::move(values), 0.5);
-}
-
 void print_table(const std::vector<FitStrategy>& strategies, const std::vector<FitTrial>& trials) {
   fmt::print("{:<22} {:>8} {:>6} {:>10} {:>12} {:>10} {:>10}\n", "strategy", "optimum", "of",
              "unnoticed", "median error", "median ms", "90 % ms");
@@ -49,7 +46,8 @@ void print_table(const std::vector<FitStrategy>& strategies, const std::vector<F
       if (trial.optimum) error.push_back(trial.error);
     }
     fmt::print("{:<22} {:>8} {:>6} {:>10} {:>12.2e} {:>10.2f} {:>10.2f}\n", strategies[s].name,
-               good, count, unnoticed, median(error), median(time), quantile(time, 0.9));
+               good, count, unnoticed, data::median(error), data::median(time),
+               data::quantile(time, 0.9));
   }
 }
 

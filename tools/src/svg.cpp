@@ -141,8 +141,10 @@ void SvgPlot::bar(Range x, Range y, const char* colour) {
 }
 
 void SvgPlot::words(const Eigen::Vector2d& at, const std::string& text, const char* colour) {
-  body_ += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" fill=\"{}\">{}</text>", px_x(at.x()) + 7.0,
-                       px_y(at.y()) - 7.0, colour, escaped(text));
+  body_ += fmt::format(
+      "<text x=\"{:.2f}\" y=\"{:.2f}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"4\" "
+      "stroke-linejoin=\"round\" paint-order=\"stroke\">{}</text>",
+      px_x(at.x()) + 7.0, px_y(at.y()) - 7.0, colour, ink::paper, escaped(text));
 }
 
 void SvgPlot::key(const std::string& text, const char* colour, bool line) {

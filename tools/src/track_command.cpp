@@ -1,4 +1,5 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cstdio>
@@ -48,6 +49,21 @@ void write_timing(const fs::path& track, double seconds, const tracking::TrackSu
   fs::path path = track;
   path.replace_extension(".timing.json");
   data::write_text(timing.dump(2) + "\n", path);
+}
+
+/// Frame by frame what deserves a look: gaps, and samples to be doubted.
+void detail_tracks(const data::TrackFile& file) {
+  for (const std::string& line : file.notes) detail(line);
+  for (const data::Track& track : file.tracks) {
+    if (track.samples.empty()) continue;
+    std::vector<std::int64_t> doubtful;
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.doubtful()) doubtful.push_back(sample.frame);
+    detail(fmt::format("object {}: {} samples, frames {} to {}; doubtful frames: {}", track.object,
+                       track.samples.size(), track.samples.front().frame,
+                       track.samples.back().frame,
+                       doubtful.empty() ? "none" : fmt::format("{}", fmt::join(doubtful, ", "))));
+  }
 }
 
 /// How many frames showed what, for people or for scripts.
@@ -108,6 +124,7 @@ void run(const Options& options) {
   }
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   write_timing(options.output, elapsed.count(), result.summary);
+  detail_tracks(result.file);
   tell(options, result, interpolated);
   const auto wanted = static_cast<std::size_t>(scene.tracking.objects);
   if (result.file.tracks.size() < wanted)

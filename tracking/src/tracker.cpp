@@ -323,8 +323,8 @@ class Tracking {
       const auto found = static_cast<std::int64_t>(samples.size());
       result.summary.found += found;
       result.summary.lost += frames_ - found;
-      result.summary.doubtful += std::count_if(samples.begin(), samples.end(),
-                                               [](const auto& s) { return s.quality < 0.5; });
+      result.summary.doubtful +=
+          std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
     result.file.camera = words;
     result.summary.camera_words = words;

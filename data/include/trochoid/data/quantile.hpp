@@ -1,0 +1,12 @@
+#pragma once
+#include <vector>
+
+namespace trochoid::data {
+
+/// The value below which a share (0..1) of the values lies, linear between neighbours in order.
+/// NaN without values.
+[[nodiscard]] double quantile(std::vector<double> values, double share);
+
+[[nodiscard]] double median(std::vector<double> values);
+
+}  // namespace trochoid::data

@@ -1,0 +1,23 @@
+#include "trochoid/data/quantile.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace trochoid::data {
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto low = values.begin() + static_cast<std::ptrdiff_t>(std::floor(place));
+  std::nth_element(values.begin(), low, values.end());
+  const double rest = place - std::floor(place);
+  return rest > 0.0 ? std::lerp(*low, *std::min_element(low + 1, values.end()), rest) : *low;
+}
+
+double median(std::vector<double> values) {
+  return quantile(std::move(values), 0.5);
+}
+
+}  // namespace trochoid::data
