@@ -71,13 +71,15 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
   return start;
 }
 
-// Without angles neighbouring valleys explain the path nearly as well as the right one.
+// Without angles neighbouring valleys explain the path nearly as well as the right one; a sliding
+// body has some with them too.
 Found look_about(const Problem& problem, Found found) {
   constexpr int kMisses = 3;
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
-  if (seen || !rim || (!slides && surely_explained(problem, found))) return found;
+  if (!rim || (seen && !slides)) return found;
+  if ((seen || !slides) && surely_explained(problem, found)) return found;
   return hop(problem, std::move(found), kMisses);
 }
 
@@ -111,11 +113,12 @@ Found search_path(const Problem& problem, const Quest& quest) {
     const Start plain = with_given_losses(problem, near);
     if (take(grow(problem, plain, std::max(24, all / 4), kSlowly))) return best;
   }
-  if (!searched) take(search(problem, quest.starter));
+  if (!searched && !exhausted(problem, best)) take(search(problem, quest.starter));
   return best;
 }
 
-Found find_arc(const Problem& problem, const Quest& quest) {
+Found find_arc(Problem problem, const Quest& quest) {
+  if (!problem.work) problem.work = std::make_shared<double>(0.0);
   const bool spins = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
     return problem.predictor->parameters()[p.index].name == "psi_rad";
   });

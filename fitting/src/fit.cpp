@@ -50,14 +50,19 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
 // Integrates ever finer until that no longer shows. @returns the integration error left, in sigma.
 double silence_integration(Problem& problem, Solution& solution, double fixed_tolerance) {
   constexpr double kSilent = 0.01, kFinest = 1e-12;
+  // From a minimum of a slightly other cost; more than a few steps only follow its noise.
+  constexpr double kMostSteps = 12.0, kFewest = 3.0, kMostWork = 1e6;
+  problem.work = std::make_shared<double>(0.0);
   double error = integration_error_sigma(problem, solution.u);
   while (fixed_tolerance <= 0.0 && error > kSilent && problem.tolerance > kFinest) {
     problem.tolerance *= 1e-2;
-    // From a minimum of a slightly other cost; more than a few steps only follow its noise.
-    Solution finer = solve(problem, solution.u, {.iterations = 12, .function_tolerance = 1e-7});
+    const double step = 6.0 * *problem.work;  // two runs were made; this is about one's derivatives
+    const int steps = static_cast<int>(std::clamp(kMostWork / step, kFewest, kMostSteps));
+    Solution finer = solve(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
     if (!finer.usable) break;
     finer.converged = finer.converged || solution.converged;
     solution = std::move(finer);
+    *problem.work = 0.0;
     error = integration_error_sigma(problem, solution.u);
   }
   return error;

@@ -59,7 +59,9 @@ Found hop(const Problem& problem, Found best, int misses) {
   std::normal_distribution<double> normal;
   Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
   bool fresh = true;
-  for (int round = 0, missed = 0; round < kMostRounds && missed < misses && L.size() > 0; ++round) {
+  for (int round = 0, missed = 0;
+       round < kMostRounds && missed < misses && L.size() > 0 && !exhausted(problem, best);
+       ++round) {
     double least = std::numeric_limits<double>::infinity();
     Eigen::VectorXd from;
     if (fresh) {

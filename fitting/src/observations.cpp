@@ -152,25 +152,61 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
 
 namespace {
 
-// Distance of each reading of a channel from the middle of its neighbours, the median over the
-// pairs m samples before and after; what curvature adds is common to all and enters the scale.
-std::vector<double> neighbour_distance(const std::vector<const Reading*>& readings) {
-  constexpr int kPairs = 4;
+// Typical rate of an angle about a reading: the median over the steps near it [rad/s].
+double local_rate(const ArcData& arc, const std::vector<const Reading*>& readings, int about) {
+  constexpr int kSteps = 8;
+  const int n = static_cast<int>(readings.size());
+  std::vector<double> rates;
+  for (int i = std::max(0, about - kSteps); i < std::min(n - 1, about + kSteps); ++i)
+    rates.push_back(wrapped(readings[i + 1]->value.x() - readings[i]->value.x()) /
+                    (arc.t_s[readings[i + 1]->sample] - arc.t_s[readings[i]->sample]));
+  return median(std::move(rates));
+}
+
+// How far a reading lies off the chord between the readings m before and after it, and what a
+// curved path adds to that per unit of its second derivative.
+struct OffChord {
+  Eigen::Vector2d off;
+  double sag_s2;
+};
+
+OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readings, int at, int m,
+                   double rate) {
+  const Reading &before = *readings[at - m], &after = *readings[at + m];
+  const double whole_s = arc.t_s[after.sample] - arc.t_s[before.sample];
+  const double part_s = arc.t_s[readings[at]->sample] - arc.t_s[before.sample];
+  const Eigen::Vector2d here = readings[at]->value - before.value;
+  const Eigen::Vector2d way = after.value - before.value;
+  const double sag_s2 = 0.5 * part_s * (whole_s - part_s);
+  if (before.channel == Channel::position) return {here - part_s / whole_s * way, sag_s2};
+  const double off =
+      wrapped(here.x() - rate * part_s - part_s / whole_s * wrapped(way.x() - rate * whole_s));
+  return {{off, 0.0}, sag_s2};
+}
+
+// Distance of each reading of a channel from the parabola through two pairs of its neighbours, the
+// lower third over such pairs: where every fifth reading is wrong, more than half of them are.
+std::vector<double> neighbour_distance(const ArcData& arc,
+                                       const std::vector<const Reading*>& readings) {
+  constexpr int kFarthest = 6;
   const int n = static_cast<int>(readings.size());
   std::vector<double> distance(n, 0.0);
   for (int i = 0; i < n; ++i) {
+    const bool planar = readings[i]->channel == Channel::position;
+    const double rate = planar ? 0.0 : local_rate(arc, readings, i);
+    std::vector<OffChord> chords;
+    for (int m = 1; m <= std::min({kFarthest, i, n - 1 - i}); ++m)
+      chords.push_back(off_chord(arc, readings, i, m, rate));
     std::vector<double> off;
-    for (int m = 1; m <= kPairs; ++m) {
-      const int before = i - m, after = i + m;
-      if (before < 0 || after >= n) continue;
-      const Eigen::Vector2d p = readings[before]->value, q = readings[after]->value;
-      if (readings[i]->channel == Channel::position)
-        off.push_back((readings[i]->value - 0.5 * (p + q)).norm());
-      else
-        off.push_back(
-            std::abs(wrapped(readings[i]->value.x() - p.x() - 0.5 * wrapped(q.x() - p.x()))));
-    }
-    if (!off.empty()) distance[i] = median(std::move(off));
+    for (const OffChord& near : chords)
+      for (const OffChord& far : chords)
+        if (far.sag_s2 > 2.0 * near.sag_s2)
+          off.push_back((far.sag_s2 * near.off - near.sag_s2 * far.off).norm() /
+                        (far.sag_s2 - near.sag_s2));
+    if (off.empty()) continue;
+    const auto third = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 3);
+    std::nth_element(off.begin(), third, off.end());
+    distance[i] = *third;
   }
   return distance;
 }
@@ -186,7 +222,7 @@ std::vector<int> consistent_samples(const ArcData& arc) {
     for (const Reading& reading : arc.readings)
       if (reading.channel == channel) readings.push_back(&reading);
     if (readings.size() < 24) continue;
-    const std::vector<double> distance = neighbour_distance(readings);
+    const std::vector<double> distance = neighbour_distance(arc, readings);
     const double limit = kFar * median(distance);
     for (std::size_t i = 0; i < readings.size(); ++i)
       if (distance[i] > limit) doubtful[readings[i]->sample] = true;
@@ -196,7 +232,7 @@ std::vector<int> consistent_samples(const ArcData& arc) {
     all.push_back(i);
     if (!doubtful[i]) kept.push_back(i);
   }
-  return 5 * kept.size() > 4 * all.size() ? kept : all;
+  return 5 * kept.size() > 3 * all.size() ? kept : all;
 }
 
 double excess_scatter(const ArcData& arc, Channel channel) {

@@ -304,6 +304,30 @@ void name_attitudes(Problem& problem) {
   }
 }
 
+namespace {
+
+// Rows after the model's end repeat the last ones before it.
+void lie_still(const ArcData& arc, model::Prediction& prediction) {
+  const auto width = static_cast<Eigen::Index>(arc.observables.size());
+  Eigen::Index last = 0;
+  while (last + width < prediction.values.size() && std::isfinite(prediction.values[last + width]))
+    last += width;
+  for (Eigen::Index row = last + width; row < prediction.values.size(); row += width) {
+    prediction.values.segment(row, width) = prediction.values.segment(last, width);
+    prediction.jacobian.middleRows(row, prediction.jacobian.rows() > 0 ? width : 0) =
+        prediction.jacobian.middleRows(last, prediction.jacobian.rows() > 0 ? width : 0);
+  }
+}
+
+// A step with up to eight derivatives costs about six plain ones.
+void count_work(const Problem& problem, std::size_t derivatives, int steps) {
+  if (!problem.work) return;
+  const double times = derivatives == 0 ? 1.0 : 6.0 * static_cast<double>((derivatives + 7) / 8);
+  *problem.work += times * steps;
+}
+
+}  // namespace
+
 bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
               Eigen::MatrixXd* jacobian, bool held_too) {
   const ArcData& data = problem.arcs[arc];
@@ -329,6 +353,8 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   } catch (const Error&) {  // outside the model's range: a rejected step
     return false;
   }
+  count_work(problem, request.derivatives.size(), prediction.steps);
+  if (prediction.outcome == model::Outcome::flat) lie_still(data, prediction);
   if (jacobian != nullptr && request.derivatives.size() < columns.size()) {
     Eigen::MatrixXd all =
         Eigen::MatrixXd::Zero(prediction.values.size(), static_cast<int>(columns.size()));

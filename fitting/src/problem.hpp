@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,6 +53,8 @@ struct Problem {
   Timing timing;
   bool rough = false;  ///< a search may end near the minimum: only a start is wanted
   std::function<void(const std::string& line)> log;  ///< may be empty
+  /// Integration steps taken so far, one with derivatives counted by its cost; null: not counted.
+  std::shared_ptr<double> work;
 
   [[nodiscard]] int shared_count() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0
@@ -78,7 +81,8 @@ struct Problem {
 [[nodiscard]] Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                                    const data::Scene& scene);
 
-/// Whitened, weighted residuals of one arc and their derivatives by u (columns_of order).
+/// Whitened, weighted residuals of one arc and their derivatives by u (columns_of order). A body
+/// that falls flat before the arc ends lies still from then on.
 /// Returns false if the model has no prediction there (never leaves NaN behind).
 /// @param held_too  false: derivatives by held parameters are not computed but zero.
 [[nodiscard]] bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u,

@@ -70,7 +70,7 @@ bool settles_it(const Problem& problem, const Found& best) {
 Found search_briefly(const Problem& problem, const Starter& starter) {
   // Where the angles were seen, starts differ little and a good one is known by its result.
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
-  const std::size_t tried = seen ? 2 : 5;
+  const std::size_t tried = seen ? 3 : 5;
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
@@ -78,7 +78,7 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, 1.5, &valleys);
       if (better(found, best)) best = std::move(found);
-      if (settles_it(problem, best)) return best;
+      if (settles_it(problem, best) || exhausted(problem, best)) return best;
       if (seen && best.unexplained < kExplained) return best;
     }
     if (best.unexplained < kExplained) return best;
@@ -105,7 +105,7 @@ std::vector<Start> settled(const Problem& window, const Starter& starter) {
   for (FreeParameter& parameter : plain.free) parameter.held |= is_loss(plain, parameter);
   std::vector<std::pair<double, Start>> ends;
   const std::vector<Start> starts = screened(window, starter);
-  for (std::size_t i = 0; i < std::min(kSettled, starts.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kSettled, starts.size()) && !exhausted(window, {}); ++i) {
     Problem trial = plain;
     apply(starts[i], trial);
     const Solution end =
@@ -136,14 +136,15 @@ Found search_widely(const Problem& problem, const Starter& starter, Found best) 
     const std::vector<Start> starts = settled(windowed(problem, window), starter);
     for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, kSlowly);
-      if (!found.solution.usable) continue;
+      if (!found.solution.usable && !exhausted(problem, best)) continue;
       const double gain = best.reduced_chi2 / found.reduced_chi2 - 1.0;
       if (!best.solution.usable || gain > kSameValley)
         reached = 1;
       else if (gain > -kSameValley)
         ++reached;
       if (better(found, best)) best = std::move(found);
-      if (settles_it(problem, best) || best.unexplained < kExplained || reached >= kOftenEnough)
+      if (settles_it(problem, best) || best.unexplained < kExplained || reached >= kOftenEnough ||
+          exhausted(problem, best))
         return best;
     }
   }
@@ -160,9 +161,16 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   // A sliding body's derivatives are dear, and few of its starts lead anywhere.
   const bool brief = seen || !slides || effort == Effort::brief;
   if (brief) best = search_briefly(problem, starter);
-  if (settles_it(problem, best) || !rim || effort == Effort::brief || best.unexplained < kExplained)
+  if (settles_it(problem, best) || !rim || effort == Effort::brief ||
+      best.unexplained < kExplained || exhausted(problem, best))
     return best;
-  return search_widely(problem, starter, std::move(best));
+  best = search_widely(problem, starter, std::move(best));
+  if (best.solution.usable || !seen) return best;
+  // Angles that lead nowhere: starts from the positions alone.
+  const Starter blind = [&](const ArcData& window) {
+    return starter(window.without(Channel::phi));
+  };
+  return search_widely(problem, blind, std::move(best));
 }
 
 Found from_best_start(const Problem& problem, const Starter& starter) {

@@ -169,12 +169,12 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   solution.iterations = static_cast<int>(summary.iterations.size()) - 1;
   solution.message = summary.message;
   if (problem.log)
-    problem.log(
-        fmt::format("{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} iterations, {} "
-                    "derivatives, {:.3g} s: {}",
-                    problem.rows(), problem.free.size(), 2.0 * summary.initial_cost, solution.chi2,
-                    solution.iterations, summary.num_jacobian_evaluations,
-                    summary.total_time_in_seconds, summary.message));
+    problem.log(fmt::format(
+        "{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} iterations, {} "
+        "derivatives, {:.3g} s, work {:.3g}: {}",
+        problem.rows(), problem.free.size(), 2.0 * summary.initial_cost, solution.chi2,
+        solution.iterations, summary.num_jacobian_evaluations, summary.total_time_in_seconds,
+        problem.work ? *problem.work : 0.0, summary.message));
   return solution;
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "smoothing.hpp"
@@ -92,16 +93,58 @@ std::vector<double> steady_rates(const RimShape& q, double theta, double vn) {
   return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
 }
 
+// Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
+// line's value at an instant: a third of the readings may be wrong.
+std::pair<double, double> robust_line(const AngleSeries& series, int count, double t_s) {
+  std::vector<double> slopes, values;
+  for (int i = 0; i < count; ++i)
+    for (int k = i + 1; k < count; ++k)
+      slopes.push_back((series.value(k, 0) - series.value(i, 0)) / (series.t_s[k] - series.t_s[i]));
+  const double slope = median(std::move(slopes));
+  for (int i = 0; i < count; ++i)
+    values.push_back(series.value(i, 0) - slope * (series.t_s[i] - t_s));
+  return {median(std::move(values)), slope};
+}
+
+// The same for an angle that turns up to a quarter of a turn per sample and may be half a turn off:
+// the rate that aligns twice the angles best, then the side that more of them are on.
+std::pair<double, double> robust_turning(const AngleSeries& series, int count, double t_s) {
+  const double span_s = series.t_s[count - 1] - series.t_s[0];
+  const double fastest = 0.5 * kPi * (count - 1) / span_s;
+  constexpr int kPerPeak = 8;  // rates looked at over the width of a peak
+  const int steps = kPerPeak * count;
+  const auto aligned = [&](double rate, double times) {
+    std::complex<double> sum = 0.0;
+    for (int i = 0; i < count; ++i)
+      sum += std::polar(1.0, times * (series.value(i, 0) - rate * (series.t_s[i] - t_s)));
+    return sum;
+  };
+  double best = 0.0, turning = 0.0;
+  for (int i = -steps; i <= steps; ++i) {
+    const double rate = fastest * i / steps, size = std::abs(aligned(rate, 2.0));
+    if (size > best) best = size, turning = rate;
+  }
+  double azimuth = 0.5 * std::arg(aligned(turning, 2.0));
+  if ((aligned(turning, 1.0) * std::polar(1.0, -azimuth)).real() < 0.0) azimuth += kPi;
+  return {azimuth, turning};
+}
+
 std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const Motion& motion) {
   const AngleSeries theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
-  if (theta.t_s.size() < 8 || phi.t_s.size() < 8) return {};
-  const auto [tilt, tilting] = at(theta, arc.start_s);
-  const auto [azimuth, turning] = at(phi, arc.start_s);
-  const double clamped = std::clamp(tilt, 0.03, kPi - 0.03);
+  const int fewest = static_cast<int>(std::min(theta.t_s.size(), phi.t_s.size()));
+  if (fewest < 8) return {};
   std::vector<Start> starts;
+  const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
+                       double share) {
+    const double clamped = std::clamp(tilt.first, 0.03, kPi - 0.03);
+    starts.push_back(state(motion, shape, clamped, turn.first, share * tilt.second,
+                           turn.second * std::sin(clamped), "windows"));
+  };
   for (const double share : {1.0, 0.5})  // the rate at an edge of the window is its noisiest number
-    starts.push_back(state(motion, shape, clamped, azimuth, share * tilting,
-                           turning * std::sin(clamped), "windows"));
+    add(at(theta, arc.start_s), at(phi, arc.start_s), share);
+  for (const int count : {8, 16, 32})
+    if (count <= fewest)
+      add(robust_line(theta, count, arc.start_s), robust_turning(phi, count, arc.start_s), 1.0);
   return starts;
 }
 

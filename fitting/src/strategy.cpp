@@ -55,9 +55,16 @@ bool surely_explained(const Problem& problem, const Found& best) {
          best.reduced_chi2 < 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
 }
 
+bool exhausted(const Problem& problem, const Found& best) {
+  constexpr double kNearly = 0.03;  // of the variance
+  const double most = best.unexplained < kNearly ? 6e6 : 1e7;
+  return problem.work && *problem.work > most;
+}
+
 bool surely_found(const Problem& problem, const Found& best) {
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
+  if (exhausted(problem, best)) return true;
   if (seen || !slides) return best.passed || best.unexplained < kExplained;
   return surely_explained(problem, best);
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <numbers>
 #include <random>
 #include <sstream>
 
@@ -96,6 +97,52 @@ TEST_F(RimFit, FindsARollingDiscFromItsPathAlone) {
   EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar);
   EXPECT_LT(pull(fit, "w3_rad_s", 3.0), kFar);
   EXPECT_LT(fit.find("theta_rad")->sigma, 0.02);
+}
+
+// A tracker's bad day: every fifth sample is wrong (another outline's place, the azimuth a quarter
+// or half a turn off, any tilt), and stretches are missing.
+Case with_faults(const std::string& name, double until_s, std::size_t step) {
+  Case made = noisy(name, until_s, 2e-4, step);
+  const auto columns = columns_of(reference_folder() + name + ".csv");
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  data::Track faulty;
+  for (std::size_t i = 0; i < made.track.samples.size(); ++i) {
+    if (i % 60 > 53) continue;
+    data::TrackSample sample = made.track.samples[i];
+    double theta = columns.at("theta")[step * i] + 0.02 * normal(generator);
+    double phi = columns.at("phi")[step * i] + 0.03 * normal(generator);
+    const double fault = uniform(generator);
+    if (fault < 0.05)
+      sample.centre_m.x() += 0.01 * normal(generator);
+    else if (fault < 0.1)
+      phi += std::numbers::pi;
+    else if (fault < 0.15)
+      phi += (fault < 0.125 ? 0.5 : -0.5) * std::numbers::pi;
+    else if (fault < 0.2)
+      theta = 0.1 + 1.3 * uniform(generator);
+    sample.theta = data::MeasuredAngle{theta, 0.02};
+    sample.phi = data::MeasuredAngle{phi, 0.03};
+    faulty.samples.push_back(sample);
+  }
+  made.track = faulty;
+  return made;
+}
+
+TEST_F(RimFit, IsNotMisledByEveryFifthSample) {
+  const Case disc = with_faults("s06_roll_disc", 2.0, 4);
+  const data::Fit rolling = fitting::fit(std::span(&disc.track, 1), disc.scene);
+  ASSERT_TRUE(rolling.converged) << rolling.reason;
+  EXPECT_LT(pull(rolling, "theta_rad", 1.2217304763960306), kFar);
+  EXPECT_LT(pull(rolling, "w2_rad_s", 22.5526228988618), kFar);
+  EXPECT_LT(pull(rolling, "w3_rad_s", 3.0), kFar);
+  EXPECT_NEAR(rolling.noise_scale, 1.0, 0.15);
+  const Case ring = with_faults("s09_ring_retrograde_drag", 4.0, 2);
+  const data::Fit retrograde = fitting::fit(std::span(&ring.track, 1), ring.scene);
+  ASSERT_TRUE(retrograde.converged) << retrograde.reason;
+  EXPECT_LT(pull(retrograde, "air_linear_N_m_s[1]", 2.5e-6), kFar);
+  EXPECT_LT(pull(retrograde, "air_linear_N_m_s[3]", 1.5e-5), kFar);
 }
 
 TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
@@ -309,6 +356,54 @@ TEST_F(RimFit, LeavesMirroredFramesAside) {
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar);
   EXPECT_LT(pull(fit, "w3_rad_s", 3.0), kFar);
+}
+
+// The clip goes on after the disc has fallen flat.
+TEST(FlatEnd, IsPartOfTheTrack) {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.0375;
+  body.thickness_m = 0.005;
+  body.mass_kg = 0.06;
+  scene.model.name = "rolling";
+  scene.model.rolling_friction_m = 1e-3;
+  scene.start.theta_rad = 0.6;
+  scene.start.w2_rad_s = 18.0;
+  scene.start.w3_rad_s = 1.5;
+  const auto predictor = model::make_predictor(scene);
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = predictor->parameters()[i].value;
+  std::vector<double> t_s;
+  for (int i = 0; i < 600; ++i) t_s.push_back(i / 120.0);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.observables = {model::Observable::x_m, model::Observable::y_m,
+                         model::Observable::theta_rad, model::Observable::phi_rad};
+  const model::Prediction run = predictor->predict(values, request);
+  ASSERT_EQ(run.outcome, model::Outcome::flat);
+  ASSERT_GT(run.valid_until_s, 1.0);
+  std::mt19937_64 generator(9);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  Eigen::Vector4d seen = Eigen::Vector4d::Zero();
+  for (int i = 0; i < 600; ++i) {
+    const bool flat = !std::isfinite(run.values[4 * i]);
+    if (!flat) seen = run.values.segment<4>(4 * i);
+    data::TrackSample sample;
+    sample.t_s = t_s[i];
+    sample.centre_m = seen.head<2>() + 1e-4 * Eigen::Vector2d(normal(generator), normal(generator));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * 1e-8;
+    sample.theta = data::MeasuredAngle{seen[2] + 0.01 * normal(generator), 0.01};
+    if (!flat) sample.phi = data::MeasuredAngle{seen[3] + 0.03 * normal(generator), 0.03};
+    track.samples.push_back(sample);
+  }
+  scene.start = {};
+  scene.model.rolling_friction_m = 1e-4;
+  const data::Fit fit = fitting::fit(std::span(&track, 1), scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "rolling_friction_m", 1e-3), kFar);
+  EXPECT_LT(fit.find("rolling_friction_m")->sigma, 2e-5);
+  EXPECT_LT(pull(fit, "theta_rad", 0.6), kFar);
 }
 
 }  // namespace
