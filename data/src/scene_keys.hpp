@@ -24,6 +24,9 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr Range kAny{-kLargest, kLargest, true, "a finite number"};
 constexpr Range kPositive{0.0, kLargest, false, "greater than 0"};
 constexpr Range kNonNegative{0.0, kLargest, true, "0 or greater"};
+// A body of 45 m is one of 45 mm.
+constexpr Range kSize{0.0, 10.0, false, "in metres, greater than 0 and at most 10"};
+constexpr Range kSizeOrNone{0.0, 10.0, true, "in metres, 0 to 10"};
 constexpr Range kTilt{0.0, kPi, true, "between 0 (lying flat) and pi"};
 constexpr Range kTolerance{1e-15, 0.1, true, "between 1e-15 (finer is below rounding) and 0.1"};
 constexpr Range kObjects{1.0, 64.0, true, "a whole number in 1..64"};
@@ -51,11 +54,11 @@ void mark_keys(Visit&& visit) {
 template <class Visit>
 void body_keys(Visit&& visit) {
   visit("kind", &Body::kind, kBodyKinds);
-  visit("radius_m", &Body::radius_m, kPositive);
-  visit("inner_radius_m", &Body::inner_radius_m, kNonNegative);
-  visit("thickness_m", &Body::thickness_m, kNonNegative);
-  visit("axle_radius_m", &Body::axle_radius_m, kNonNegative);
-  visit("axle_above_m", &Body::axle_above_m, kNonNegative);
+  visit("radius_m", &Body::radius_m, kSize);
+  visit("inner_radius_m", &Body::inner_radius_m, kSizeOrNone);
+  visit("thickness_m", &Body::thickness_m, kSizeOrNone);
+  visit("axle_radius_m", &Body::axle_radius_m, kSizeOrNone);
+  visit("axle_above_m", &Body::axle_above_m, kSizeOrNone);
   visit("mass_kg", &Body::mass_kg, kPositive);
   visit("I_kg_m2", &Body::I_kg_m2, kPositive);
   visit("Is_kg_m2", &Body::Is_kg_m2, kPositive);

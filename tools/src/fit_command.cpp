@@ -128,8 +128,9 @@ void add_fit_command(CLI::App& app) {
       ->required();
   fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors");
   fit->add_option("--model,-m", command->options.model,
-                  "top, rolling, sliding, puck, pivot or auto (compare, as where the scene names "
-                  "none); overrides the scene's");
+                  "Model to fit, or auto: compare, as where the scene names none; overrides the "
+                  "scene's")
+      ->check(fitted_model());
   fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
   fit->add_option("--object", command->object, "Fit this object of the track only");
   fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");

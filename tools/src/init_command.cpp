@@ -73,14 +73,15 @@ std::string body_words(const Inspection& seen, const Measures& body) {
               ? "kind = \"ring\"             # the floor shows through its middle; else \"disc\"\n"
               : "kind = \"disc\"             # nothing shows through its middle; else \"ring\"\n";
   text += fmt::format(
-      "radius_m = {:<12g} # {}\n", body.radius_m,
+      "radius_m = {:<15g} # {}\n", body.radius_m,
       body.measured ? "outer rim"
                     : "NOT MEASURED, a placeholder: every length in the result scales with it");
   if (body.ring)
-    text += fmt::format("inner_radius_m = {:<6g} # the bore: a guess, measure it\n",
+    text += fmt::format("inner_radius_m = {:<9g} # the bore: a guess, measure it\n",
                         body.inner_radius_m);
-  text += fmt::format("thickness_m = {:<9g} # a guess, measure it\n", body.thickness_m);
+  text += fmt::format("thickness_m = {:<12g} # a guess, measure it\n", body.thickness_m);
   text += "# mass_kg = 0.03           # from the balance; needed for forces and losses\n";
+  text += "# mark = { distance_m = 0.02, size_m = 0.003 }   # a dot on the face shows the spin\n";
   if (seen.body)
     text += fmt::format(
         "# seen {:.0f} px in radius, tilted up to about {:.0f} degrees\n", seen.body->radius_px,
@@ -104,15 +105,18 @@ std::string prior_words(const Measures& body) {
 }
 
 std::string support_words(const Inspection& seen) {
+  constexpr double kStays = 0.1;  // of its radius: what turns on the spot is held there
   const bool flat = seen.body && seen.body->least_axis_ratio > kFlatRatio;
-  std::string text = "\n[support]\n";
-  text +=
-      flat
-          ? "kind = \"flat\"             # its outline never gets narrow: it slides on its face\n"
-          : "kind = \"floor\"            # its outline gets narrow: it tilts and runs on its rim\n";
-  text += "# kind = \"pivot\"           # or turns about a fixed point:\n";
-  text += "# pivot_m = [0, 0, 0]\n";
-  return text;
+  const bool held = flat && seen.body->travel_px < kStays * seen.body->radius_px;
+  const char* kind = held ? "pivot" : flat ? "flat" : "floor";
+  const char* why = held   ? "its centre stays: it turns about a fixed point"
+                    : flat ? "its outline never gets narrow: it slides on its face"
+                           : "its outline gets narrow: it tilts and runs on its rim";
+  return fmt::format(
+      "\n[support]\nkind = {:<19} # {}\n# \"floor\": runs on its rim; \"flat\": slides on its "
+      "face; \"pivot\": turns about a fixed point,\n# a disc on a pin, or a top (then pivot_m = "
+      "[0.01, 0.02, 0.03] says where, in metres)\n",
+      fmt::format("\"{}\"", kind), why);
 }
 
 std::string camera_words(const Inspection& seen, const std::optional<double>& rate_hz) {
@@ -122,10 +126,10 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
   const auto captured = seen.video.capture_rate_hz;
   if (rate_hz)
-    text += fmt::format("frame_rate_hz = {:<9g}# as given\n", *rate_hz);
+    text += fmt::format("frame_rate_hz = {:<10g} # as given\n", *rate_hz);
   else if (captured && std::abs(*captured - seen.video.frame_rate_hz) > 0.05 * *captured)
     text += fmt::format(
-        "frame_rate_hz = {:<9g}# the file says it was filmed at this rate and plays at {:.4g}\n",
+        "frame_rate_hz = {:<10g} # the file says it was filmed at this rate and plays at {:.4g}\n",
         *captured, seen.video.frame_rate_hz);
   else
     text += "# frame_rate_hz = 240      # the true rate, if this was filmed in slow motion\n";
@@ -161,6 +165,7 @@ std::string scene_text(const Options& options, const Inspection& seen, double ra
 void run(Options options) {
   if (options.output.empty())
     options.output = fs::path(options.video).replace_extension(".toml").filename();
+  check_output(options.output, {options.video});
   if (fs::exists(options.output) && !options.force)
     throw InputError(
         fmt::format("{}: exists already; name another with -o or replace it with --force",

@@ -135,6 +135,19 @@ PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
   return replayed;
 }
 
+// A disc on a pivot is drawn where it was seen: its place is no prediction.
+void put_where_seen(PredictedArc& arc, const data::Track& track) {
+  Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+  int count = 0;
+  for (const data::TrackSample& sample : track.samples) {
+    if (!sample.has_metres()) continue;
+    sum_m += sample.centre_m;
+    ++count;
+  }
+  if (count == 0) return;
+  for (data::Pose<>& pose : arc.pose) pose.centre_m.head<2>() = sum_m / count;
+}
+
 }  // namespace
 
 PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int track_index) {
@@ -142,8 +155,10 @@ PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int tr
   const auto predictor = model::make_predictor(scene);
   PredictedPath path{.model = predictor->model_name(), .arcs = {}};
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
-    if (const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index))
+    if (const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index)) {
       path.arcs.push_back(replay_arc(*predictor, fit, scene, *track, i));
+      if (path.angles_alone()) put_where_seen(path.arcs.back(), *track);
+    }
   if (path.arcs.empty())
     throw InputError(fmt::format(
         "the fit holds no arc of this track (object or track number {} is missing); give the fit "
@@ -203,6 +218,7 @@ std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
   std::vector<std::vector<Residual>> all;
   for (const data::Track& track : tracks.tracks) {
     std::vector<Residual>& list = all.emplace_back();
+    if (path.angles_alone()) continue;
     for (const data::TrackSample& sample : track.samples) {
       const auto pose = path.at(track.object, sample.t_s);
       if (!sample.has_metres() || !pose) continue;

@@ -30,6 +30,8 @@ struct PredictedPath {
   /// Pose at a time within an arc of the object; nothing outside.
   [[nodiscard]] std::optional<data::Pose<>> at(int object, double t_s) const;
   [[nodiscard]] const PredictedArc* arc_at(int object, double t_s) const;
+  /// A disc on a fixed pivot: where it is was given, not predicted.
+  [[nodiscard]] bool angles_alone() const { return model == "pivot"; }
 };
 
 /// Replays a fit: rebuilds its model from the scene stored in it and runs it with the fitted

@@ -112,7 +112,8 @@ std::string parameter_section(const data::Fit& fit) {
           escaped(parameter.name), given || !parameter.identifiable ? "" : " strong",
           shown ? with_superscripts(value_words(parameter.value, parameter.sigma))
                 : fmt::format("{} ± ∞", short_number(parameter.value)),
-          escaped(parameter.unit), status_words(parameter), escaped(parameter.note));
+          parameter.unit == "1" ? "" : escaped(parameter.unit), status_words(parameter),
+          escaped(parameter.note));
     }
   html += "</tbody></table></div>";
   html += fmt::format(
@@ -182,15 +183,29 @@ std::string correlation_table(const data::Fit& fit) {
   return html + "</tbody></table></div>";
 }
 
+std::string names_of_unseen(const data::Fit& fit) {
+  std::string names;
+  for (const data::FitParameter& parameter : fit.parameters)
+    if (!parameter.identifiable) names += (names.empty() ? "" : ", ") + parameter.name;
+  return names;
+}
+
 std::string identifiability_section(const data::Fit& fit) {
   std::string html = "<section class=\"long\"><h2>What the recording can tell</h2>";
   const std::size_t free = fit.covariance_names.size();
-  if (fit.null_vectors.empty())
+  if (!fit.converged)
+    html +=
+        "<p>This fit does not describe the recording; what follows says what it could tell if it "
+        "did.</p>";
+  if (fit.null_vectors.empty()) {
+    const std::string faint = names_of_unseen(fit);
     html += fmt::format(
-        "<p>All {} free parameters are determined by the data (rank {}, condition number {:.2g} in "
-        "scaled units).</p>",
-        free, fit.rank, fit.condition);
-  else {
+        "<p>The data reach all {} free parameters (rank {}, condition number {:.2g} in scaled "
+        "units){}.</p>",
+        free, fit.rank, fit.condition,
+        faint.empty() ? ""
+                      : ", but these too faintly for a value: <code>" + escaped(faint) + "</code>");
+  } else {
     html += fmt::format("<p>The data determine {} of {} free directions. Not seen:</p><ul>",
                         fit.rank, free);
     for (const data::NullVector& vector : fit.null_vectors) {

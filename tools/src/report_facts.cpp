@@ -19,7 +19,7 @@ void count_gaps(const data::Track& track, ReportFacts& facts) {
   }
 }
 
-void measure_residuals(ReportFacts& facts, double noise_scale) {
+void measure_residuals(ReportFacts& facts) {
   double sum_m2 = 0.0, sum_sigma2 = 0.0;
   int count = 0, with_sigma = 0;
   for (const auto& list : facts.residuals)
@@ -27,13 +27,26 @@ void measure_residuals(ReportFacts& facts, double noise_scale) {
       for (int axis = 0; axis < 2; ++axis) {
         sum_m2 += std::pow(residual.value_m[axis], 2);
         ++count;
-        const double sigma_m = residual.sigma_m[axis] / noise_scale;
+        const double sigma_m = residual.sigma_m[axis] / facts.noise_scale;
         if (!(sigma_m > 0.0)) continue;
         sum_sigma2 += std::pow(residual.value_m[axis] / sigma_m, 2);
         ++with_sigma;
       }
   facts.rms_axis_m = count > 0 ? std::sqrt(sum_m2 / count) : kNaN;
   facts.rms_axis_sigma = with_sigma > 0 ? std::sqrt(sum_sigma2 / with_sigma) : kNaN;
+}
+
+double rms_spin_rad(const data::TrackFile& tracks, const PredictedPath& path) {
+  double sum = 0.0;
+  int count = 0;
+  for (const data::Track& track : tracks.tracks)
+    for (const data::TrackSample& sample : track.samples) {
+      const PredictedArc* arc = path.arc_at(track.object, sample.t_s);
+      if (!sample.psi || arc == nullptr || !arc->has_spin) continue;
+      sum += std::pow(sample.psi->value_rad - path.at(track.object, sample.t_s)->psi_rad, 2);
+      ++count;
+    }
+  return count > 0 ? std::sqrt(sum / count) : kNaN;
 }
 
 }  // namespace
@@ -59,8 +72,11 @@ ReportFacts gather(const ReportInput& input) {
   facts.median_sigma_m = data::median(std::move(sigmas_m));
   if (input.fit && !input.fit->parameters.empty()) {
     facts.prediction = replay(*input.fit, input.tracks, input.fit_track);
-    facts.residuals = residuals(input.tracks, facts.prediction, input.fit->noise_scale);
-    measure_residuals(facts, input.fit->noise_scale);
+    // What does not explain the track must not look as if it did for the sigmas it would need.
+    if (input.fit->converged) facts.noise_scale = input.fit->noise_scale;
+    facts.residuals = residuals(input.tracks, facts.prediction, facts.noise_scale);
+    measure_residuals(facts);
+    facts.rms_spin_rad = rms_spin_rad(input.tracks, facts.prediction);
   }
   return facts;
 }

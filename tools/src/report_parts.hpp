@@ -22,9 +22,11 @@ struct ReportFacts {
   int missing = 0;   ///< frames in those gaps
   int doubtful = 0;  ///< samples of low quality
   double first_s = 0.0, last_s = 0.0;
-  double rms_axis_m = 0.0;  ///< residual per axis
+  double noise_scale = 1.0;  ///< of the track's sigmas in the residuals' bands
+  double rms_axis_m = 0.0;   ///< residual per axis
   double rms_axis_sigma =
       0.0;  ///< the same in sigmas of the track (before rescaling); NaN if unknown
+  double rms_spin_rad = 0.0;    ///< residual of the spin angle; NaN if it is not seen or predicted
   double median_sigma_m = 0.0;  ///< of the track per axis; NaN if unknown
 };
 [[nodiscard]] ReportFacts gather(const ReportInput& input);

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "report_parts.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -72,8 +73,10 @@ class Series {
     made["path"] = path();
     made["charts"] = json::array();
     for (int axis = 0; axis < 2; ++axis) made["charts"].push_back(position(axis));
-    if (arc_ != nullptr)
-      for (int axis = 0; axis < 2; ++axis) made["charts"].push_back(residual(axis));
+    if (arc_ != nullptr && facts_.prediction.angles_alone())
+      made["charts"].push_back(spin_residual());
+    else if (arc_ != nullptr)
+      for (int axis = 0; axis < 2; ++axis) made["charts"].push_back(position_residual(axis));
     for (json& chart : angles()) made["charts"].push_back(std::move(chart));
     for (json& chart : dynamics()) made["charts"].push_back(std::move(chart));
     return made;
@@ -96,8 +99,7 @@ class Series {
   }
   [[nodiscard]] double sigma_mm(std::size_t i, int axis) const {
     if (rows_[i].sample == nullptr || !rows_[i].sample->has_covariance()) return kNaN;
-    return facts_.input.fit->noise_scale * std::sqrt(rows_[i].sample->covariance_m2(axis, axis)) *
-           kMmPerM;
+    return facts_.noise_scale * std::sqrt(rows_[i].sample->covariance_m2(axis, axis)) * kMmPerM;
   }
 
   static json line(const char* label, const char* kind, const char* colour, json values) {
@@ -131,27 +133,45 @@ class Series {
     return chart;
   }
 
-  [[nodiscard]] json residual(int axis) const {
-    json chart{{"label", axis == 0 ? "x residual [mm]" : "y residual [mm]"},
-               {"series", json::array()}};
+  [[nodiscard]] json position_residual(int axis) const {
+    return residual(
+        axis == 0 ? "x residual [mm]" : "y residual [mm]", axis == 0 ? "x" : "y",
+        [&](std::size_t i) { return seen(i, axis) - expected(i, axis); },
+        [&](std::size_t i) { return sigma_mm(i, axis); });
+  }
+
+  [[nodiscard]] json spin_residual() const {
+    constexpr double kMradPerRad = 1000.0;
+    const auto measured = [&](std::size_t i) {
+      return rows_[i].sample != nullptr && poses_[i] ? rows_[i].sample->psi : std::nullopt;
+    };
+    return residual(
+        "spin residual [mrad]", "x",
+        [&](std::size_t i) {
+          return measured(i) ? (measured(i)->value_rad - poses_[i]->psi_rad) * kMradPerRad : kNaN;
+        },
+        [&](std::size_t i) {
+          return measured(i) ? facts_.noise_scale * measured(i)->sigma_rad * kMradPerRad : kNaN;
+        });
+  }
+
+  template <class Value, class Sigma>
+  json residual(const char* label, const char* colour, const Value& value,
+                const Sigma& sigma) const {
+    json chart{{"label", label}, {"series", json::array()}};
     for (const auto& [factor, shade] : {std::pair(2.0, "band2"), std::pair(1.0, "band")})
       for (const double sign : {1.0, -1.0}) {
         json edge = line("band", "band", shade,
-                         column([&](std::size_t i) { return sign * factor * sigma_mm(i, axis); }));
+                         column([&](std::size_t i) { return sign * factor * sigma(i); }));
         edge["upper"] = sign > 0.0;
         chart["series"].push_back(std::move(edge));
       }
     std::vector<double> sizes;
-    const auto value = [&](std::size_t i) { return seen(i, axis) - expected(i, axis); };
     for (std::size_t i = 0; i < rows_.size(); ++i)
-      for (const double size : {std::abs(value(i)), 2.2 * sigma_mm(i, axis)})
+      for (const double size : {std::abs(value(i)), 2.2 * sigma(i)})
         if (std::isfinite(size)) sizes.push_back(size);
-    std::sort(sizes.begin(), sizes.end());
-    if (!sizes.empty())
-      chart["limit"] = number(
-          1.1 * sizes[static_cast<std::size_t>(0.995 * static_cast<double>(sizes.size() - 1))]);
-    chart["series"].push_back(
-        line("observed − predicted", "dots", axis == 0 ? "x" : "y", column(value)));
+    if (!sizes.empty()) chart["limit"] = number(1.1 * data::quantile(std::move(sizes), 0.995));
+    chart["series"].push_back(line("observed − predicted", "dots", colour, column(value)));
     return chart;
   }
 

@@ -26,10 +26,13 @@ std::string tracked_words(const ReportFacts& facts) {
 Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
   Verdict verdict;
   const std::string scatter =
-      fmt::format("{} rms per axis{}", length_words(facts.rms_axis_m),
-                  std::isfinite(facts.rms_axis_sigma)
-                      ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
-                      : "");
+      facts.prediction.angles_alone()
+          ? fmt::format("{:.3g} mrad rms of the spin angle", 1e3 * facts.rms_spin_rad)
+          : fmt::format(
+                "{} rms per axis{}", length_words(facts.rms_axis_m),
+                std::isfinite(facts.rms_axis_sigma)
+                    ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
+                    : "");
   const bool doubtful = !fit.converged;
   const bool weak = fit.verdict == "weak";
   const bool wide = facts.rms_axis_sigma > kTooWide;
@@ -44,8 +47,8 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                                                         : "explained";
   verdict = {weak || wide ? "fair" : "good",
              word,
-             fmt::format("{}: the model “{}” passes through them with {}: {}.",
-                         tracked_words(facts), fit.model, scatter, fit.verdict_words),
+             fmt::format("{}: the model “{}” follows them with {}: {}.", tracked_words(facts),
+                         fit.model, scatter, fit.verdict_words),
              {}};
   return verdict;
 }
@@ -66,6 +69,7 @@ std::string value_words(double value, double sigma) {
                        decimals, power);
   }
   const int decimals = std::clamp(-exponent, 0, 12);
+  if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0.0;  // no "-0.000"
   return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, sigma, decimals);
 }
 

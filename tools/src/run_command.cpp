@@ -224,7 +224,8 @@ std::string command_line(const Options& options) {
 void write_run_file(const Run& run, const Options& options, const fs::path& folder) {
   nlohmann::ordered_json file;
   file["trochoid"] = TROCHOID_VERSION;
-  file["video"] = fs::path(options.video).filename().string();
+  const fs::path video = fs::absolute(options.video).lexically_normal();
+  file["video"] = (video.parent_path().filename() / video.filename()).string();
   file["command"] = command_line(options);
   file["frames"] = run.tracked.summary.frames;
   file["found"] = run.tracked.summary.found;
@@ -323,8 +324,10 @@ void add_run_command(CLI::App& app) {
   command->add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
   command->add_option("-o,--output", options->output,
                       "Folder to make (default: VIDEO's name with .trochoid)");
-  command->add_option("--model", options->model,
-                      "top, rolling, sliding, puck, pivot or auto; overrides the scene's");
+  command
+      ->add_option("--model", options->model,
+                   "Model to fit, or auto: compare; overrides the scene's")
+      ->check(fitted_model());
   command->add_option("--objects", options->objects, "Number of moving bodies")
       ->check(CLI::Range(1, 64));
   add_at(*command, options->at);

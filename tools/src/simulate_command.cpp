@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 
@@ -45,21 +46,43 @@ void apply_overrides(const Options& options, data::Scene& scene) {
   if (!options.integrator.empty()) scene.run.integrator = options.integrator;
 }
 
-void list_scenes() {
+void list_scenes(bool as_json) {
+  if (as_json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::object();
+    for (const BundledScene& scene : bundled_scenes()) list[scene.name] = scene.summary();
+    return print_json({{"scenes", list}});
+  }
   for (const BundledScene& scene : bundled_scenes())
     fmt::print("{:<28} {}\n", scene.name, scene.summary());
 }
 
-void print_steady(const data::Scene& scene) {
+nlohmann::ordered_json steady_json(const std::vector<model::SteadyMotion>& motions) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const model::SteadyMotion& motion : motions)
+    list.push_back({{"floor", model::name(motion.floor)},
+                    {"motion", model::name(motion.kind)},
+                    {"theta_rad", motion.theta_rad},
+                    {"dphi_rad_s", motion.precession_rad_s},
+                    {"w3_rad_s", motion.w3_rad_s},
+                    {"circle_radius_m", motion.circle_radius_m},
+                    {"normal_force_N", motion.normal_force_N},
+                    {"friction_demand", motion.friction_demand},
+                    {"nutation2_1_s2", motion.nutation2_1_s2}});
+  return list;
+}
+
+void print_steady(const data::Scene& scene, bool as_json) {
   if (!scene.body) throw InputError("--steady needs a [body] in the scene");
   std::vector<double> tilts_rad;
   for (int degrees = 10; degrees <= 80; degrees += 10)
     tilts_rad.push_back(degrees * std::numbers::pi / 180.0);
+  const std::vector<model::SteadyMotion> motions =
+      model::steady_catalogue(*scene.body, scene.model.gravity_m_s2, tilts_rad);
+  if (as_json) return print_json({{"steady", steady_json(motions)}});
   fmt::print("{:<7} {:<17} {:>9} {:>14} {:>10} {:>11} {:>9} {:>8} {:>16}  {}\n", "floor", "motion",
              "tilt_deg", "dphi_rad_s", "w3_rad_s", "radius_m", "N_N", "demand", "nutation_rad_s",
              "stability");
-  for (const model::SteadyMotion& motion :
-       model::steady_catalogue(*scene.body, scene.model.gravity_m_s2, tilts_rad)) {
+  for (const model::SteadyMotion& motion : motions) {
     const double nu2 = motion.nutation2_1_s2;
     const std::string nutation =
         std::isnan(nu2) ? "-" : fmt::format("{:.4f}", std::sqrt(std::abs(nu2)));
@@ -110,7 +133,7 @@ void simulate_scene(const Options& options) {
   data::Scene scene = options.fit.empty() ? load_scene(options.scene)
                                           : fitted_scene(data::read_fit(options.fit), options.arc);
   apply_overrides(options, scene);
-  if (options.steady) return print_steady(scene);
+  if (options.steady) return print_steady(scene, options.json);
   const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
   if (run.values.rows() == 0)
     throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
@@ -132,7 +155,7 @@ void simulate_scene(const Options& options) {
 }
 
 void run(const Options& options) {
-  if (options.list) return list_scenes();
+  if (options.list) return list_scenes(options.json);
   if (options.scene.empty() == options.fit.empty())
     throw InputError(
         "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "

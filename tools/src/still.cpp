@@ -41,7 +41,8 @@ std::vector<Moment> ends_of(const ObjectPaths& paths) {
 }
 
 // The part of the frame that holds every path and the body at its ends, with a margin, not narrower
-// than 3:1 or taller than 1:1.5, so that a straight path does not make a ribbon.
+// than 3:1 or taller than 1:1.5, so that a straight path does not make a ribbon, and wide enough
+// for the words.
 cv::Rect cutting_of(const OverlayContent& content, cv::Size frame) {
   Box box;
   for (const ObjectPaths& paths : content.objects()) {
@@ -58,7 +59,7 @@ cv::Rect cutting_of(const OverlayContent& content, cv::Size frame) {
   Eigen::Vector2d size = box.high - box.low;
   const Eigen::Vector2d centre = 0.5 * (box.low + box.high);
   size = (1.25 * size.array() + 24.0).matrix();
-  size.x() = std::max(size.x(), size.y() / 1.5);
+  size.x() = std::max({size.x(), size.y() / 1.5, kStillWidthPx / kMostEnlarged});
   size.y() = std::max(size.y(), size.x() / 3.0);
   const cv::Rect wanted(cvFloor(centre.x() - 0.5 * size.x()), cvFloor(centre.y() - 0.5 * size.y()),
                         cvCeil(size.x()), cvCeil(size.y()));

@@ -141,10 +141,14 @@ void SvgPlot::bar(Range x, Range y, const char* colour) {
 }
 
 void SvgPlot::words(const Eigen::Vector2d& at, const std::string& text, const char* colour) {
+  constexpr double kOff_px = 7.0, kLetter_px = 8.0;
+  const bool fits =
+      px_x(at.x()) + kOff_px + kLetter_px * static_cast<double>(text.size()) < width_ - right_;
   body_ += fmt::format(
-      "<text x=\"{:.2f}\" y=\"{:.2f}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"4\" "
-      "stroke-linejoin=\"round\" paint-order=\"stroke\">{}</text>",
-      px_x(at.x()) + 7.0, px_y(at.y()) - 7.0, colour, ink::paper, escaped(text));
+      "<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"{}\" fill=\"{}\" stroke=\"{}\" "
+      "stroke-width=\"4\" stroke-linejoin=\"round\" paint-order=\"stroke\">{}</text>",
+      px_x(at.x()) + (fits ? kOff_px : -kOff_px), px_y(at.y()) - kOff_px, fits ? "start" : "end",
+      colour, ink::paper, escaped(text));
 }
 
 void SvgPlot::key(const std::string& text, const char* colour, bool line) {

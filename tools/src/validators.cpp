@@ -28,4 +28,8 @@ CLI::Validator non_negative_number() {
                 [](double value) { return value >= 0.0; });
 }
 
+CLI::Validator fitted_model() {
+  return CLI::IsMember({"top", "smooth", "rolling", "sliding", "puck", "pivot", "auto"});
+}
+
 }  // namespace trochoid::tools

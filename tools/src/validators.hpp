@@ -8,4 +8,7 @@ namespace trochoid::tools {
 [[nodiscard]] CLI::Validator positive_number();
 [[nodiscard]] CLI::Validator non_negative_number();
 
+/// A model that can be fitted, or auto.
+[[nodiscard]] CLI::Validator fitted_model();
+
 }  // namespace trochoid::tools
