@@ -6,7 +6,9 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 
+#include "linearise.hpp"
 #include "observed.hpp"
 #include "strategy.hpp"
 #include "trochoid/data/error.hpp"
@@ -34,31 +36,6 @@ const std::array<Given, 7>& givens() {
 
 bool gave_the_scale(const data::Scene& scene, const std::string& name) {
   return name == "radius_m" && scene.camera.file.empty() && !scene.camera.scale_px_per_m;
-}
-
-// Residuals of all arcs and, if asked for, their derivatives by u, priors as further rows.
-bool residuals_of(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
-                  Eigen::MatrixXd* jacobian) {
-  const auto count = static_cast<Eigen::Index>(problem.free.size());
-  residuals.setZero(problem.rows() + count);
-  if (jacobian != nullptr) jacobian->setZero(residuals.size(), count);
-  Eigen::Index first = 0;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    Eigen::VectorXd r;
-    Eigen::MatrixXd j;
-    if (!evaluate(problem, arc, u, r, jacobian != nullptr ? &j : nullptr)) return false;
-    residuals.segment(first, r.size()) = r;
-    const std::vector<int> columns = problem.columns_of(arc);
-    for (std::size_t c = 0; jacobian != nullptr && c < columns.size(); ++c)
-      jacobian->col(columns[c]).segment(first, r.size()) = j.col(static_cast<Eigen::Index>(c));
-    first += r.size();
-  }
-  for (Eigen::Index i = 0; jacobian != nullptr && i < count; ++i) {
-    const FreeParameter& parameter = problem.free[static_cast<std::size_t>(i)];
-    if (parameter.prior)
-      (*jacobian)(first + i, i) = parameter.transform.slope(u[i]) / parameter.prior->sigma;
-  }
-  return true;
 }
 
 }  // namespace
@@ -93,7 +70,7 @@ class Moved {
     const auto wrapped = observed(*plain, scene, frame_time_s_);
     const Problem other = for_predictor(problem_, wrapped ? *wrapped : *plain);
     Eigen::VectorXd residuals;
-    if (other.free.size() != problem_.free.size() || !residuals_of(other, u_, residuals, nullptr))
+    if (other.free.size() != problem_.free.size() || !all_residuals(other, u_, residuals))
       return {};
     return residuals;
   }
@@ -126,24 +103,23 @@ class Moved {
 std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
                                const data::Scene& scene, double frame_time_s) {
   std::vector<Doubt> doubts;
-  Eigen::VectorXd here;
-  Eigen::MatrixXd jacobian;
+  std::optional<Linearised> all;
   for (const Given& given : givens()) {
     const auto prior = scene.fit.prior.find(given.name);
     if (prior == scene.fit.prior.end() || !scene.body || gave_the_scale(scene, given.name) ||
         problem.predictor->index_of(given.name) >= 0)
       continue;
-    if (here.size() == 0 && !residuals_of(problem, u, here, &jacobian)) return {};
-    const Eigen::VectorXd by_given =
-        Moved(problem, u, scene, given, prior->second, frame_time_s).derivative(here);
+    if (!all) all = linearise(problem, u);
+    const Eigen::Index rows = problem.rows();
+    const Eigen::VectorXd by_given = Moved(problem, u, scene, given, prior->second, frame_time_s)
+                                         .derivative(all->residuals.head(rows));
     if (by_given.size() == 0) continue;
-    const Eigen::VectorXd size = jacobian.colwise().norm().cwiseMax(1e-300);
-    const Eigen::MatrixXd scaled = jacobian * size.cwiseInverse().asDiagonal();
-    Eigen::VectorXd shift =
-        -scaled.completeOrthogonalDecomposition().solve(by_given).cwiseQuotient(size);
-    for (Eigen::Index i = 0; i < shift.size(); ++i)
-      shift[i] *= problem.free[static_cast<std::size_t>(i)].transform.slope(u[i]);
-    doubts.push_back({given.name, std::move(shift)});
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(all->residuals.size());  // priors do not move
+    right.head(rows) = by_given;
+    const Eigen::VectorXd size = all->jacobian.colwise().norm().cwiseMax(1e-300);
+    const Eigen::MatrixXd scaled = all->jacobian * size.cwiseInverse().asDiagonal();
+    doubts.push_back(
+        {given.name, -scaled.completeOrthogonalDecomposition().solve(right).cwiseQuotient(size)});
   }
   return doubts;
 }

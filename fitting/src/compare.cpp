@@ -13,6 +13,7 @@
 #include "adequacy.hpp"
 #include "arcs.hpp"
 #include "ladder.hpp"
+#include "observed.hpp"
 #include "retrograde.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/parallel.hpp"
@@ -92,7 +93,10 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
     if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
   if (arc < 0) return squares;
-  const auto predictor = model::make_predictor(scene);
+  const auto plain = model::make_predictor(scene);
+  data::Scene measured = scene;
+  const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
+  const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
   const auto& parameters = predictor->parameters();
   Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i) {

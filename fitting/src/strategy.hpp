@@ -86,8 +86,8 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// neighbouring valleys pass the gate as well.
 [[nodiscard]] bool surely_explained(const Problem& problem, const Found& best);
 
-/// Whether the search has used up its steps (about half a minute's, more where nothing explains the
-/// path yet): the best so far has to do, and the verdict says what it is worth.
+/// Whether the search has used up its steps (less than a minute's, half of that where angles were
+/// seen): the best so far has to do, and the verdict says what it is worth.
 [[nodiscard]] bool exhausted(const Problem& problem, const Found& best);
 
 /// Whether looking on is idle: the path is explained but for a per cent, or the gate is passed;
