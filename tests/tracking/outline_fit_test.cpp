@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -19,13 +20,15 @@ StretchProfile profile_of(double offset_px, double blur_px, double outer_slope, 
   std::normal_distribution<double> normal(0.0, noise);
   StretchProfile p;
   constexpr double kReach_px = 4.0;
-  p.profile.count = static_cast<int>(2.0 * kReach_px / Profile::kStepPx) + 1;
-  p.profile.first_px = static_cast<float>(-kReach_px);
+  constexpr double kSpacing_px = 0.8;
+  p.profile.count = static_cast<int>(2.0 * kReach_px / kSpacing_px) + 1;
+  p.profile.shared = 1.0;
   const auto beyond = [&](double s) {
     return 0.5 * std::erfc(-s / (blur_px * std::numbers::sqrt2));
   };
   for (int j = 0; j < p.profile.count; ++j) {
-    const double s = static_cast<double>(p.profile.s_px(j)) - offset_px;
+    p.profile.s_px[static_cast<size_t>(j)] = static_cast<float>(kSpacing_px * j - kReach_px);
+    const double s = kSpacing_px * j - kReach_px - offset_px;
     double light = 30.0 + (70.0 + outer_slope * s) * beyond(s);
     if (strip_px > 0.0) light -= 15.0 * (beyond(s + strip_px) - beyond(s));
     p.profile.light[static_cast<size_t>(j)] = static_cast<float>(light + normal(random));
@@ -95,6 +98,48 @@ TEST(EdgeStretch, TellsThatEdgesAreWiderThanTheModel) {
   const double wider_px = fit_stretches(profiles);
   EXPECT_GT(wider_px, 0.07);
   EXPECT_LT(wider_px, 0.25);
+}
+
+// Pixels in the rows and columns that a round outline crosses lie at their distance from the
+// circle, and near the outline each is read once.
+TEST(Crossings, ReadEveryPixelBesideTheOutlineOnceAtItsDistance) {
+  const double radius_px = 30.0;
+  const Eigen::Vector2d centre_px(60.3, 59.4);
+  data::Body body;
+  body.radius_m = 0.03;
+  body.thickness_m = 1e-6;
+  const auto camera = data::Camera::from_scale(120, 120, 1000.0);
+  const PoseMotion motion(body, {data::SupportKind::flat, {}}, camera);
+  data::Pose<> pose;
+  pose.centre_m = camera.table_from_image(centre_px, body.half_thickness_m());
+  // A picture of its own pixel numbers.
+  cv::Mat numbers(120, 120, CV_32FC1);
+  for (int i = 0; i < 120 * 120; ++i) numbers.at<float>(i / 120, i % 120) = static_cast<float>(i);
+  const LightWindow picture(numbers, cv::Point(0, 0));
+  std::vector<Crossings> crossings;
+  const auto samples = cross_pixels(outline_samples(body, pose, camera, motion, 2.0), 1, crossings);
+  std::map<int, int> times;
+  double arc_px = 0.0;
+  for (const OutlineSample& sample : samples) arc_px += sample.arc_px;
+  for (const Crossings& look : crossings) {
+    Profile profile;
+    ASSERT_TRUE(read_pixels(picture, {}, look, 0.0, {4.0, 4.0}, profile));
+    for (int j = 0; j < profile.count; ++j) {
+      const auto k = static_cast<size_t>(j);
+      const int number = static_cast<int>(profile.light[k]);
+      const Eigen::Vector2d at_px(number % 120, number / 120);
+      // To second order: of a bend with 30 px, 4 px away.
+      constexpr double kTolerance_px = 0.06;
+      EXPECT_NEAR(profile.s_px[k], (at_px - centre_px).norm() - radius_px, kTolerance_px);
+      if (std::abs(profile.s_px[k]) < 0.7f) ++times[number];
+    }
+  }
+  int twice = 0;
+  for (const auto& [number, count] : times) twice += count > 1 ? 1 : 0;
+  // Where rows give way to columns a few are in both.
+  EXPECT_LT(twice, 12);
+  EXPECT_NEAR(static_cast<double>(times.size()), 2.0 * std::numbers::pi * radius_px * 1.4, 15.0);
+  EXPECT_NEAR(arc_px, 2.0 * std::numbers::pi * radius_px, 6.0);
 }
 
 // Two rings of four unknowns and three common ones against a dense solver.

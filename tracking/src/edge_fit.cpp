@@ -21,7 +21,7 @@ struct Sums {
     std::array<NormalTable::Step, Profile::kMost> steps;
     for (int j = 0; j < p.count; ++j) {
       const auto k = static_cast<size_t>(j);
-      steps[k] = table.at((p.s_px(j) - offset) * inverse_blur);
+      steps[k] = table.at((p.s_px[k] - offset) * inverse_blur);
       const float ground = plate ? p.background[k] : 1.0f;
       const float a = 1.0f - steps[k].share, b = steps[k].share * ground, y = p.light[k];
       aa += a * a, ab += a * b, bb += b * b, ay += a * y, by += b * y;
@@ -68,7 +68,7 @@ double square_without_edge(const Profile& p, bool plate) {
   const float base = p.light[0];
   for (int j = 0; j < p.count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const float ground = plate ? p.background[k] - p.background[0] : p.s_px(j);
+    const float ground = plate ? p.background[k] - p.background[0] : p.s_px[k];
     const float light = p.light[k] - base;
     n += 1, g += ground, gg += ground * ground, i += light, gi += ground * light,
         ii += light * light;
@@ -96,13 +96,14 @@ bool fit_edge(const Profile& profile, double blur_px, bool plate, double reach_p
     if (std::abs(step) < kSettledPx) break;
   }
   edge.offset_px = offset;
-  edge.noise_variance_px2 = kSamplesPerIndependent * kUsualNoise2 / information;
+  edge.noise_variance_px2 = profile.shared * kUsualNoise2 / information;
   edge.shading_variance_px2 = edge.strip_variance_px2 = edge.inner_slope = edge.outer_slope = 0.0;
-  const double ground = plate ? profile.background_at(offset) : 1.0;
+  const double ground = plate ? profile.background[profile.nearest(offset)] : 1.0;
   edge.contrast = static_cast<double>(sums.outer) * ground - static_cast<double>(sums.inner);
   edge.mean_level = static_cast<double>(sums.inner) + 0.5 * edge.contrast;
-  const double freedom = std::max(1.0, profile.count / kSamplesPerIndependent - 2.4);
-  edge.gain = 0.5 * freedom *
+  const double freedom = std::max(1.0, profile.count / profile.shared - 2.4);
+  edge.lines = profile.lines;
+  edge.gain = 0.5 * freedom / profile.lines *
               std::log((square_without_edge(profile, plate) + freedom * kLeastNoise2) /
                        (static_cast<double>(sums.square) + freedom * kLeastNoise2));
   return true;

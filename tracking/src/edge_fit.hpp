@@ -13,7 +13,8 @@ struct ProfileEdge {
   double mean_level = 0.0;            ///< of both levels at the edge
   double inner_slope = 0.0, outer_slope = 0.0;  ///< of the levels at the edge [1/px]
   double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
-  double gain = 0.0;      ///< log-likelihood over "no edge here"
+  double gain = 0.0;      ///< log-likelihood over "no edge here", of one line
+  int lines = 1;          ///< side by side that were looked at together
 };
 
 /// Fits one level on either side (outside a multiple of the background plate, if `plate`) and the
@@ -26,8 +27,5 @@ bool fit_edge(const Profile& profile, double blur_px, bool plate, double reach_p
 /// Squared residual of a profile without an edge: of the best line (or, with a plate, of the best
 /// multiple of it plus a constant).
 [[nodiscard]] double square_without_edge(const Profile& profile, bool plate);
-
-/// Samples every half pixel of a bilinear picture: about every second one is independent.
-inline constexpr double kSamplesPerIndependent = 2.0;
 
 }  // namespace trochoid::tracking

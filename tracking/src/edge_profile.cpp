@@ -7,6 +7,10 @@
 namespace trochoid::tracking {
 namespace {
 
+constexpr size_t at(int i) {
+  return static_cast<size_t>(i);
+}
+
 // Inverse of the transfer curve cameras apply (sRGB; BT.709 differs by less than 2 levels).
 const std::array<float, 256>& light_of_luma() {
   static const std::array<float, 256> table = [] {
@@ -59,32 +63,80 @@ float LightWindow::at(float x_px, float y_px) const {
 
 bool sample_profile(const LightWindow& picture, const LightWindow& plate,
                     const Eigen::Vector2d& at_px, const Eigen::Vector2d& normal_px,
-                    double inside_px, double outside_px, Profile& profile) {
-  const int in = static_cast<int>(inside_px / Profile::kStepPx);
-  const int out = static_cast<int>(outside_px / Profile::kStepPx);
+                    const Extent& extent, Profile& profile) {
+  constexpr float kStepPx = 0.5f;
+  const int in = static_cast<int>(extent.inside_px / static_cast<double>(kStepPx));
+  const int out = static_cast<int>(extent.outside_px / static_cast<double>(kStepPx));
   profile.count = std::min(in + out + 1, Profile::kMost);
-  profile.first_px = -Profile::kStepPx * static_cast<float>(in);
   profile.plate = !plate.empty();
-  const Eigen::Vector2d first = at_px + profile.first_px * normal_px;
-  const Eigen::Vector2d last = at_px + profile.s_px(profile.count - 1) * normal_px;
-  if (!picture.holds(first) || !picture.holds(last)) return false;
-  const Eigen::Vector2f from = first.cast<float>();
-  const Eigen::Vector2f step = (Profile::kStepPx * normal_px).cast<float>();
+  profile.shared = 2.0;  // bilinear neighbours
+  profile.lines = 1;
+  for (int i = 0; i < profile.count; ++i)
+    profile.s_px[at(i)] = kStepPx * static_cast<float>(i - in);
+  const auto place = [&](int i) -> Eigen::Vector2d {
+    return at_px + static_cast<double>(profile.s_px[at(i)]) * normal_px;
+  };
+  if (!picture.holds(place(0)) || !picture.holds(place(profile.count - 1))) return false;
   for (int i = 0; i < profile.count; ++i) {
-    const float x = from.x() + static_cast<float>(i) * step.x();
-    const float y = from.y() + static_cast<float>(i) * step.y();
-    profile.light[i] = picture.at(x, y);
-    if (profile.plate) profile.background[i] = plate.at(x, y);
+    const Eigen::Vector2f p = place(i).cast<float>();
+    profile.light[at(i)] = picture.at(p.x(), p.y());
+    if (profile.plate) profile.background[at(i)] = plate.at(p.x(), p.y());
   }
   return true;
+}
+
+namespace {
+
+// Appends the pixels of one row or column.
+bool read_line(const LightWindow& picture, const LightWindow& plate, const Crossing& crossing,
+               double middle_px, const Extent& extent, Profile& profile) {
+  const bool row = crossing.row;
+  const Eigen::Vector2d &p = crossing.image_px, &n = crossing.normal_px;
+  const double slope = std::abs(row ? n.x() : n.y()), along = row ? n.y() : n.x();
+  const int way = (row ? n.x() : n.y()) > 0.0 ? 1 : -1;
+  const double from = way * (row ? p.x() : p.y());
+  const int line = static_cast<int>(std::lround(row ? p.y() : p.x()));
+  const int begin = static_cast<int>(std::ceil(from + (middle_px - extent.inside_px) / slope));
+  int end = static_cast<int>(std::floor(from + (middle_px + extent.outside_px) / slope)) + 1;
+  end = std::min(end, begin + Profile::kMost / Crossings::kMost);
+  const auto place = [&](int k) {
+    return row ? cv::Point(way * k, line) : cv::Point(line, way * k);
+  };
+  if (end <= begin || !picture.window().contains(place(begin)) ||
+      !picture.window().contains(place(end - 1)))
+    return false;
+  // The outline bends away from the straight line.
+  const double bend = 0.5 * crossing.curvature_per_px * along * along;
+  for (int k = begin; k < end; ++k) {
+    const cv::Point pixel = place(k);
+    const double d = k - from;
+    const size_t i = at(profile.count++);
+    profile.s_px[i] = static_cast<float>(d * (slope + d * bend) - middle_px);
+    profile.light[i] = picture.pixel(pixel);
+    if (profile.plate) profile.background[i] = plate.pixel(pixel);
+  }
+  return true;
+}
+
+}  // namespace
+
+bool read_pixels(const LightWindow& picture, const LightWindow& plate, const Crossings& crossings,
+                 double middle_px, const Extent& extent, Profile& profile) {
+  profile.count = 0;
+  profile.plate = !plate.empty();
+  profile.shared = 1.0;
+  profile.lines = crossings.count;
+  for (int i = 0; i < crossings.count; ++i)
+    if (!read_line(picture, plate, crossings.at[at(i)], middle_px, extent, profile)) return false;
+  return profile.count > 0;
 }
 
 bool plate_explains(const Profile& profile, double from_px) {
   if (!profile.plate) return false;
   double n = 0, b = 0, bb = 0, i = 0, ii = 0, bi = 0;
   for (int j = 0; j < profile.count; ++j) {
-    if (profile.s_px(j) < from_px) continue;
-    const double light = profile.light[j], ground = profile.background[j];
+    if (profile.s_px[at(j)] < from_px) continue;
+    const double light = profile.light[at(j)], ground = profile.background[at(j)];
     n += 1, b += ground, bb += ground * ground, i += light, ii += light * light,
         bi += light * ground;
   }

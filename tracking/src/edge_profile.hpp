@@ -2,8 +2,11 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <utility>
+
+#include "outline_samples.hpp"
 
 namespace trochoid::tracking {
 
@@ -21,6 +24,9 @@ class LightWindow {
   [[nodiscard]] LightWindow blurred(double sigma_px) const;
   [[nodiscard]] bool empty() const { return light_.empty(); }
   [[nodiscard]] const cv::Rect& window() const { return window_; }
+  [[nodiscard]] float pixel(const cv::Point& p) const {
+    return light_.ptr<float>(p.y - window_.y)[p.x - window_.x];
+  }
   /// Bilinear sample; `holds` must be true for the point.
   [[nodiscard]] float at(float x_px, float y_px) const;
   [[nodiscard]] bool holds(const Eigen::Vector2d& p) const {
@@ -33,31 +39,46 @@ class LightWindow {
   cv::Rect window_;
 };
 
-/// Samples of picture and background plate along the normal of an outline; s grows outwards.
+/// Samples of picture and background plate across an outline, s [px] growing outwards along its
+/// normal.
 struct Profile {
-  static constexpr int kMost = 64;
-  static constexpr float kStepPx = 0.5f;
+  static constexpr int kMost = 96;
   int count = 0;
-  float first_px = 0.0f;  ///< s of sample 0
   bool plate = false;
-  std::array<float, kMost> light, background;
+  double shared = 2.0;  ///< samples per independent one
+  int lines = 1;        ///< side by side
+  std::array<float, kMost> s_px, light, background;
 
-  [[nodiscard]] float s_px(int i) const { return first_px + kStepPx * static_cast<float>(i); }
   /// Whether some of it is as bright as the picture can be.
   [[nodiscard]] bool clipped() const {
     constexpr float kClipped = 245.0f;
     return *std::max_element(light.begin(), light.begin() + count) > kClipped;
   }
-  [[nodiscard]] double background_at(double s) const {
-    const int i = static_cast<int>((s - first_px) / kStepPx);
-    return background[static_cast<size_t>(i < 0 ? 0 : i >= count ? count - 1 : i)];
+  /// Of the sample nearest to s.
+  [[nodiscard]] std::size_t nearest(double s) const {
+    const auto* end = s_px.data() + count;
+    const auto off = [s](float a) { return std::abs(static_cast<double>(a) - s); };
+    return static_cast<std::size_t>(
+        std::min_element(s_px.data(), end, [&](float a, float b) { return off(a) < off(b); }) -
+        s_px.data());
   }
 };
 
-/// Samples from -inside_px to +outside_px; false if that leaves the picture.
+/// How far a profile goes to either side of a place beside the edge [px].
+struct Extent {
+  double inside_px, outside_px;
+};
+
+/// Samples every half pixel along the normal, between the pixels; false if that leaves the picture.
 bool sample_profile(const LightWindow& picture, const LightWindow& plate,
                     const Eigen::Vector2d& at_px, const Eigen::Vector2d& normal_px,
-                    double inside_px, double outside_px, Profile& profile);
+                    const Extent& extent, Profile& profile);
+
+/// The pixels of rows or columns in which an outline is crossed, as they are: crossings of all rows
+/// and columns see every pixel beside the outline once, and none through its neighbours.
+/// @param middle_px outwards of the outline: where s is 0.
+bool read_pixels(const LightWindow& picture, const LightWindow& plate, const Crossings& crossings,
+                 double middle_px, const Extent& extent, Profile& profile);
 
 /// Whether a multiple of the plate explains the part of the profile beyond `from_px` better than a
 /// constant does: not so where the body rests in the plate.

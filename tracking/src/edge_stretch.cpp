@@ -35,6 +35,12 @@ struct Working {
   std::array<std::array<float, kAll>, kAll> normal;  // lower triangle
   std::array<float, kAll> right;
   float square = 0.0f;
+  // Of shading and blur with levels and offset free.
+  ShadingMatrix shading_normal;
+  Shading shading_right, blur_cross;
+  double blur_normal = 0.0, blur_right = 0.0;
+  double left_square = 0.0, freedom = 0.0;  // of all residuals, after fitting everything
+  double light = 0.0;                       // brighter level
   Shading shading = Shading::Zero();
   ShadingMatrix shading_covariance = ShadingMatrix::Zero();
   double blur_step = 0.0, blur_information = 0.0;
@@ -70,11 +76,11 @@ void columns_of(const StretchProfile& p, Columns& c) {
   const float scale = p.plate ? static_cast<float>(p.profile.count) / std::max(mean, 1.0f) : 0.0f;
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const Ramp ramp = ramp_at(p, p.profile.s_px(j));
+    const Ramp ramp = ramp_at(p, p.profile.s_px[k]);
     c.share[k] = ramp.share;
     c.density[k] = ramp.density;
     c.widening[k] = ramp.widening;
-    c.strip[k] = p.strip_px > 0.0 ? ramp_at(p, p.profile.s_px(j) + strip).share - ramp.share : 0.0f;
+    c.strip[k] = p.strip_px > 0.0 ? ramp_at(p, p.profile.s_px[k] + strip).share - ramp.share : 0.0f;
     c.ground[k] = p.plate ? scale * p.profile.background[k] : 1.0f;
   }
 }
@@ -100,7 +106,7 @@ void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
   const int count = p.profile.count, whole = (count + 3) / 4 * 4;
   for (int j = 0; j < count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const float s = p.profile.s_px(j), ground = c.ground[k];
+    const float s = p.profile.s_px[k], ground = c.ground[k];
     const float a = 1.0f - c.share[k], b = c.share[k] * ground;
     const float contrast = w.inner - w.outer * ground, d = contrast * c.density[k];
     const float sa = s * a, sb = s * b;
@@ -121,16 +127,16 @@ void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
   w.square = sum(kAll, kAll);
 }
 
-// Largest slopes [per px] and bends [per px^2] of the light, as shares of it.
-Shading largest_shading(const Working& w) {
+// Largest slopes [per px] and bends [per px^2] of the light and difference of a strip, as shares of
+// the light.
+Shading largest_shading() {
   constexpr double kSlope = 0.06, kBend = 0.02, kStrip = 0.3;
-  const double brightest = std::max(
-      {2.0, std::abs(static_cast<double>(w.inner)), std::abs(static_cast<double>(w.outer))});
-  return brightest * (Shading() << kSlope, kSlope, kBend, kBend, kStrip).finished();
+  return (Shading() << kSlope, kSlope, kBend, kBend, kStrip).finished();
 }
 
-// Slopes and bends with levels and offset free, then the blur with all of them free.
-void find_shading(const StretchProfile& p, Working& w) {
+// Projects levels and offset out of the sums for shading and blur, and shading as large as it can
+// be out of the square.
+void reduce(const StretchProfile& p, Working& w) {
   std::array<std::array<double, kAll>, kAll> m{};
   std::array<double, kAll> r{};
   for (size_t i = 0; i < kAll; ++i) {
@@ -150,32 +156,71 @@ void find_shading(const StretchProfile& p, Working& w) {
     }
   };
   for (size_t k = 0; k < kOwn; ++k) eliminate(k);
-  ShadingMatrix normal;
-  Shading right, cross;
   for (size_t i = 0; i < kShading; ++i) {
+    const auto row = static_cast<int>(i);
     for (size_t j = 0; j <= i; ++j)
-      normal(static_cast<int>(i), static_cast<int>(j)) =
-          normal(static_cast<int>(j), static_cast<int>(i)) = m[kOwn + i][kOwn + j];
-    right[static_cast<int>(i)] = r[kOwn + i];
-    cross[static_cast<int>(i)] = m[kAll - 1][kOwn + i];
+      w.shading_normal(row, static_cast<int>(j)) = w.shading_normal(static_cast<int>(j), row) =
+          m[kOwn + i][kOwn + j];
+    w.shading_right[row] = r[kOwn + i];
+    w.blur_cross[row] = m[kAll - 1][kOwn + i];
   }
-  const double blur = m[kAll - 1][kAll - 1], blur_right = r[kAll - 1];
-  const Shading prior = largest_shading(w).cwiseAbs2().cwiseInverse();
+  w.blur_normal = m[kAll - 1][kAll - 1];
+  w.blur_right = r[kAll - 1];
+  constexpr double kLeastLight = 2.0;
+  w.light = std::max({kLeastLight, std::abs(static_cast<double>(w.inner)),
+                      std::abs(static_cast<double>(w.outer))});
+  const Shading prior = (w.light * largest_shading()).cwiseAbs2().cwiseInverse();
   for (size_t k = kOwn; k < kOwn + kShading; ++k) {
     m[k][k] += prior[static_cast<int>(k) - kOwn];
     eliminate(k);
   }
-  const double freedom = std::max(0.5, p.profile.count / kSamplesPerIndependent - 5.0);
-  const double noise2 = kSamplesPerIndependent *
-                        (kLeastNoise2 + std::max(0.0, square) / kSamplesPerIndependent / freedom);
-  normal.diagonal() += noise2 * prior;
-  const Eigen::LLT<ShadingMatrix> factor(normal);
-  const ShadingMatrix inverse = factor.solve(ShadingMatrix::Identity());
-  w.shading = inverse * right;
+  w.left_square = std::max(0.0, square);
+  w.freedom = std::max(0.5, p.profile.count / p.profile.shared - 5.0);
+}
+
+// Sum of `of(look)` over the neighbours of each look within its curve.
+template <class Sum, class Of>
+std::vector<Sum> sums_of_neighbours(const std::vector<Working>& all,
+                                    const std::vector<StretchProfile>& profiles,
+                                    double share_of_curve, const Sum& none, const Of& of) {
+  std::vector<Sum> out(all.size(), none), before;
+  for (size_t first = 0, end = 0; first < all.size(); first = end) {
+    before.assign(1, none);
+    for (; end < all.size() && profiles[end].curve == profiles[first].curve; ++end) {
+      before.push_back(before.back());
+      if (all[end].usable) before.back() += of(end);
+    }
+    constexpr size_t kLeastReach = 4;
+    const size_t count = end - first;
+    const auto reach = std::max(
+        kLeastReach, static_cast<size_t>(0.5 * share_of_curve * static_cast<double>(count)));
+    for (size_t i = 0; i < count; ++i)
+      out[first + i] = before[std::min(count, i + reach + 1)] - before[i - std::min(i, reach)];
+  }
+  return out;
+}
+
+// Slopes and bends with levels and offset free, then the blur with all of them free.
+void find_shading(double noise2, Working& w) {
+  ShadingMatrix normal = w.shading_normal;
+  normal.diagonal() += noise2 * (w.light * largest_shading()).cwiseAbs2().cwiseInverse();
+  const ShadingMatrix inverse = Eigen::LLT<ShadingMatrix>(normal).solve(ShadingMatrix::Identity());
+  w.shading = inverse * w.shading_right;
   w.shading_covariance = noise2 * inverse;
-  const double own = blur - cross.dot(inverse * cross);
+  const double own = w.blur_normal - w.blur_cross.dot(inverse * w.blur_cross);
   w.blur_information = own / noise2;
-  w.blur_step = own > 0.0 ? (blur_right - cross.dot(w.shading)) / own : 0.0;
+  w.blur_step = own > 0.0 ? (w.blur_right - w.blur_cross.dot(w.shading)) / own : 0.0;
+}
+
+// How noisy samples are is known from a stretch of the outline, not from a single look.
+void find_shadings(const std::vector<StretchProfile>& profiles, std::vector<Working>& all) {
+  constexpr double kShare = 0.08;
+  const auto noise = sums_of_neighbours(
+      all, profiles, kShare, Eigen::Array2d(0.0, 0.0),
+      [&](size_t i) { return Eigen::Array2d(all[i].left_square, all[i].freedom); });
+  for (size_t i = 0; i < all.size(); ++i)
+    if (all[i].usable)
+      find_shading(profiles[i].profile.shared * kLeastNoise2 + noise[i][0] / noise[i][1], all[i]);
 }
 
 // By how much the edges should be wider: the median, so that shadows that end beside some of them
@@ -214,17 +259,17 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   const Eigen::Vector3f own = m.ldlt().solve(r).cast<float>();
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float inner = w.inner + own[0], outer = w.outer + own[1];
-  constexpr auto kShare = static_cast<float>(1.0 / kSamplesPerIndependent);
+  const auto own_share = static_cast<float>(1.0 / p.profile.shared);
   float inner_square = 0, outer_square = 0, inner_count = 0, outer_count = 0;
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const float s = p.profile.s_px(j), a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
+    const float s = p.profile.s_px[k], a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
     const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
                        shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] -
                        own[2] * (w.inner - w.outer * c.ground[k]) * c.density[k];
-    const float square = kShare * rest * rest;
+    const float square = own_share * rest * rest;
     inner_square += a * square, outer_square += c.share[k] * square;
-    inner_count += kShare * a, outer_count += kShare * c.share[k];
+    inner_count += own_share * a, outer_count += own_share * c.share[k];
   }
   w.inner = inner, w.outer = outer;
   // Half of what was fitted comes from either side; priors make slopes and bends count less.
@@ -236,23 +281,19 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
 // Variances of a sample on either side, from a stretch of the outline.
 std::vector<std::array<float, 2>> noise_of_neighbours(const std::vector<Working>& all,
                                                       const std::vector<StretchProfile>& profiles) {
-  constexpr int kReach = 5;
-  const int n = static_cast<int>(all.size());
+  constexpr double kShare = 0.07;
+  const auto sums = sums_of_neighbours(
+      all, profiles, kShare, Eigen::Array4d(Eigen::Array4d::Constant(0.0)), [&](size_t i) {
+        const Noise& n = all[i].noise;
+        return Eigen::Array4d(n.inner, n.inner_freedom, n.outer, n.outer_freedom);
+      });
   std::vector<std::array<float, 2>> out(all.size());
-  for (int i = 0; i < n; ++i) {
-    Noise sum{0.0, 0.0, 1e-3, 1e-3};
-    for (int j = std::max(0, i - kReach); j <= std::min(n - 1, i + kReach); ++j) {
-      const auto k = static_cast<size_t>(j);
-      if (!all[k].usable || profiles[k].curve != profiles[static_cast<size_t>(i)].curve) continue;
-      const Noise& own = all[k].noise;
-      sum.inner += own.inner, sum.inner_freedom += own.inner_freedom;
-      sum.outer += own.outer, sum.outer_freedom += own.outer_freedom;
-    }
-    const auto of = [](double square, double freedom) {
-      return static_cast<float>(kSamplesPerIndependent * std::max(square / freedom, kLeastNoise2));
+  for (size_t i = 0; i < all.size(); ++i) {
+    const double shared = profiles[i].profile.shared;
+    const auto of = [shared](double square, double freedom) {
+      return static_cast<float>(shared * std::max(square / std::max(freedom, 1e-3), kLeastNoise2));
     };
-    out[static_cast<size_t>(i)] = {of(sum.inner, sum.inner_freedom),
-                                   of(sum.outer, sum.outer_freedom)};
+    out[i] = {of(sums[i][0], sums[i][1]), of(sums[i][2], sums[i][3])};
   }
   return out;
 }
@@ -267,7 +308,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   const int count = p.profile.count, whole = (count + 3) / 4 * 4;
   for (int j = 0; j < count; ++j) {
     const auto k = static_cast<size_t>(j);
-    const float s = p.profile.s_px(j), ground = c.ground[k], share = c.share[k];
+    const float s = p.profile.s_px[k], ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
     const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
     const float weight = 1.0f / (noise[0] + share * (noise[1] - noise[0]));
@@ -305,9 +346,8 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   e.shading_variance_px2 = pull.dot(w.shading_covariance * pull);
   constexpr int kStrip = kShading - 1;
   e.strip_variance_px2 = pull[kStrip] * pull[kStrip] * w.shading_covariance(kStrip, kStrip);
-  const float s = std::clamp(static_cast<float>(offset), p.profile.first_px, -p.profile.first_px);
-  const float ground = c.ground[static_cast<size_t>(std::clamp(
-      (s - p.profile.first_px) / Profile::kStepPx, 0.0f, static_cast<float>(p.profile.count - 1)))];
+  const auto s = static_cast<float>(offset);
+  const float ground = c.ground[p.profile.nearest(offset)];
   const double inner = shaded(w.inner, v[0], v[2], s) + beside;
   e.contrast = shaded(w.outer, v[1], v[3], s) * ground - inner;
   e.mean_level = inner + 0.5 * e.contrast;
@@ -316,8 +356,9 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   const double square = w.noise.inner + w.noise.outer;
   const double freedom = std::max(1.0, w.noise.inner_freedom + w.noise.outer_freedom);
   constexpr double kLeastGainNoise2 = 0.1;
-  e.gain = 0.5 * freedom *
-           std::log((square_without_edge(p.profile, p.plate) / kSamplesPerIndependent +
+  e.lines = p.profile.lines;
+  e.gain = 0.5 * freedom / p.profile.lines *
+           std::log((square_without_edge(p.profile, p.plate) / p.profile.shared +
                      freedom * kLeastGainNoise2) /
                     (square + freedom * kLeastGainNoise2));
   p.found = true;
@@ -333,9 +374,11 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
     all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
     if (!all[i].usable) continue;
     accumulate(profiles[i], columns[i], all[i]);
-    find_shading(profiles[i], all[i]);
-    find_noise(profiles[i], columns[i], all[i]);
+    reduce(profiles[i], all[i]);
   }
+  find_shadings(profiles, all);
+  for (size_t i = 0; i < profiles.size(); ++i)
+    if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
   const auto noise = noise_of_neighbours(all, profiles);
   for (size_t i = 0; i < profiles.size(); ++i) {
     profiles[i].found = false;

@@ -95,6 +95,14 @@ double Sweep::step_px() const {
   return count > 1 ? sum / (count - 1) : 0.0;
 }
 
+Sweep between(const Sweep& from, const Sweep& to, double part) {
+  Sweep sweep;
+  sweep.count = std::min(from.count, to.count);
+  for (size_t k = 0; k < static_cast<size_t>(sweep.count); ++k)
+    sweep.shift_px[k] = from.shift_px[k] + part * (to.shift_px[k] - from.shift_px[k]);
+  return sweep;
+}
+
 std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
                              const PoseMotion& motion, const ExposureMotion& exposure,
                              const Pose& middle, const std::vector<OutlineSample>& outline,

@@ -38,6 +38,9 @@ struct Sweep {
   [[nodiscard]] double step_px() const;
 };
 
+/// Of a place between those of two sweeps, `part` of the way.
+[[nodiscard]] Sweep between(const Sweep& from, const Sweep& to, double part);
+
 /// Sweeps of all samples of an outline about `middle`; each within `parts` parts, at most
 /// Sweep::kMost.
 [[nodiscard]] std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,

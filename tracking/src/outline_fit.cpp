@@ -62,7 +62,7 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
   Fitted out;
   double blur_px = known_blur_px.value_or(kUsualBlurPx);
   data::Pose<> pose = start;
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 6; ++round) {
     auto refined = refine(scenery, pose, exact(scenery.sampling, blur_px, outline_px));
     if (!refined) return std::nullopt;
     out.refined = std::move(*refined);

@@ -43,9 +43,10 @@ void set_sweep(const Sweep& sweep, double own_blur_px, StretchProfile& look) {
   look.blur_px = std::sqrt(look.sharp_px * look.sharp_px + square);
 }
 
-// Whatever the picture of luma or colour shows near a point of the outline.
+// Whatever the picture of luma or colour shows near a point of the outline; of a crossing, the
+// pixels themselves.
 bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* sweep,
-             const Search& search, bool colour, StretchProfile& look) {
+             const Crossings* crossings, const Search& search, bool colour, StretchProfile& look) {
   if (sweep != nullptr && sweep->count == 0) return false;
   // Between two surfaces of the body there is no room for a ramp.
   if (!sample.silhouette) sweep = nullptr;
@@ -60,8 +61,9 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
     middle = sweep->mean_px();
   }
   const double widen = look.blur_px - search.blur_px;
-  constexpr double kMostExtent = 0.5 * (Profile::kMost - 1) * Profile::kStepPx;
-  const double extent = std::min(kMostExtent, search.extent_px + std::max(half_range, 2.0 * widen));
+  constexpr double kMostExtentPx = 15.5;  // as many pixels as a profile holds
+  const double extent =
+      std::min(kMostExtentPx, search.extent_px + std::max(half_range, 2.0 * widen));
   double inside = clear_of_next(sample.inside_px - half_range, extent, look.blur_px);
   // A wall too narrow to look past: a strip of its own beside the face.
   look.strip_px = 0.0;
@@ -75,9 +77,12 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   static const LightWindow kNoPlate;
   const LightWindow& picture = colour ? scenery.colour : scenery.picture;
   const LightWindow& plate = sample.silhouette && !colour ? scenery.plate : kNoPlate;
-  const Eigen::Vector2d at_px = sample.image_px + middle * sample.normal_px;
-  if (!sample_profile(picture, plate, at_px, sample.normal_px, inside, outside, look.profile))
-    return false;
+  const bool sampled =
+      crossings != nullptr
+          ? read_pixels(picture, plate, *crossings, middle, {inside, outside}, look.profile)
+          : sample_profile(picture, plate, sample.image_px + middle * sample.normal_px,
+                           sample.normal_px, {inside, outside}, look.profile);
+  if (!sampled) return false;
   look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8);
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
   look.plate = plate_explains(look.profile, std::max(1.5 * look.blur_px, half_range));
@@ -170,7 +175,7 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, b
   e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   e.offset_px = edge.offset_px;
   // Colour planes of half the size hold fewer independent values, along the profile and across.
-  const double shared = colour ? 1.5 : 1.0;
+  const double shared = colour ? 1.7 : 1.0;
   e.variance_px2 = shared * (edge.noise_variance_px2 + edge.shading_variance_px2);
   e.arc_px = sample.arc_px;
   e.curve = static_cast<int>(sample.edge) + (colour ? 8 : 0);
@@ -181,7 +186,7 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, b
 double certainty(const ProfileEdge& edge, double off_px, double tolerance_px) {
   constexpr double kCertain = 3.0;
   const double misfit =
-      0.5 * off_px * off_px / (edge.noise_variance_px2 + tolerance_px * tolerance_px);
+      0.5 * off_px * off_px / (edge.lines * edge.noise_variance_px2 + tolerance_px * tolerance_px);
   return std::clamp((edge.gain - misfit) / kCertain, 0.0, 1.0);
 }
 
@@ -195,6 +200,7 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
 // What one round looked at.
 struct Round {
   std::vector<OutlineSample> outline;
+  std::vector<Crossings> crossings;                  // exact: of the outline
   std::vector<Sweep> sweeps;                         // during the exposure; empty: hardly any
   std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
   std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
@@ -208,7 +214,8 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
   const std::vector<OutlineSample>& all = round.outline;
   StretchProfile look;
   for (size_t i = 0; i < all.size(); ++i)
-    if (all[i].silhouette && look_at(scenery, all[i], round.sweep(i), search, colour, look) &&
+    if (all[i].silhouette &&
+        look_at(scenery, all[i], round.sweep(i), nullptr, search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
       keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
       out.places.push_back(i);
@@ -225,7 +232,8 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
   looks.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i)
     if ((all[i].silhouette || !colour) &&
-        look_at(scenery, all[i], round.sweep(i), search, colour, looks[places.size()]))
+        look_at(scenery, all[i], round.sweep(i), &round.crossings[i], search, colour,
+                looks[places.size()]))
       places.push_back(i);
   looks.resize(places.size());
   const double wider = fit_stretches(looks);
@@ -255,10 +263,27 @@ void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round)
                            round.outline, static_cast<int>(std::ceil(longest / kPartPx)));
 }
 
+// From the sparse outline to where it crosses rows and columns of pixels.
+void cross_outline(double step_px, Round& round) {
+  const int every = std::max(1, static_cast<int>(std::lround(step_px)));
+  round.outline = cross_pixels(round.outline, every, round.crossings);
+  if (round.sweeps.empty()) return;
+  std::vector<Sweep> sweeps;
+  sweeps.reserve(round.crossings.size());
+  for (const Crossings& c : round.crossings) {
+    const Crossing& at = c.at.front();
+    sweeps.push_back(between(round.sweeps[at.before], round.sweeps[at.before + 1], at.part));
+  }
+  round.sweeps = std::move(sweeps);
+}
+
 bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, double step_px,
              Round& round, Refined& out) {
-  round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion, step_px);
+  constexpr double kSmoothPx = 2.0;  // closer samples are as well interpolated
+  round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion,
+                                  search.exact ? kSmoothPx : step_px);
   find_sweeps(scenery, pose, round);
+  if (search.exact) cross_outline(step_px, round);
   out.outline_px = 0.0;
   for (const OutlineSample& sample : round.outline)
     if (sample.silhouette) out.outline_px += sample.arc_px;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "pose_motion.hpp"
@@ -24,6 +25,27 @@ struct OutlineSample {
                                                          const data::Pose<>& pose,
                                                          const data::Camera& camera,
                                                          const PoseMotion& motion, double step_px);
+
+/// Where an outline, sampled sparsely, crosses a row of pixels (where it runs up or down rather
+/// than across) or a column.
+struct Crossing {
+  size_t before;  ///< the sample before; the next one is behind
+  double part;    ///< of the way between them
+  bool row;       ///< or a column
+  Eigen::Vector2d image_px = Eigen::Vector2d::Zero(), normal_px = Eigen::Vector2d::Zero();
+  double curvature_per_px = 0.0;  ///< of the outline, > 0 where the body is convex
+};
+
+/// Neighbouring crossings of rows, or of columns, looked at together.
+struct Crossings {
+  static constexpr int kMost = 2;
+  int count = 0;
+  std::array<Crossing, kMost> at;
+};
+
+/// The outline at crossings of one in `every` rows and columns, interpolated.
+[[nodiscard]] std::vector<OutlineSample> cross_pixels(const std::vector<OutlineSample>& outline,
+                                                      int every, std::vector<Crossings>& crossings);
 
 /// Axis pointing out of the face towards the camera.
 [[nodiscard]] Eigen::Vector3d axis_towards(const data::Camera& camera, const data::Pose<>& pose);

@@ -16,11 +16,11 @@ struct Sampling {
     case Effort::quick:
       return {2.0, 120.0};
     case Effort::exact:
-      return {1.25, 400.0};
+      return {1.0, 1000.0};
     case Effort::normal:
       break;
   }
-  return {1.25, 200.0};
+  return {1.0, 450.0};
 }
 
 }  // namespace trochoid::tracking
