@@ -80,10 +80,11 @@ bool displaced(const Problem& problem, const Eigen::VectorXd& u, const Eigen::Ve
   return residuals.allFinite();
 }
 
+constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
+
 // What one standard deviation along each direction of the data really does to the residuals.
 struct Chords {
   Eigen::MatrixXd slope;  ///< half the difference of the two ends; linear: of unit length
-  Eigen::MatrixXd bend;   ///< mean of the two ends about the middle; linear: zero
   bool straight = true;   ///< the derivatives say the same
 };
 
@@ -92,10 +93,8 @@ struct Chords {
 Chords chords_of(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
                  const Eigen::MatrixXd& scaled_directions, const Eigen::MatrixXd& size_v,
                  const Eigen::VectorXd& sd) {
-  constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
   constexpr double kStraight = 0.2;
-  Chords chords{scaled_directions * sd.asDiagonal(),
-                Eigen::MatrixXd::Zero(scaled_directions.rows(), sd.size()), true};
+  Chords chords{scaled_directions * sd.asDiagonal(), true};
   for (Eigen::Index k = 0; k < sd.size(); ++k) {
     if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
     const Eigen::VectorXd step = sd[k] * size_v.col(k);
@@ -105,7 +104,6 @@ Chords chords_of(const Problem& problem, const Eigen::VectorXd& u, const Lineari
     Eigen::VectorXd slope = 0.5 * (ahead - behind);
     const Eigen::Index priors = slope.size() - problem.rows();
     slope.tail(priors) = chords.slope.col(k).tail(priors);
-    chords.bend.col(k) = 0.5 * (ahead + behind) - all.residuals;
     if ((slope - chords.slope.col(k)).norm() < kStraight) continue;
     chords.straight = false;
     chords.slope.col(k) = slope;
@@ -113,12 +111,23 @@ Chords chords_of(const Problem& problem, const Eigen::VectorXd& u, const Lineari
   return chords;
 }
 
-// How far the valley bends: when the solution is moved by one standard deviation along a singular
-// direction k to either side, the mean of the two residual vectors leaves the tangent plane, and
-// the other directions follow by w(., k), in their own standard deviations. One column per
-// direction.
-Eigen::MatrixXd bends(const Chords& chords) {
-  Eigen::MatrixXd w = chords.slope.transpose() * chords.bend;
+// How far the valley bends: when the solution is moved to either side by `sd` along a direction k,
+// the mean of the two residual vectors leaves the tangent plane, and the other directions follow by
+// w(., k), in the standard deviations of independent residuals. Measured over the distances that
+// correlated residuals let the solution move: ripples do not grow with the square of those. One
+// column per direction.
+Eigen::MatrixXd bends(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
+                      const Chords& chords, const Eigen::MatrixXd& size_v,
+                      const Eigen::VectorXd& sd) {
+  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(chords.slope.rows(), sd.size());
+  for (Eigen::Index k = 0; k < sd.size(); ++k) {
+    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
+    const Eigen::VectorXd step = sd[k] * size_v.col(k);
+    Eigen::VectorXd ahead = all.residuals, behind = all.residuals;
+    if (displaced(problem, u, step, ahead) && displaced(problem, u, -step, behind))
+      bend.col(k) = 0.5 * (ahead + behind) - all.residuals;
+  }
+  Eigen::MatrixXd w = chords.slope.transpose() * bend;
   w.diagonal().setZero();
   return w;
 }
@@ -269,18 +278,13 @@ Eigen::MatrixXd widened(const Problem& problem, const Linearised& all, Correlati
 // Second moment of how far a bent valley takes the solution from the straight one. A displacement
 // w t^2 with a standard normal t has the second moment 3 w w^T.
 Eigen::MatrixXd of_bends(const Directions& seen, const Eigen::MatrixXd& w,
-                         const Eigen::MatrixXd& covariance) {
+                         const Eigen::VectorXd& sd) {
   constexpr double kMostBend = 5.0;
-  // Correlated residuals let the solution move further along a direction, by the root of `further`.
   Eigen::MatrixXd follow = seen.axes * seen.inverse.asDiagonal() * w;
   for (Eigen::Index k = 0; k < w.cols(); ++k) {
     if (!(seen.inverse[k] > 0.0)) continue;
-    const Eigen::VectorXd direction = seen.axes.col(k);
-    const double further =
-        direction.dot(covariance * direction) / (seen.inverse[k] * seen.inverse[k]);
-    const double bend = further * w.col(k).norm();
-    follow.col(k) *=
-        further * std::min(1.0, kMostBend * std::sqrt(further) / std::max(bend, 1e-300));
+    const double most = kMostBend * sd[k] / seen.inverse[k];
+    follow.col(k) *= std::min(1.0, most / std::max(w.col(k).norm(), 1e-300));
   }
   return 3.0 * follow * follow.transpose();
 }
@@ -317,8 +321,10 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   Correlation correlation = correlation_of(problem, all, result);
   Eigen::MatrixXd covariance =
       widened(problem, all, std::move(correlation), scaled, seen.bread, result.whiteness.inflation);
-  const Eigen::MatrixXd w = bends(chords);
-  covariance += of_bends(seen, w, covariance);
+  const Eigen::VectorXd sd =
+      (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd w = bends(problem, u, all, chords, size.asDiagonal() * seen.axes, sd);
+  covariance += of_bends(seen, w, sd);
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
