@@ -96,13 +96,20 @@ std::string cell(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
 }
 
-void print_truth(const Recording& r, const data::TrackFile& file) {
-  const data::Scene scene = data::read_object(r.object);
+/// On the floor; a usual size where nothing is known of the body.
+double radius_px(const Recording& r) {
+  constexpr double kUsual_px = 30.0;
+  if (!r.rendered()) return kUsual_px;
   const data::Camera camera = data::read_camera(r.camera);
   const Eigen::Matrix<double, 2, 3> px_per_m = camera.jacobian_px_per_m({0.0, 0.0, 0.0});
-  const double size_px = px_per_m.leftCols<2>().norm() / std::sqrt(2.0) * scene.body->radius_m;
-  const TruthScore s =
-      score_against_truth(file.tracks.front(), data::read_table(r.truth), *scene.body, size_px);
+  return px_per_m.leftCols<2>().norm() / std::sqrt(2.0) *
+         data::read_object(r.object).body->radius_m;
+}
+
+void print_truth(const Recording& r, const data::TrackFile& file) {
+  const data::Scene scene = data::read_object(r.object);
+  const TruthScore s = score_against_truth(file.tracks.front(), data::read_table(r.truth),
+                                           *scene.body, radius_px(r));
   fmt::print("  frames {}: found {}, wrong {}, lost {}\n", s.frames, s.found, s.wrong, s.lost);
   fmt::print("  CoM rms {} px ({} mm), bias {}, {} px ({}, {} mm), largest {} px in frame {}\n",
              cell(s.rms_px, 4), cell(s.rms_mm, 4), cell(s.bias_px.x(), 4), cell(s.bias_px.y(), 4),
@@ -170,7 +177,7 @@ bool study(const fs::path& folder, const Options& options) {
   else
     fmt::print("  no truth and no labels: tracked only, {} bodies\n", file.tracks.size());
   print_speed(ours, ffmpeg, frames_tracked(target));
-  if (options.baselines) print_baselines(r.video, r.truth, r.labels);
+  if (options.baselines) print_baselines(r.video, r.truth, r.labels, radius_px(r));
   return true;
 }
 
