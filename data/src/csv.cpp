@@ -36,6 +36,8 @@ void check_columns(const std::vector<std::string>& columns, const std::string& p
     const auto starts_as_name = [](char c) {
       return std::isalpha(static_cast<unsigned char>(c)) || c == '_';
     };
+    if (columns[i].front() == '{')
+      throw InputError(fmt::format("{}: is JSON, where a table (CSV) is read", place));
     if (!starts_as_name(columns[i].front()))
       throw InputError(fmt::format(
           "{}: {} is no column name; the first line must name the columns, e.g. t_s,x_m,y_m", place,

@@ -20,7 +20,9 @@ nlohmann::json read_json_object(const std::filesystem::path& path) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
     throw InputError(fmt::format("{}:{}: not JSON{}", path.string(),
                                  1 + std::count(text.begin(), end, '\n'),
-                                 text.empty() ? ", the file is empty" : ""));
+                                 text.empty()                ? ", the file is empty"
+                                 : text.starts_with("# tro") ? ", but a table (CSV)"
+                                                             : ""));
   } catch (const nlohmann::json::exception&) {  // a number out of range
     throw InputError(fmt::format("{}: not JSON: a number is out of range", path.string()));
   }

@@ -100,7 +100,8 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
   };
   const std::vector<fs::path> videos = expanded(base / text("video"));
   if (videos.empty())
-    fail(campaign.manifest, table, fmt::format("video = '{}' matches no file", text("video")));
+    fail(campaign.manifest, *table.get("video"),
+         fmt::format("video = '{}' matches no file", text("video")));
   for (const fs::path& video : videos) {
     CampaignItem item{.name = unique_name(video, taken),
                       .video = video,

@@ -37,7 +37,9 @@ ImageSequence images_of_folder(const fs::path& folder) {
     if (entry.is_regular_file() && is_image(entry.path()))
       ++count[entry.path().extension().string()];
   if (count.empty())
-    throw InputError(fmt::format("{}: the folder holds no images", folder.string()));
+    throw InputError(
+        fmt::format("{}: the folder holds no images; name a video file, or a folder of images",
+                    folder.string()));
   const auto most = std::max_element(
       count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   return {ImageSequence::Kind::pattern, (folder / ("*" + most->first)).string(), 0};
