@@ -87,6 +87,20 @@ TEST(TrackVideo, TwoDiscsKeepTheirNamesThroughACollision) {
   }
 }
 
+TEST(TrackVideo, ReadsNoSpinFromTheShadingOfABodyThatTilts) {
+  const ScratchFolder folder("tilting");
+  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               const double x = 30.0 + 2.2 * i, narrow = 18.0 * (0.75 + 0.2 * std::cos(0.2 * i));
+               draw_disc(picture, x, 60.0, 18.0, narrow, 0.1 * i, 60.0);
+               draw_disc(picture, x + 8.0, 57.0, 4.0, 3.0, 0.0, 130.0);  // the lamp, mirrored
+             });
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt);
+  ASSERT_GT(result.file.tracks.front().samples.size(), 10U);
+  for (const data::TrackSample& sample : result.file.tracks.front().samples)
+    EXPECT_FALSE(sample.psi) << "frame " << sample.frame;
+}
+
 TEST(TrackVideo, ABarInFrontLeavesAGapAndTheDiscIsFoundAgain) {
   const ScratchFolder folder("bar");
   const auto truth = [](int i) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
@@ -37,6 +39,16 @@ double quality_of(const Sighting& seen) {
   constexpr double kDoubtful = 0.4;
   return std::clamp(1.2 * seen.accepted / (1.0 + 0.25 * spread * spread), 0.0,
                     seen.attitude_doubtful ? kDoubtful : 1.0);
+}
+
+/// Whether the body lies: only then does the picture of its face turn as the body spins. One that
+/// tilts gets narrower, and shows its wall and the lamp's shading in place of marks.
+bool lies(const BodyPath& path) {
+  constexpr double kAsRound = 0.1;
+  std::vector<double> roundness;
+  for (const auto& [index, at] : path.frames)
+    roundness.push_back(at.seen.rim.semi_minor_px() / at.seen.rim.semi_major_px());
+  return data::quantile(roundness, 0.9) - data::quantile(roundness, 0.1) < kAsRound;
 }
 
 void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
@@ -99,6 +111,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
   Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
   const std::vector<double> inflations = smoothed_inflations(path);
   auto inflation = inflations.begin();
+  const bool turns_as_it_spins = path.marks && lies(path);
   for (const auto& [index, at] : path.frames) {
     const Sighting& seen = at.seen;
     data::TrackSample sample;
@@ -118,7 +131,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     } else {
       metres_from_rim(sample, seen, rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
-      if (path.marks && seen.turned_rad)
+      if (turns_as_it_spins && seen.turned_rad)
         sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),
                       seen.turned_sigma_rad};
     }
