@@ -66,8 +66,8 @@ double typical_sigma(const Problem& problem, Channel channel) {
   return median(std::move(sigmas));
 }
 
-// Of the worst channel, of those that are not even followed: trackers know little of their common
-// errors. The noise is the larger one of the track's own sigmas and the scatter of
+// Of the worst channel. A path that is followed is doubtful at most: trackers know little of their
+// common errors. The noise is the larger one of the track's own sigmas and the scatter of
 // its samples about a smooth curve.
 Misfit misfit(const Problem& problem, const Squares& sum) {
   constexpr double kFollowed_rad = 0.2;
@@ -89,8 +89,8 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
     double scatter = 1.0;
     for (const ArcData& arc : problem.arcs)
       scatter = std::max(scatter, excess_scatter(arc, channel));
-    const double times = problem.noise_scale[c] / scatter;
-    if (channel == Channel::position && path_followed) continue;
+    double times = problem.noise_scale[c] / scatter;
+    if (channel == Channel::position && path_followed) times = std::min(times, kHopeless);
     // Where the angle is all there is, being followed is not enough.
     const bool whole = problem.predictor->model_name() == "pivot" && times >= kAnyTracker;
     if (channel != Channel::position && !whole &&
