@@ -25,11 +25,12 @@ constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
 // From a prediction that is off by more than the blur: where the last sharp look then starts.
 constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 2, 0.5, false};
 // Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
-Search exact(const Sampling& sampling, double blur_px, double outline_px) {
+Search exact(double most_looks, double blur_px, double outline_px) {
+  constexpr double kLeastStep_px = 1.0;  // neighbours nearer than this show the same pixels
   return {blur_px,
           2.0 + 2.5 * blur_px,
           0.5 + 2.0 * blur_px,
-          std::max(sampling.least_step_px, outline_px / sampling.points),
+          std::max(kLeastStep_px, outline_px / most_looks),
           5,
           0.06,
           true};
@@ -63,7 +64,7 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
   double blur_px = known_blur_px.value_or(kUsualBlurPx);
   data::Pose<> pose = start;
   for (int round = 0; round < 6; ++round) {
-    auto refined = refine(scenery, pose, exact(scenery.sampling, blur_px, outline_px));
+    auto refined = refine(scenery, pose, exact(scenery.most_looks, blur_px, outline_px));
     if (!refined) return std::nullopt;
     out.refined = std::move(*refined);
     out.blur_px = std::clamp(blur_px + out.refined.wider_px, kSharpestPx, kWidestPx);
@@ -299,7 +300,7 @@ OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camer
     : body_(std::move(body)),
       support_(std::move(support)),
       camera_(std::move(camera)),
-      sampling_(sampling_of(effort)) {
+      most_looks_(most_looks(effort)) {
   if (!(body_.radius_m > 0.0))
     throw InputError(fmt::format(
         "body: radius_m = {} gives no outline to look for; give the radius of the rim in metres",
@@ -326,7 +327,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       LightWindow(evidence.luma, window),
       evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
       colour_window(evidence.chroma, window, body_, camera_, starts.front()),
-      sampling_,
+      most_looks_,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))

@@ -21,7 +21,7 @@ struct Scenery {
   const PoseMotion& motion;
   LightWindow picture, plate;
   LightWindow colour;  ///< colour_window, or empty
-  Sampling sampling;
+  double most_looks;
   PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
   std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
@@ -34,7 +34,7 @@ struct Scenery {
             picture.blurred(sigma_px),
             plate.blurred(sigma_px),
             colour.blurred(sigma_px),
-            sampling,
+            most_looks,
             smear,
             tints,
             exposure};

@@ -85,7 +85,7 @@ class OutlineFitter {
   data::Body body_;
   data::Support support_;
   data::Camera camera_;
-  Sampling sampling_;
+  double most_looks_;
 };
 
 }  // namespace trochoid::tracking
