@@ -65,6 +65,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     *problem.work = 0.0;
     error = integration_error_sigma(problem, solution.u);
   }
+  problem.work.reset();  // copies of the problem run side by side from here on
   return error;
 }
 

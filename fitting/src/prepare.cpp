@@ -27,7 +27,7 @@ std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& 
   const SampleRange kept{chosen.first,
                          kept_samples(chosen.first, chosen.second, options.hold_back)};
   if (model == "puck") return sliding_ranges(track, kept);
-  if (model == "pivot") return {{released_at(track, kept), kept.second}};
+  if (model == "pivot" && options.from.empty()) return {{released_at(track, kept), kept.second}};
   return {kept};
 }
 
@@ -44,9 +44,12 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
       arc.held =
           model == "pivot" && first > chosen_range(tracks[i], options.from, options.to).first;
       if (arc.readings.empty())
-        throw InputError(fmt::format(
-            "track {}: no sample has positions in metres; track with a scale or a camera file",
-            i + 1));
+        throw InputError(fmt::format("track {}: no sample has {}", i + 1,
+                                     model == "pivot"
+                                         ? "a spin angle psi_rad, which the pivot model is fitted "
+                                           "to; name the mark under [body] and track again"
+                                         : "positions in metres; track with a scale or a camera "
+                                           "file"));
       arcs.push_back(std::move(arc));
     }
   }
@@ -126,8 +129,9 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   suit_to_data(problem, scene);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
-    throw InputError(fmt::format("{} measurements cannot determine {} parameters of model '{}'",
-                                 problem.rows(), needed, model));
+    throw InputError(fmt::format(
+        "{} measurements{} cannot determine {} parameters of model '{}'", problem.rows(),
+        problem.arcs.front().held ? " after the body is let go" : "", needed, model));
   for (const auto& [name, value] : options.start)
     if (const int index = predictor.index_of(name); index >= 0)
       for (Eigen::VectorXd& base : problem.base) base[index] = value;

@@ -136,7 +136,10 @@ Found search_widely(const Problem& problem, const Starter& starter, Found best) 
     const std::vector<Start> starts = settled(windowed(problem, window), starter);
     for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, kSlowly);
-      if (!found.solution.usable && !exhausted(problem, best)) continue;
+      if (!found.solution.usable) {
+        if (exhausted(problem, best)) return best;
+        continue;
+      }
       const double gain = best.reduced_chi2 / found.reduced_chi2 - 1.0;
       if (!best.solution.usable || gain > kSameValley)
         reached = 1;

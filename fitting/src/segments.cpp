@@ -174,9 +174,12 @@ std::vector<SampleRange> sliding_ranges(const data::Track& track, SampleRange ra
 }
 
 int released_at(const data::Track& track, SampleRange range) {
-  constexpr int kHalfWidth = 4;                 // samples a speed is taken from
-  constexpr std::size_t kHeld = 5;              // at rest for longer than a pendulum at its turn
+  constexpr int kHalfWidth = 4;  // samples a speed is taken from
+  constexpr std::size_t kHeld = 5;
   constexpr double kStill = 0.05, kFast = 0.5;  // of the greatest speed
+  // A hand lets go, or pushes, soon; a pendulum let go takes ten times as long to get fast as it
+  // was still.
+  constexpr double kSuddenly = 3.0;
   std::vector<double> t_s, psi;
   std::vector<int> sample;
   for (int i = range.first; i < range.second; ++i) {
@@ -194,7 +197,9 @@ int released_at(const data::Track& track, SampleRange range) {
   std::size_t i = 0;
   while (i < sample.size() && speed[i] < kStill * greatest) ++i;
   if (i < kHeld) return range.first;
+  const double still_s = t_s[i] - t_s[0];
   while (i < sample.size() && speed[i] < kFast * greatest) ++i;
+  if (t_s[i] - t_s[0] > (1.0 + kSuddenly) * still_s) return range.first;
   while (i + 1 < sample.size() &&
          speed[i] <
              speed.segment(i + 1, std::min<Eigen::Index>(2 * kHalfWidth, speed.size() - i - 1))

@@ -48,7 +48,8 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
     return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };
   }
   if (model == "pivot") {
-    const bool unbalanced = predictor.index_of("spin_down_imbalance_sin_rad_s2") >= 0;
+    const bool unbalanced = predictor.index_of("spin_down_imbalance_sin_rad_s2") >= 0 ||
+                            predictor.index_of("spin_down_imbalance_cos_rad_s2") >= 0;
     return [=](const ArcData& window) { return pivot_starts(window, unbalanced); };
   }
   return [](const ArcData&) { return std::vector<Start>{}; };

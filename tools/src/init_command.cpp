@@ -199,8 +199,9 @@ void add_init_command(CLI::App& app) {
       app.add_subcommand("init", "Write a scene file from a first look at a recording");
   command->add_option("video", options->video, "Recording")->required();
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
-  command->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known")
-      ->check(positive_number());
+  command
+      ->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known: 0.1 to 10000")
+      ->check(CLI::Range(0.1, 10000.0));
   command
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz]: of slow motion, or of an image folder or series")

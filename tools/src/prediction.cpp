@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "fitted_scene.hpp"
 #include "trochoid/data/error.hpp"
@@ -211,6 +212,14 @@ std::optional<data::Pose<>> PredictedPath::at(int object, double t_s) const {
   pose.psi_rad = mix(a.psi_rad, b.psi_rad);
   if (!pose.centre_m.allFinite()) return std::nullopt;
   return pose;
+}
+
+std::optional<double> spin_residual_rad(const data::TrackSample& sample, int object,
+                                        const PredictedPath& path) {
+  const PredictedArc* arc = path.arc_at(object, sample.t_s);
+  if (!sample.psi || arc == nullptr || !arc->has_spin) return std::nullopt;
+  return std::remainder(sample.psi->value_rad - path.at(object, sample.t_s)->psi_rad,
+                        2.0 * std::numbers::pi);
 }
 
 std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,

@@ -47,6 +47,11 @@ struct PredictedPath {
                                                               const data::TrackFile& tracks,
                                                               int track_index, double tolerance);
 
+/// Observed minus predicted spin angle of a sample, the nearer way round; nothing where one of them
+/// is not known.
+[[nodiscard]] std::optional<double> spin_residual_rad(const data::TrackSample& sample, int object,
+                                                      const PredictedPath& path);
+
 /// Observed minus predicted position of one sample.
 struct Residual {
   std::int64_t frame = -1;

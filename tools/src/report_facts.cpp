@@ -40,12 +40,11 @@ double rms_spin_rad(const data::TrackFile& tracks, const PredictedPath& path) {
   double sum = 0.0;
   int count = 0;
   for (const data::Track& track : tracks.tracks)
-    for (const data::TrackSample& sample : track.samples) {
-      const PredictedArc* arc = path.arc_at(track.object, sample.t_s);
-      if (!sample.psi || arc == nullptr || !arc->has_spin) continue;
-      sum += std::pow(sample.psi->value_rad - path.at(track.object, sample.t_s)->psi_rad, 2);
-      ++count;
-    }
+    for (const data::TrackSample& sample : track.samples)
+      if (const auto residual = spin_residual_rad(sample, track.object, path)) {
+        sum += *residual * *residual;
+        ++count;
+      }
   return count > 0 ? std::sqrt(sum / count) : kNaN;
 }
 

@@ -142,16 +142,16 @@ class Series {
 
   [[nodiscard]] json spin_residual() const {
     constexpr double kMradPerRad = 1000.0;
-    const auto measured = [&](std::size_t i) {
-      return rows_[i].sample != nullptr && poses_[i] ? rows_[i].sample->psi : std::nullopt;
+    const auto off = [&](std::size_t i) {
+      return rows_[i].sample == nullptr
+                 ? std::nullopt
+                 : spin_residual_rad(*rows_[i].sample, track_.object, facts_.prediction);
     };
     return residual(
         "spin residual [mrad]", "x",
+        [&](std::size_t i) { return off(i) ? *off(i) * kMradPerRad : kNaN; },
         [&](std::size_t i) {
-          return measured(i) ? (measured(i)->value_rad - poses_[i]->psi_rad) * kMradPerRad : kNaN;
-        },
-        [&](std::size_t i) {
-          return measured(i) ? facts_.noise_scale * measured(i)->sigma_rad * kMradPerRad : kNaN;
+          return off(i) ? facts_.noise_scale * rows_[i].sample->psi->sigma_rad * kMradPerRad : kNaN;
         });
   }
 

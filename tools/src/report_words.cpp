@@ -17,8 +17,9 @@ std::string length_words(double length_m) {
 
 std::string tracked_words(const ReportFacts& facts) {
   const std::size_t bodies = facts.input.tracks.tracks.size();
-  return fmt::format("{} of {} positions over {:.3g} s",
+  return fmt::format("{} of {} {} over {:.3g} s",
                      bodies == 1 ? "The path" : fmt::format("{} paths", bodies), facts.samples,
+                     facts.prediction.angles_alone() ? "samples" : "positions",
                      facts.last_s - facts.first_s);
 }
 

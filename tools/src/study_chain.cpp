@@ -173,6 +173,12 @@ Axes study_fitting(const Options& options) {
 }
 
 void run(const Options& options) {
+  for (const fs::path& folder : options.folders)
+    for (const char* file : {"video.mp4", "truth.csv", "camera.json", "object.json"})
+      if (!fs::exists(folder / file))
+        throw InputError(
+            fmt::format("{}: no such file; each folder needs a recording with its truth",
+                        (folder / file).string()));
   fitting::silence_solver_log();
   fs::create_directories(options.out);
   std::vector<Axes> panels{study_fitting(options)};

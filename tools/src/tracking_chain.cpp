@@ -192,7 +192,6 @@ Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& 
       "recording,picture,width_px,height_px,effort,frames,found,wrong,rms_px,rms_mm,tilt_rms_deg,"
       "normalised,frames_per_s,peak_mb\n";
   for (const fs::path& folder : folders) {
-    if (!fs::is_directory(folder)) continue;  // a README beside the folders
     const std::string name = fs::weakly_canonical(folder).filename().string();
     for (const View& view : kViews) {
       const Recording made = make_view(folder, view, work);
