@@ -29,8 +29,9 @@ struct Options {
   int repeats = 5;
 };
 
-constexpr std::array<const char*, 6> kScenes{"thesis-base",  "thesis-spin-1", "thesis-free",
-                                             "disc_rolling", "disc_smooth",   "disc_sliding"};
+constexpr std::array<const char*, 7> kScenes{"thesis-base", "thesis-spin-1", "top_drag",
+                                             "thesis-free", "disc_rolling",  "disc_smooth",
+                                             "disc_sliding"};
 constexpr std::array<const char*, 5> kIntegrators{"dop853", "taylor", "cvode-adams", "cvode-bdf",
                                                   "arkode"};
 constexpr std::array<double, 6> kTolerances{1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13};
