@@ -100,10 +100,7 @@ std::string cell(double value, int digits) {
 double radius_px(const Recording& r) {
   constexpr double kUsual_px = 30.0;
   if (!r.rendered()) return kUsual_px;
-  const data::Camera camera = data::read_camera(r.camera);
-  const Eigen::Matrix<double, 2, 3> px_per_m = camera.jacobian_px_per_m({0.0, 0.0, 0.0});
-  return px_per_m.leftCols<2>().norm() / std::sqrt(2.0) *
-         data::read_object(r.object).body->radius_m;
+  return px_per_m(data::read_camera(r.camera)) * data::read_object(r.object).body->radius_m;
 }
 
 void print_truth(const Recording& r, const data::TrackFile& file) {

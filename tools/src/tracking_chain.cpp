@@ -49,10 +49,6 @@ int even(double px) {
   return static_cast<int>(px) / 2 * 2;
 }
 
-double px_per_m(const data::Camera& camera) {
-  return camera.jacobian_px_per_m({0.0, 0.0, 0.0}).leftCols<2>().norm() / std::sqrt(2.0);
-}
-
 /// Two radii to every side of where the centre goes: the outline never comes near the border.
 Part part_of(const View& view, const data::Camera& camera, const data::Table& truth,
              double radius_m) {

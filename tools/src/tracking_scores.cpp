@@ -197,4 +197,8 @@ LabelScore score_against_labels(const data::TrackFile& file, const data::Table& 
   return best;
 }
 
+double px_per_m(const data::Camera& camera) {
+  return camera.jacobian_px_per_m({0.0, 0.0, 0.0}).leftCols<2>().norm() / std::sqrt(2.0);
+}
+
 }  // namespace trochoid::tools

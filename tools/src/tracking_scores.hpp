@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "trochoid/data/body.hpp"
+#include "trochoid/data/camera.hpp"
 #include "trochoid/data/table.hpp"
 #include "trochoid/data/track.hpp"
 
@@ -43,5 +44,8 @@ struct LabelScore {
 [[nodiscard]] LabelScore score_against_labels(const data::TrackFile& file,
                                               const data::Table& labels, const std::string& name,
                                               std::int64_t first_frame = 0);
+
+/// Pixels a metre of the floor takes at the table's origin, mean square of both directions.
+[[nodiscard]] double px_per_m(const data::Camera& camera);
 
 }  // namespace trochoid::tools
