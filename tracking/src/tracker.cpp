@@ -9,6 +9,7 @@
 
 #include "attitude_sequence.hpp"
 #include "body_search.hpp"
+#include "neighbours.hpp"
 #include "path_motion.hpp"
 #include "recording.hpp"
 #include "track_assembly.hpp"

@@ -1,0 +1,78 @@
+#include "neighbours.hpp"
+
+#include "glimpsed_sequence.hpp"
+#include "pose_motion.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Neighbours = GlimpsedSequence;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// Finds the same in one frame wherever it looks.
+class StubbornOracle final : public BodyFinder {
+ public:
+  StubbornOracle(std::int64_t index, double phi_rad) : index_(index), phi_rad_(phi_rad) {}
+  [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+    auto seen = oracle_.find(look);
+    if (look.frame.index == index_) seen->pose->pose.phi_rad = phi_rad_;
+    return seen;
+  }
+  void place(Sighting& guess) const override { oracle_.place(guess); }
+
+ private:
+  std::int64_t index_;
+  double phi_rad_;
+  Oracle oracle_{[](int) { return 10.0; }};
+};
+
+TEST_F(Neighbours, ALostFrameIsSoughtWhereItsNeighboursPutIt) {
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  glimpses[30].seen.reset();
+  mend_from_neighbours(background_, oracle, glimpses);
+  ASSERT_TRUE(glimpses[30].seen);
+  EXPECT_NEAR(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn), 0.0, 0.01);
+}
+
+TEST_F(Neighbours, WrongFramesSideBySideAreOutvotedByThoseAround) {
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (const std::size_t i : {30u, 31u}) glimpses[i].seen->pose->pose.phi_rad += 2.0;
+  mend_from_neighbours(background_, oracle, glimpses);
+  for (const std::size_t i : {30u, 31u})
+    EXPECT_NEAR(std::remainder(glimpses[i].pose().phi_rad - phi_at(frames_[i].t_s), kTurn), 0.0,
+                0.01)
+        << i;
+}
+
+TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {
+  const double wrong_rad = phi_at(0.5) + 1.2;
+  const StubbornOracle oracle(30, wrong_rad);
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  mend_from_neighbours(background_, oracle, glimpses);
+  for (std::size_t i = 0; i < glimpses.size(); ++i)
+    EXPECT_EQ(glimpses[i].seen->attitude_doubtful, i == 30) << i;
+  EXPECT_TRUE(std::isinf(glimpses[30].seen->pose->sigma_phi_rad));
+}
+
+TEST_F(Neighbours, ABodyThatRocksOverItsFaceIsExpectedOnTheWayBetween) {
+  // Tilt and precession do not change evenly there: the one turns round, the other leaps.
+  const auto axis_at = [](double t_s) {
+    const Eigen::Vector2d level(4.0 * (t_s - 0.5), 0.05);
+    return Eigen::Vector3d(level.x(), level.y(), std::sqrt(1.0 - level.squaredNorm()));
+  };
+  const Oracle oracle([](int) { return 0.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses)
+    if (std::abs(g.frame->t_s - 0.5) < 0.12) set_axis(axis_at(g.frame->t_s), g.seen->pose->pose);
+  const std::vector<Glimpse> near(glimpses.begin() + 24, glimpses.begin() + 37);
+  std::vector<Glimpse> rocking = near;
+  rocking[6].seen.reset();
+  mend_from_neighbours(background_, oracle, rocking);
+  ASSERT_TRUE(rocking[6].posed());
+  EXPECT_LT(between_axes(axis_of(rocking[6].pose()), axis_at(0.5), false), 0.02);
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,51 @@
+#include "glimpse.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+
+namespace trochoid::tracking {
+
+Eigen::Vector3d axis_of(const data::Pose<>& pose) {
+  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+}
+
+double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike) {
+  const double cosine = a.dot(b);
+  return std::acos(std::clamp(alike ? std::abs(cosine) : cosine, -1.0, 1.0));
+}
+
+std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,
+                                              const std::optional<data::Pose<>>& near) {
+  finder_.place(guess);
+  const double half_px = 1.6 * guess.rim.semi_major_px() + 24.0;
+  const cv::Rect box = cv::Rect(static_cast<int>(guess.centre_px.x() - half_px),
+                                static_cast<int>(guess.centre_px.y() - half_px),
+                                static_cast<int>(2.0 * half_px), static_cast<int>(2.0 * half_px)) &
+                       cv::Rect({}, frame.luma.size());
+  if (box.width < 8 || box.height < 8) return std::nullopt;
+  background_.scaled_into(plate_, background_.gain(frame.luma), box);
+  Look look{.frame = frame, .background = plate_};
+  look.predicted = &guess;
+  Sighting last = guess;
+  if (near) {
+    last.pose->pose = *near;
+    finder_.place(last);
+    look.last = &last;
+    look.motion_px = guess.centre_px - last.centre_px;
+  }
+  return finder_.find(look);
+}
+
+void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
+                   const std::function<void(Measuring&, std::size_t)>& work) {
+  const auto every_other = [&](std::size_t first) {
+    Measuring measuring(background, finder);
+    for (std::size_t i = first; i < count; i += 2) work(measuring, i);
+  };
+  auto other = std::async(std::launch::async, every_other, 1);
+  every_other(0);
+  other.get();
+}
+
+}  // namespace trochoid::tracking

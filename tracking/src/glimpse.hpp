@@ -1,0 +1,45 @@
+#pragma once
+#include <cstddef>
+#include <functional>
+#include <optional>
+
+#include "background.hpp"
+#include "body_finder.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tracking {
+
+/// One body in one of consecutive frames; nothing where it was not seen.
+struct Glimpse {
+  const Frame* frame = nullptr;
+  std::optional<Sighting> seen{};
+
+  [[nodiscard]] bool posed() const { return seen && seen->pose; }
+  [[nodiscard]] const data::Pose<>& pose() const { return seen->pose->pose; }
+};
+
+/// Measures a body about a guess in one frame.
+class Measuring {
+ public:
+  Measuring(const Background& background, const BodyFinder& finder)
+      : background_(background), finder_(finder) {}
+
+  /// @param near its pose one frame earlier or later, if known: how far it smears.
+  [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
+                                                   const std::optional<data::Pose<>>& near);
+
+ private:
+  const Background& background_;
+  const BodyFinder& finder_;
+  Plate plate_;
+};
+
+/// Runs work(measuring, i) for i of 0..count on two cores.
+void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
+                   const std::function<void(Measuring&, std::size_t)>& work);
+
+[[nodiscard]] Eigen::Vector3d axis_of(const data::Pose<>& pose);
+/// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
+[[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
+
+}  // namespace trochoid::tracking

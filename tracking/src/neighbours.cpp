@@ -1,0 +1,375 @@
+#include "neighbours.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "forecast.hpp"
+#include "pose_motion.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Pose = data::Pose<>;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// The polynomial through all the values [Lagrange].
+template <class Value>
+Value through(const std::vector<double>& times, const std::vector<Value>& values, double t) {
+  Value sum = 0.0 * values[0];
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    double weight = 1.0;
+    for (std::size_t l = 0; l < times.size(); ++l)
+      if (l != k) weight *= (t - times[l]) / (times[k] - times[l]);
+    sum += weight * values[k];
+  }
+  return sum;
+}
+
+/// Where neighbours at a and b (and those before and after them) put the body at time t.
+struct Neighbours {
+  const Glimpse &before, &a, &b, &after;
+
+  [[nodiscard]] double frame_s() const {
+    return (b.frame->t_s - a.frame->t_s) / static_cast<double>(b.frame->index - a.frame->index);
+  }
+  [[nodiscard]] Pose at(double t_s, bool alike) const {
+    constexpr double kSlowTurn_rad = 0.5;  // per frame: the axis draws a smooth curve
+    constexpr double kNearlyUpright = 0.35;
+    const std::vector<double> times = moments();
+    const std::vector<Pose> poses = in_one_reading(alike);
+    const double ta = a.frame->t_s, tb = b.frame->t_s, share = (t_s - ta) / (tb - ta);
+    Pose pose = a.pose();
+    const Pose& to = poses[static_cast<std::size_t>(&before != &a) + 1];
+    pose.centre_m += share * (to.centre_m - pose.centre_m);
+    std::vector<Eigen::Vector2d> level;  // parts of the axis
+    for (const Pose& p : poses) level.emplace_back(axis_of(p).head<2>());
+    const bool upright = axis_of(pose).z() >= 0.0;
+    const double early = rate_between(before, a, alike), late = rate_between(b, after, alike);
+    const bool slow = std::max(std::abs(early), std::abs(late)) * frame_s() < kSlowTurn_rad;
+    if (goes_on(level) || (slow && std::min(level_of(pose), level_of(to)) < kNearlyUpright)) {
+      const Eigen::Vector2d n = through(times, level, t_s);
+      const double z = std::sqrt(std::max(0.0, 1.0 - n.squaredNorm()));
+      set_axis(Eigen::Vector3d(n.x(), n.y(), upright ? z : -z).normalized(), pose);
+      return pose;
+    }
+    const double turns =
+        std::round((0.5 * (early + late) * (tb - ta) - (to.phi_rad - pose.phi_rad)) / kTurn);
+    pose.theta_rad += share * (to.theta_rad - pose.theta_rad);
+    pose.phi_rad += share * (to.phi_rad - pose.phi_rad + turns * kTurn);
+    return pose;
+  }
+
+ private:
+  static double level_of(const Pose& pose) { return std::sin(pose.theta_rad); }
+  [[nodiscard]] std::vector<double> moments() const {
+    std::vector<double> times;
+    if (&before != &a) times.push_back(before.frame->t_s);
+    times.insert(times.end(), {a.frame->t_s, b.frame->t_s});
+    if (&after != &b) times.push_back(after.frame->t_s);
+    return times;
+  }
+  [[nodiscard]] std::vector<Pose> in_one_reading(bool alike) const {
+    std::vector<Pose> poses;
+    if (&before != &a) poses.push_back(before.pose());
+    poses.insert(poses.end(), {a.pose(), b.pose()});
+    if (&after != &b) poses.push_back(after.pose());
+    for (Pose& pose : poses)
+      if (alike) pose = nearer_face(pose, a.pose(), 0.0);
+    return poses;
+  }
+  /// The axis moves on in about one direction, be it through the vertical, where tilt and
+  /// precession do not; not so where it turns by much of a round from frame to frame.
+  static bool goes_on(const std::vector<Eigen::Vector2d>& level) {
+    constexpr double kLeastCosine = 0.0, kStill = 0.02;
+    for (std::size_t k = 2; k < level.size(); ++k) {
+      const Eigen::Vector2d first = level[k - 1] - level[k - 2], then = level[k] - level[k - 1];
+      if (std::max(first.norm(), then.norm()) < kStill) continue;
+      if (first.dot(then) < kLeastCosine * first.norm() * then.norm()) return false;
+    }
+    return true;
+  }
+  static double rate_between(const Glimpse& from, const Glimpse& to, bool alike) {
+    const double step_s = to.frame->t_s - from.frame->t_s;
+    if (step_s <= 0.0) return 0.0;
+    Pose end = to.pose();
+    if (alike) end = nearer_face(end, from.pose(), 0.0);
+    return std::remainder(end.phi_rad - from.pose().phi_rad, kTurn) / step_s;
+  }
+};
+
+/// What speaks for a fit. A wrong pose may have the longer outline and so the more evidence: how
+/// much of it is plainly seen counts as well.
+double worth(const Sighting& seen) {
+  return seen.pose->evidence * seen.accepted;
+}
+
+/// Frames in which clearly less speaks for the fit than in those around: it may have settled
+/// beside the body.
+std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kReach = 12, kFewest = 8;
+  constexpr double kOfUsual = 0.05, kDeviations = 2.5 * 1.48;
+  std::vector<bool> poor(glimpses.size(), false);
+  std::vector<double> around, off;
+  for (std::size_t i = 0; i < glimpses.size(); ++i) {
+    if (!glimpses[i].seen || !glimpses[i].seen->pose) continue;
+    around.clear(), off.clear();
+    for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
+         ++k)
+      if (const Glimpse& g = glimpses[k]; g.seen && g.seen->pose) around.push_back(worth(*g.seen));
+    if (around.size() < kFewest) continue;
+    const double usual = data::median(around);
+    for (const double value : around) off.push_back(std::abs(value - usual));
+    poor[i] = worth(*glimpses[i].seen) <
+              usual - std::max(kOfUsual * usual, kDeviations * data::median(off));
+  }
+  return poor;
+}
+
+/// Where the frames around one put the body in it.
+struct Expected {
+  Sighting seen;            ///< placed there
+  Pose earlier;             ///< one frame before
+  double step_rad = 0.0;    ///< turn of the axis between the frames it lies between
+  double spread_rad = 0.0;  ///< by how much the frames around usually differ on it
+
+  /// Whether they cannot all be wrong about what was seen this far off.
+  [[nodiscard]] bool contradicts(double off_rad) const {
+    constexpr double kLeast = 0.2, kSpreads = 2.0;
+    return off_rad >= kLeast + kSpreads * spread_rad;
+  }
+};
+
+/// How far a sighting is from a pose: in the attitude of the axis, or in place per size of the
+/// body.
+double off_rad(const Sighting& seen, const Sighting& expected, bool alike) {
+  return std::max(
+      between_axes(axis_of(seen.pose->pose), axis_of(expected.pose->pose), alike),
+      2.0 * (seen.centre_px - expected.centre_px).norm() / expected.rim.semi_major_px());
+}
+
+/// The pairs of frames, one on either side of frame i and at most a few frames off, nearest first;
+/// at an end of the recording the two nearest lead beyond themselves.
+/// @param but frames that do not count.
+std::vector<Neighbours> pairs_around(const std::vector<Glimpse>& glimpses, std::size_t i,
+                                     const std::vector<bool>& but) {
+  constexpr std::size_t kFarthest = 6, kSide = 3;
+  std::vector<const Glimpse*> before, after;
+  for (std::size_t k = 1; k <= kFarthest && k <= i && before.size() <= kSide; ++k)
+    if (glimpses[i - k].posed() && !but[i - k]) before.push_back(&glimpses[i - k]);
+  for (std::size_t k = 1; k <= kFarthest && i + k < glimpses.size() && after.size() <= kSide; ++k)
+    if (glimpses[i + k].posed() && !but[i + k]) after.push_back(&glimpses[i + k]);
+  if (before.empty() && after.size() > 1) return {{*after[0], *after[0], *after[1], *after[1]}};
+  if (after.empty() && before.size() > 1) return {{*before[0], *before[0], *before[1], *before[1]}};
+  std::vector<Neighbours> pairs;
+  for (std::size_t span = 0; span < 2 * kSide - 1; ++span)
+    for (std::size_t k = 0; k <= span; ++k) {
+      const std::size_t l = span - k;
+      if (k >= std::min(kSide, before.size()) || l >= std::min(kSide, after.size())) continue;
+      pairs.push_back({*before[std::min(k + 1, before.size() - 1)], *before[k], *after[l],
+                       *after[std::min(l + 1, after.size() - 1)]});
+    }
+  return pairs;
+}
+
+/// What most of the pairs of frames around frame i agree on: some of these may be wrong themselves.
+std::optional<Expected> expected_at(const BodyFinder& finder, const std::vector<Glimpse>& glimpses,
+                                    std::size_t i, const std::vector<bool>& but) {
+  const bool alike = finder.faces_look_alike();
+  const std::vector<Neighbours> pairs = pairs_around(glimpses, i, but);
+  if (pairs.empty()) return std::nullopt;
+  const double t_s = glimpses[i].frame->t_s;
+  std::vector<Sighting> said;
+  for (const Neighbours& pair : pairs) {
+    said.push_back(*pair.a.seen);
+    said.back().pose->pose = pair.at(t_s, alike);
+    finder.place(said.back());
+  }
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity(), spread = 0.0;
+  for (std::size_t k = 0; k < said.size(); ++k) {
+    std::vector<double> apart;
+    for (std::size_t l = 0; l < said.size(); ++l)
+      if (l != k) apart.push_back(off_rad(said[l], said[k], alike));
+    const double sum = std::accumulate(apart.begin(), apart.end(), 0.0);
+    if (sum >= least) continue;
+    best = k, least = sum, spread = apart.empty() ? 0.0 : data::median(apart);
+  }
+  const Neighbours& pair = pairs[best];
+  return Expected{said[best], pair.at(t_s - pair.frame_s(), alike),
+                  between_axes(axis_of(pair.a.pose()), axis_of(pair.b.pose()), alike), spread};
+}
+
+/// Where a body would have been one frame before `pose`, moving as between its neighbours.
+Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
+  Pose earlier = pose;
+  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, kTurn);
+  const double turned = std::remainder(pose.phi_rad - before.phi_rad, kTurn) +
+                        std::remainder(after.phi_rad - pose.phi_rad, kTurn);
+  // More than half a turn in two frames.
+  earlier.phi_rad -= std::abs(turned) > 0.5 * kTurn ? 0.5 * turned : turn;
+  earlier.theta_rad -= 0.5 * (after.theta_rad - before.theta_rad);
+  earlier.centre_m -= 0.5 * (after.centre_m - before.centre_m);
+  return earlier;
+}
+
+/// Frames in which the body moves far during the exposure are measured again with how it moves as
+/// the frames on both sides know it: while it was followed, only the past did.
+void measure_smeared(const Background& background, const BodyFinder& finder,
+                     std::vector<Glimpse>& glimpses) {
+  constexpr double kLeastSmear_px = 1.5, kAsGood = 0.95, kNear = 0.25;
+  const double fraction = finder.exposure_fraction();
+  if (!(fraction > 0.0)) return;
+  const bool alike = finder.faces_look_alike();
+  const std::vector<Glimpse> was = glimpses;
+  const auto posed = [&](std::size_t i) { return was[i].seen && was[i].seen->pose; };
+  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+    if (i == 0 || i + 1 >= was.size() || !posed(i) || !posed(i - 1) || !posed(i + 1)) return;
+    const Sighting& seen = *was[i].seen;
+    if (seen.attitude_doubtful) return;
+    const double way_px = apart_px(*was[i - 1].seen, seen) + apart_px(seen, *was[i + 1].seen);
+    if (0.5 * fraction * way_px < kLeastSmear_px) return;
+    const Pose pose = seen.pose->pose;
+    Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
+    if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
+    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after));
+    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
+    const double off =
+        std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
+                 (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
+    if (off > kNear) return;
+    again->turned_rad = seen.turned_rad;
+    glimpses[i].seen = std::move(again);
+  });
+}
+
+/// Measures a frame again where its neighbours contradict it. Nothing if what was seen stands.
+class Mending {
+ public:
+  Mending(const BodyFinder& finder, const std::vector<Glimpse>& was)
+      : finder_(finder), was_(was), poor_(poor_fits(was)), none_(was.size(), false) {
+    std::vector<double> worths;
+    for (const Glimpse& g : was)
+      if (g.posed()) worths.push_back(worth(*g.seen));
+    usual_ = data::median(worths);
+  }
+
+  [[nodiscard]] std::optional<Sighting> operator()(Measuring& measure, std::size_t i) const {
+    if (was_[i].seen && !was_[i].seen->pose) return std::nullopt;
+    Found best;
+    // Poor fits may mislead, or be all there is.
+    for (const std::vector<bool>& but : {poor_, none_}) {
+      const auto expected = expected_at(finder_, was_, i, but);
+      if (!expected) continue;
+      Found found = better(measure, i, *expected);
+      if (found.seen && found.gain > best.gain) best = std::move(found);
+    }
+    return std::move(best.seen);
+  }
+
+ private:
+  struct Found {
+    std::optional<Sighting> seen;
+    double gain = 0.0;  ///< in likelihood, over what was seen before
+  };
+
+  /// How likely a sighting is: by what speaks for it, and by how far it is from what is expected.
+  [[nodiscard]] static double likelihood(const Sighting& seen, double off_rad,
+                                         const Expected& expected) {
+    const double usual = 0.15 + expected.spread_rad, off = off_rad / usual;
+    return worth(seen) / (1.0 + off * off);
+  }
+
+  /// What is seen where the body is expected, if that explains frame i better than what it has.
+  [[nodiscard]] Found better(Measuring& measure, std::size_t i, const Expected& expected) const {
+    constexpr double kUsualShare = 0.5, kAsGood = 0.9, kBetter = 1.1;
+    const auto& before = was_[i].seen;
+    const bool alike = finder_.faces_look_alike();
+    const double off = before ? off_rad(*before, expected.seen, alike) : 0.0;
+    if (before && !expected.contradicts(off) && !poor_[i]) return {};
+    auto seen = measure(*was_[i].frame, expected.seen, expected.earlier);
+    if (!seen || !seen->pose) return {};
+    const double now_off = off_rad(*seen, expected.seen, alike);
+    if (expected.contradicts(now_off)) return {};
+    const double now = likelihood(*seen, now_off, expected);
+    if (!before) {
+      if (worth(*seen) < kUsualShare * usual_) return {};
+      return {std::move(seen), now};
+    }
+    const double gain = now / likelihood(*before, off, expected);
+    if (gain < kBetter || worth(*seen) < kAsGood * worth(*before)) return {};
+    seen->turned_rad = before->turned_rad;
+    return {std::move(seen), gain};
+  }
+
+  const BodyFinder& finder_;
+  const std::vector<Glimpse>& was_;
+  std::vector<bool> poor_, none_;
+  double usual_ = 0.0;  ///< worth of a sighting
+};
+
+/// What the frames around still contradict may be where they say instead: its covariance holds
+/// both.
+void doubt(const Expected& expected, Sighting& seen) {
+  seen.attitude_doubtful = true;
+  PoseMeasurement& pose = *seen.pose;
+  pose.sigma_theta_rad =
+      std::hypot(pose.sigma_theta_rad, expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
+  pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d px = expected.seen.centre_px - seen.centre_px;
+  const Eigen::Vector2d m = (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>();
+  const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
+  seen.covariance_px2 += px2;
+  pose.covariance_px2 += px2, pose.common.px2 += px2;
+  pose.covariance_m2 += m2, pose.common.m2 += m2;
+}
+
+/// A poor fit is doubted sooner.
+void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses) {
+  constexpr double kPoorOff_rad = 0.1;
+  const std::vector<Glimpse> was = glimpses;
+  const std::vector<bool> poor = poor_fits(was);
+  for (std::size_t i = 0; i < was.size(); ++i) {
+    if (!was[i].posed() || was[i].seen->attitude_doubtful) continue;
+    const auto expected = expected_at(finder, was, i, poor);
+    if (!expected) continue;
+    const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
+    if (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad))
+      doubt(*expected, *glimpses[i].seen);
+  }
+}
+
+}  // namespace
+
+void mend_from_neighbours(const Background& background, const BodyFinder& finder,
+                          std::vector<Glimpse>& glimpses) {
+  constexpr int kMostRounds = 3;
+  constexpr std::size_t kReach = 6;
+  if (std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) { return g.posed(); }) <
+      4)
+    return;
+  // What was mended may tell its own neighbours more.
+  std::vector<char> open(glimpses.size(), 1);
+  for (int round = 0; round < kMostRounds; ++round) {
+    const std::vector<Glimpse> was = glimpses;
+    const Mending mend(finder, was);
+    std::vector<char> mended(was.size(), 0);
+    on_both_cores(background, finder, was.size(), [&](Measuring& measure, std::size_t i) {
+      if (!open[i]) return;
+      if (auto seen = mend(measure, i)) glimpses[i].seen = std::move(seen), mended[i] = 1;
+    });
+    open.assign(was.size(), 0);
+    for (std::size_t i = 0; i < was.size(); ++i)
+      for (std::size_t k = i - std::min(i, kReach);
+           mended[i] && k < std::min(was.size(), i + kReach + 1); ++k)
+        open[k] = 1;
+  }
+  measure_smeared(background, finder, glimpses);
+  doubt_what_is_contradicted(finder, glimpses);
+}
+
+}  // namespace trochoid::tracking
