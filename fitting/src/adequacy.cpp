@@ -198,7 +198,7 @@ void accept(const Solution& solution, const Uncertainty& error, const Misfit& wo
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
-  const double widened = std::sqrt(error.whiteness.inflation);
+  const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
   std::string words = "the model explains the track";
   if (correlated)

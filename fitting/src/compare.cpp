@@ -24,8 +24,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Evidence by differences of BIC (Kass and Raftery, J. Am. Stat. Assoc. 90, 773, 1995): up to 2
-// "not worth more than a bare mention", above 10 "very strong".
-constexpr double kBareMention = 2.0, kVeryStrong = 10.0;
+// "not worth more than a bare mention", above 6 "strong", above 10 "very strong". Trackers err a
+// little with the motion itself: a further term needs strong evidence.
+constexpr double kStrong = 6.0, kVeryStrong = 10.0;
 constexpr double kHeldBack = 1.0 / 3.0;
 
 struct Rung {
@@ -35,7 +36,7 @@ struct Rung {
   data::Fit fit;
   bool fitted = false;
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
-  int parameters = 0, rows = 0;
+  int parameters = 0;
   double aicc = kInfinity, bic = kInfinity;
 };
 
@@ -210,32 +211,12 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
   }
   rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
-  rung.rows = rung.fit.dof + rung.parameters;
+  if (!rung.fitted) return;
+  rung.aicc = rung.fit.aicc;
+  rung.bic = rung.fit.bic;
 }
 
 // --- all rungs ----------------------------------------------------------------------------------
-
-// AICc and BIC with the noise as an estimated parameter and one effective sample size for all:
-// every rung's own would reward the worse one for its correlated residuals.
-void score(std::vector<Rung>& rungs) {
-  double least = kInfinity, inflation = 1.0;
-  for (const Rung& rung : rungs) {
-    if (!rung.fitted || rung.fit.chi2 >= least) continue;
-    least = rung.fit.chi2;
-    double step_s = 0.0;
-    for (const data::FitArc& arc : rung.fit.arcs)
-      step_s = std::max(step_s, (arc.to_s - arc.from_s) / std::max(1, arc.samples - 1));
-    inflation = step_s > 0.0 ? 1.0 + 2.0 * rung.fit.correlation_time_s / step_s : 1.0;
-  }
-  for (Rung& rung : rungs) {
-    if (!rung.fitted) continue;
-    const double n = std::max(rung.rows / inflation, 2.0);
-    const double k = rung.parameters + 1.0;
-    const double misfit = n * std::log(std::max(rung.fit.chi2 / rung.rows, 1e-300));
-    rung.aicc = misfit + 2.0 * k + (n > k + 1.0 ? 2.0 * k * (k + 1.0) / (n - k - 1.0) : kInfinity);
-    rung.bic = misfit + k * std::log(n);
-  }
-}
 
 const Rung* least_bic(const std::vector<Rung>& rungs) {
   const Rung* best = nullptr;
@@ -247,7 +228,7 @@ const Rung* least_bic(const std::vector<Rung>& rungs) {
 // Fewest parameters among those as good as the best; among these the least BIC.
 const Rung* simplest_sufficient(const std::vector<Rung>& rungs) {
   const Rung* best = least_bic(rungs);
-  const double allowed = best != nullptr ? best->bic + kBareMention : 0.0;
+  const double allowed = best != nullptr ? best->bic + kStrong : 0.0;
   for (const Rung& rung : rungs) {
     if (!rung.fitted || rung.bic > allowed) continue;
     if (rung.parameters < best->parameters ||
@@ -292,7 +273,6 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
     const auto n = static_cast<std::size_t>(i);
     fit_rung(tracks, &rungs[current], added[n], one, rungs[first + n]);
   });
-  score(rungs);
   std::size_t best = current;
   for (std::size_t i = first; i < rungs.size(); ++i)
     if (rungs[i].fitted && (!rungs[best].fitted || rungs[i].bic < rungs[best].bic)) best = i;
@@ -324,13 +304,12 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   rungs.reserve(2 + (kMostTerms + 1) * ladder.terms.size());
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options, rungs[0]);
-  score(rungs);
   std::size_t current = 0;
   for (std::size_t size = 1; size <= std::min(kMostTerms, ladder.terms.size()); ++size) {
     if (options.progress)
       options.progress(rungs[current].name, static_cast<double>(size - 1) / kMostTerms);
     const std::size_t best = step_up(ladder, tracks, options, false, current, rungs);
-    const bool worth = best != current && rungs[best].bic < rungs[current].bic - kBareMention;
+    const bool worth = best != current && rungs[best].bic < rungs[current].bic - kStrong;
     if (!worth) break;
     current = best;
   }
@@ -345,7 +324,6 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (const auto all = all_that_usually_acts(ladder, rungs[current].terms); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
     fit_rung(tracks, nullptr, nullptr, options, rungs.back());
-    score(rungs);
   }
   return rungs;
 }

@@ -81,7 +81,7 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   if (error.whiteness.inflation > 1.0)
     fit.warnings.push_back(
         fmt::format("residuals hang together over {:.3g} s: error bars widened by {:.2f}",
-                    error.whiteness.correlation_time_s, std::sqrt(error.whiteness.inflation)));
+                    error.whiteness.correlation_time_s, error.widened));
 }
 
 // Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes.
@@ -114,7 +114,7 @@ void warn_short_rim(const Problem& problem, data::Fit& fit) {
 
 void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit) {
-  const Criteria score = criteria(problem, u, error.whiteness.inflation);
+  const Criteria score = criteria(problem, u, error.surprise);
   fit.chi2 = score.chi2;
   fit.dof = score.rows - static_cast<int>(problem.free.size());
   fit.aicc = score.aicc;

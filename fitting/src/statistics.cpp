@@ -11,7 +11,7 @@
 
 #include "linearise.hpp"
 #include "smoothing.hpp"
-#include "trochoid/data/error.hpp"
+#include "valley.hpp"
 
 namespace trochoid::fitting {
 
@@ -61,75 +61,6 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
   }
   const double typical = median(std::move(sizes));
   return typical > 0.0 ? Eigen::VectorXd(0.5 / typical * rows) : rows;
-}
-
-// Residuals of a displaced solution; false where a parameter leaves its range or the model ends.
-bool displaced(const Problem& problem, const Eigen::VectorXd& u, const Eigen::VectorXd& step,
-               Eigen::VectorXd& residuals) {
-  Eigen::VectorXd at = u;
-  for (Eigen::Index i = 0; i < u.size(); ++i) {
-    const Transform& transform = problem.free[i].transform;
-    const double value = transform.value(u[i]) + step[i];
-    at[i] = transform.inverse(value);
-    if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + 1e-12))
-      return false;
-  }
-  Eigen::VectorXd there;
-  if (!all_residuals(problem, at, there)) return false;
-  residuals.head(there.size()) = there;
-  return residuals.allFinite();
-}
-
-constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
-
-// What one standard deviation along each direction of the data really does to the residuals.
-struct Chords {
-  Eigen::MatrixXd slope;  ///< half the difference of the two ends; linear: of unit length
-  bool straight = true;   ///< the derivatives say the same
-};
-
-// Chords where the data see enough of a direction and the model goes on to both ends, tangents
-// elsewhere. `scaled_directions` and `size_v`: derivatives and values per unit of each direction.
-Chords chords_of(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
-                 const Eigen::MatrixXd& scaled_directions, const Eigen::MatrixXd& size_v,
-                 const Eigen::VectorXd& sd) {
-  constexpr double kStraight = 0.2;
-  Chords chords{scaled_directions * sd.asDiagonal(), true};
-  for (Eigen::Index k = 0; k < sd.size(); ++k) {
-    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
-    const Eigen::VectorXd step = sd[k] * size_v.col(k);
-    Eigen::VectorXd ahead = all.residuals, behind = all.residuals;
-    if (!displaced(problem, u, step, ahead) || !displaced(problem, u, -step, behind)) continue;
-    // Turning angles jump by whole turns of residual; priors are linear.
-    Eigen::VectorXd slope = 0.5 * (ahead - behind);
-    const Eigen::Index priors = slope.size() - problem.rows();
-    slope.tail(priors) = chords.slope.col(k).tail(priors);
-    if ((slope - chords.slope.col(k)).norm() < kStraight) continue;
-    chords.straight = false;
-    chords.slope.col(k) = slope;
-  }
-  return chords;
-}
-
-// How far the valley bends: when the solution is moved to either side by `sd` along a direction k,
-// the mean of the two residual vectors leaves the tangent plane, and the other directions follow by
-// w(., k), in the standard deviations of independent residuals. Measured over the distances that
-// correlated residuals let the solution move: ripples do not grow with the square of those. One
-// column per direction.
-Eigen::MatrixXd bends(const Problem& problem, const Eigen::VectorXd& u, const Linearised& all,
-                      const Chords& chords, const Eigen::MatrixXd& size_v,
-                      const Eigen::VectorXd& sd) {
-  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(chords.slope.rows(), sd.size());
-  for (Eigen::Index k = 0; k < sd.size(); ++k) {
-    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
-    const Eigen::VectorXd step = sd[k] * size_v.col(k);
-    Eigen::VectorXd ahead = all.residuals, behind = all.residuals;
-    if (displaced(problem, u, step, ahead) && displaced(problem, u, -step, behind))
-      bend.col(k) = 0.5 * (ahead + behind) - all.residuals;
-  }
-  Eigen::MatrixXd w = chords.slope.transpose() * bend;
-  w.diagonal().setZero();
-  return w;
 }
 
 data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
@@ -220,32 +151,31 @@ double student_factor(double degrees_of_freedom) {
   return 1.0 + (first + second / n) / (n * z);
 }
 
-// How residuals that hang together widen each row, and the offsets they may share.
-struct Correlation {
-  Eigen::VectorXd row_scale;
+// Noise of all channels, and the offsets that may be common to a whole record.
+struct Noise {
+  std::vector<ChannelNoise> channels;
   std::vector<Eigen::VectorXd> offsets;
-  bool present = false;
 };
 
-Correlation correlation_of(const Problem& problem, const Linearised& all, Uncertainty& result) {
-  Correlation found{Eigen::VectorXd::Ones(all.jacobian.rows()), {}, false};
-  const double share_taken =
-      static_cast<double>(problem.free.size()) / std::max(1.0, static_cast<double>(problem.rows()));
+Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::MatrixXd& scaled,
+               const Directions& seen, Uncertainty& result) {
+  Noise found;
+  const Eigen::MatrixXd unit_steps = seen.axes * seen.inverse.asDiagonal();
+  result.whiteness = {};
+  result.surprise = 0.0;
   for (int c = 0; c < kChannels; ++c) {
+    const auto channel = static_cast<Channel>(c);
     const auto rows = static_cast<double>(
-        std::count_if(all.channel.begin(), all.channel.begin() + problem.rows(),
-                      [&](Channel channel) { return channel == static_cast<Channel>(c); }));
+        std::count(all.channel.begin(), all.channel.begin() + problem.rows(), channel));
     if (rows == 0.0) continue;
-    const Whiteness one = channel_whiteness(problem, all, static_cast<Channel>(c));
-    found.present |= one.inflation > 1.0;
+    found.channels.push_back(channel_noise(problem, all, channel, scaled, unit_steps));
+    const Whiteness& one = found.channels.back().whiteness;
+    result.surprise +=
+        found.channels.back().surprise + 2.0 * rows * std::log(problem.noise_scale[c]);
     if (one.inflation > 1.0)
       for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
-        found.offsets.push_back(common_offset(problem, all, static_cast<Channel>(c), axis));
-    for (std::size_t row = 0; row < all.arc.size(); ++row)
-      if (all.arc[row] >= 0 && all.channel[row] == static_cast<Channel>(c))
-        found.row_scale[row] =
-            std::sqrt(one.inflation) * student_factor(rows / one.inflation - rows * share_taken);
-    if (one.p_value < result.whiteness.p_value) result.whiteness.p_value = one.p_value;
+        found.offsets.push_back(common_offset(problem, all, channel, axis));
+    result.whiteness.p_value = std::min(result.whiteness.p_value, one.p_value);
     if (one.inflation > result.whiteness.inflation) {
       result.whiteness.inflation = one.inflation;
       result.whiteness.correlation_time_s = one.correlation_time_s;
@@ -254,21 +184,18 @@ Correlation correlation_of(const Problem& problem, const Linearised& all, Uncert
   return found;
 }
 
-// The sandwich covariance of correlated residuals.
-Eigen::MatrixXd widened(const Problem& problem, const Linearised& all, Correlation correlation,
-                        const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread,
-                        double inflation) {
-  if (correlation.present) {
-    // What the parameters take from few independent samples makes the residuals too small.
-    const double rows = problem.rows(), taken = static_cast<double>(scaled.cols());
-    const double left = std::max(rows - taken * inflation, 0.1 * rows);
-    const double wider = std::sqrt(std::max(1.0, (rows - taken) / left));
-    for (std::size_t row = 0; row < all.arc.size(); ++row)
-      if (all.arc[row] >= 0) correlation.row_scale[row] *= wider;
-  }
-  const Eigen::MatrixXd filling = correlation.row_scale.asDiagonal() * scaled * bread;
-  Eigen::MatrixXd covariance = filling.transpose() * filling;
-  for (const Eigen::VectorXd& offset : correlation.offsets) {
+// The sandwich covariance of noise that may hang together.
+Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const Noise& noise,
+                         const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread) {
+  const auto rows = static_cast<double>(problem.rows());
+  const double few = student_factor(rows - static_cast<double>(problem.free.size()));
+  Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(scaled.cols(), scaled.cols());
+  for (const ChannelNoise& one : noise.channels)
+    filling += few * few * seen_through(problem, all, one, scaled);
+  const auto priors = scaled.bottomRows(scaled.rows() - problem.rows());
+  filling += priors.transpose() * priors;
+  Eigen::MatrixXd covariance = bread * filling * bread;
+  for (const Eigen::VectorXd& offset : noise.offsets) {
     const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
     covariance += shift * shift.transpose();
   }
@@ -289,6 +216,16 @@ Eigen::MatrixXd of_bends(const Directions& seen, const Eigen::MatrixXd& w,
   return 3.0 * follow * follow.transpose();
 }
 
+// Median over the parameters of how many times wider the error bars are than those of independent
+// residuals.
+double typical_widening(const Uncertainty& result) {
+  std::vector<double> ratios;
+  for (Eigen::Index i = 0; i < result.plain_variance.size(); ++i)
+    if (result.plain_variance[i] > 0.0)
+      ratios.push_back(std::sqrt(result.covariance(i, i) / result.plain_variance[i]));
+  return std::max(1.0, median(std::move(ratios)));
+}
+
 }  // namespace
 
 Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
@@ -299,36 +236,31 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
   Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
   Directions seen = directions_of(problem, scaled, result);
-  const auto chords_along = [&](const Directions& by) {
-    return chords_of(problem, u, all, scaled * by.axes, size.asDiagonal() * by.axes, by.inverse);
+  Noise noise = noise_of(problem, all, scaled, seen, result);
+  Eigen::MatrixXd covariance = sandwich(problem, all, noise, scaled, seen.bread);
+  const auto valley_along = [&](const Directions& by) {
+    return Valley{problem, u, all, scaled * by.axes, size.asDiagonal() * by.axes, by.inverse};
   };
-  Chords chords = chords_along(seen);
+  Chords chords = valley_along(seen).chords();
   // A cost with ripples (sticking that comes and goes) has derivatives that hold nowhere but at one
   // point: what counts is how it changes over an error bar.
   if (!chords.straight) {
-    Eigen::VectorXd sharpness = seen.inverse;
-    for (double& entry : sharpness) entry = entry > 0.0 ? 1.0 / entry : 0.0;
-    const Eigen::MatrixXd blind = scaled * seen.axes;
-    Eigen::MatrixXd along = chords.slope * sharpness.asDiagonal();
-    for (Eigen::Index k = 0; k < along.cols(); ++k)
-      if (!(seen.inverse[k] > 0.0)) along.col(k) = blind.col(k);
-    scaled = along * seen.axes.transpose();
+    scaled = chords.derivatives * seen.axes.transpose();
     result.rank = 0;
     result.null_vectors.clear();
     seen = directions_of(problem, scaled, result);
-    chords = chords_along(seen);
+    noise = noise_of(problem, all, scaled, seen, result);
+    covariance = sandwich(problem, all, noise, scaled, seen.bread);
+    chords = valley_along(seen).chords();
   }
-  Correlation correlation = correlation_of(problem, all, result);
-  Eigen::MatrixXd covariance =
-      widened(problem, all, std::move(correlation), scaled, seen.bread, result.whiteness.inflation);
   const Eigen::VectorXd sd =
       (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::MatrixXd w = bends(problem, u, all, chords, size.asDiagonal() * seen.axes, sd);
-  covariance += of_bends(seen, w, sd);
+  covariance += of_bends(seen, valley_along(seen).bends(chords, sd), sd);
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
   result.plain_variance = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
+  result.widened = typical_widening(result);
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   return result;
@@ -347,7 +279,7 @@ double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u)
   return worst;
 }
 
-Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double inflation) {
+Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise) {
   Problem plain = problem;
   plain.noise_scale.fill(1.0);
   Criteria result;
@@ -360,11 +292,11 @@ Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double infla
     result.chi2 += r.squaredNorm();
     result.rows += static_cast<int>(r.size());
   }
-  const double n = std::max(static_cast<double>(result.rows) / inflation, 2.0);
+  const double n = result.rows;
   const double k = static_cast<double>(problem.free.size()) + 1.0;
-  const double fit = n * std::log(std::max(result.chi2 / result.rows, 1e-300));
-  result.aicc = fit + 2.0 * k + (n > k + 1.0 ? 2.0 * k * (k + 1.0) / (n - k - 1.0) : INFINITY);
-  result.bic = fit + k * std::log(n);
+  result.bic = surprise + k * std::log(n);
+  // Akaike's correction has no meaning for fewer rows than that.
+  result.aicc = surprise + 2.0 * k + 2.0 * k * (k + 1.0) / std::max(1.0, n - k - 1.0);
   return result;
 }
 

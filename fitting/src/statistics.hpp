@@ -17,11 +17,17 @@ struct Uncertainty {
   double condition = 0.0;
   std::vector<data::NullVector> null_vectors;
   Whiteness whiteness;  ///< of the worst channel
+  /// Times the error bars are wider than those of independent residuals, typically.
+  double widened = 1.0;
+  /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
+  /// their correlation allowed for, without its constant.
+  double surprise = 0.0;
   std::vector<std::string> remarks;
 };
-/// Singular values of the Jacobian scaled by each parameter's natural size decide the rank;
-/// correlated residuals widen the covariance by their effective sample size, few residuals by
-/// Student's quantile, channel by channel (a sandwich of the channels' information matrices), and a
+/// Singular values of the Jacobian scaled by each parameter's natural size decide the rank. The
+/// covariance is the sandwich of least squares in noise that hangs together: each parameter is
+/// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the
+/// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few. A
 /// constant offset of half a sample's sigma is allowed for in every filmed channel whose residuals
 /// hang together. Where the valley of chi-square bends within a standard deviation, the second
 /// moment of the bend is added.
@@ -35,7 +41,8 @@ struct Criteria {
   int rows = 0;
   double aicc = 0.0, bic = 0.0;
 };
-/// AICc and BIC with the noise as an estimated parameter; `inflation` shrinks the sample size.
-[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double inflation);
+/// AICc and BIC from Uncertainty::surprise: what residuals that hang together may owe to the
+/// tracker does not count as evidence between models.
+[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise);
 
 }  // namespace trochoid::fitting

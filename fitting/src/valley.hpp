@@ -1,0 +1,40 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "linearise.hpp"
+
+namespace trochoid::fitting {
+
+/// What moving along a direction really does to the residuals, over an error bar.
+struct Chords {
+  Eigen::MatrixXd derivatives;  ///< per unit of each direction
+  bool straight = true;         ///< the derivatives at the solution say the same
+};
+
+/// The surroundings of a solution along orthogonal directions of the data.
+struct Valley {
+  const Problem& problem;
+  const Eigen::VectorXd& u;
+  const Linearised& all;
+  Eigen::MatrixXd tangents;  ///< derivatives of the residuals per unit of each direction
+  Eigen::MatrixXd values;    ///< of the parameters per unit of each direction
+  Eigen::VectorXd inverse;   ///< standard deviation of independent residuals; 0: unseen
+
+  /// Chords where the data see enough of a direction and the model goes on to both ends, tangents
+  /// elsewhere.
+  [[nodiscard]] Chords chords() const;
+
+  /// How far the valley bends: when the solution is moved to either side by `sd` along a direction
+  /// k, the mean of the two residual vectors leaves the tangent plane, and the other directions
+  /// follow by w(., k), in the standard deviations of independent residuals. Measured over the
+  /// distances that correlated residuals let the solution move: ripples do not grow with the
+  /// square of those. One column per direction.
+  [[nodiscard]] Eigen::MatrixXd bends(const Chords& chords, const Eigen::VectorXd& sd) const;
+
+ private:
+  [[nodiscard]] bool displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const;
+  [[nodiscard]] bool both_sides(Eigen::Index k, double distance, Eigen::VectorXd& ahead,
+                                Eigen::VectorXd& behind) const;
+};
+
+}  // namespace trochoid::fitting
