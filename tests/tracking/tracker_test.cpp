@@ -197,6 +197,28 @@ TEST(TrackVideo, FollowsTheBodyPointedAt) {
   EXPECT_LT(largest_error_px(result.file.tracks.at(0), slow), 0.5);
 }
 
+// An oblique look into the bore of a thick platter: its wall and the floor behind have edges of
+// their own, which pass for flat rims.
+TEST(TrackVideo, PointedIntoABoreItFollowsTheBoresRim) {
+  const ScratchFolder folder("bore");
+  const auto bore = [](int i) { return Eigen::Vector2d(90.0 + 0.4 * i, 66.0 + 0.1 * i); };
+  write_clip(folder / "clip.mkv", drawn_floor(240, 130, 170.0), 60, 2.0,
+             [&](cv::Mat& picture, int i) {
+               const double x = bore(i).x(), y = bore(i).y();
+               draw_disc(picture, x, y + 3.0, 72.0, 40.0, 0.0, 60.0);
+               cv::Mat inside(picture.size(), CV_64F, 105.0);
+               draw_disc(inside, x, y + 8.0, 22.0, 12.5, 0.0, 170.0);
+               cv::Mat share(picture.size(), CV_64F, 0.0);
+               draw_disc(share, x, y, 22.0, 12.5, 0.0, 1.0);
+               picture += share.mul(inside - picture);
+             });
+  data::Scene scene;
+  scene.tracking.at_px = bore(0) + Eigen::Vector2d(2.0, -1.0);
+  const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
+  EXPECT_GE(result.file.tracks.at(0).samples.size(), 58u);
+  EXPECT_LT(largest_error_px(result.file.tracks.at(0), bore), 0.4);
+}
+
 TEST(TrackVideo, AWallWithoutABodyIsAnErrorThatHelps) {
   const ScratchFolder folder("empty");
   write_clip(folder / "clip.mkv", drawn_floor(120, 90, 120.0), 20, 2.0, [](cv::Mat&, int) {});

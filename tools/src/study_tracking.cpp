@@ -78,8 +78,10 @@ Recording recording_in(const fs::path& folder) {
 
 /// The track command as a user would run it, in a process of its own: its time and memory are the
 /// program's, start and files included.
-ChildRun track(const Recording& r, const fs::path& out, const fs::path& target) {
+ChildRun track(const Recording& r, const fs::path& out, const fs::path& target,
+               const std::vector<std::string>& help = {}) {
   std::vector<std::string> arguments{own_path(), "track", r.video.string(), "-o", target.string()};
+  arguments.insert(arguments.end(), help.begin(), help.end());
   if (r.rendered()) {
     data::Scene scene = data::read_object(r.object);
     scene.camera.file = fs::absolute(r.camera).string();
@@ -117,17 +119,54 @@ void print_truth(const Recording& r, const data::TrackFile& file) {
   fmt::print("  mean squared normalised error {} (1 = honest sigmas)\n", cell(s.normalised, 3));
 }
 
-void print_labels(const Recording& r, const data::TrackFile& file) {
+void print_label_score(const LabelScore& s) {
+  fmt::print(
+      "  {}: object {}, {} of {} labelled frames found; error / uncertainty rms {}, {}; "
+      "bias {}, {} px; worst frame {}\n",
+      s.label, s.object, s.found, s.frames, cell(s.rms.x(), 2), cell(s.rms.y(), 2),
+      cell(s.bias_px.x(), 3), cell(s.bias_px.y(), 3), s.worst_frame);
+  if (s.angles > 0)
+    fmt::print("    spin: rms {} deg about a constant offset of {} deg, {} labelled angles\n",
+               cell(s.angle_rms_deg, 2), cell(s.angle_offset_deg, 2), s.angles);
+}
+
+/// Whether what was labelled is what was tracked.
+bool follows(const LabelScore& s) {
+  constexpr double kFound = 0.9, kOff = 3.0;
+  return s.found >= kFound * s.frames && s.rms.maxCoeff() <= kOff;
+}
+
+/// Where the tracker follows something else than what was labelled (another rim of the body, say):
+/// what it makes of it when pointed at it, from the earliest of a few labelled frames that will do.
+void print_pointed(const Recording& r, const data::Table& labels, const Options& options) {
+  constexpr Eigen::Index kTries = 8;
+  const fs::path target = options.out / (r.name + ".pointed.track.csv");
+  const auto column = [&](const char* name) { return labels.column(name); };
+  const Eigen::VectorXd frame = column("frame"), x = column("x_px"), y = column("y_px");
+  for (Eigen::Index k = 0; k < kTries; ++k) {
+    const Eigen::Index row = k * frame.size() / kTries;
+    const auto first = static_cast<std::int64_t>(frame[row]);
+    const ChildRun run =
+        track(r, options.out, target,
+              {"--from", fmt::format("f{}", first), "--at", fmt::format("{},{}", x[row], y[row])});
+    if (run.exit_status != 0 && run.exit_status != 3) continue;
+    LabelScore s =
+        score_against_labels(data::read_track(target), labels,
+                             fmt::format("pointed at its label in frame {}", first), first);
+    if (!follows(s)) continue;
+    print_label_score(s);
+    return;
+  }
+  fs::remove(target);
+  fmt::print("  pointed at its labels: not followed from any of {} of them\n", kTries);
+}
+
+void print_labels(const Recording& r, const data::TrackFile& file, const Options& options) {
   for (const fs::path& path : r.labels) {
-    const LabelScore s = score_against_labels(file, data::read_table(path), path.stem().string());
-    fmt::print(
-        "  {}: object {}, {} of {} labelled frames found; error / uncertainty rms {}, {}; "
-        "bias {}, {} px; worst frame {}\n",
-        s.label, s.object, s.found, s.frames, cell(s.rms.x(), 2), cell(s.rms.y(), 2),
-        cell(s.bias_px.x(), 3), cell(s.bias_px.y(), 3), s.worst_frame);
-    if (s.angles > 0)
-      fmt::print("    spin: rms {} deg about a constant offset of {} deg, {} labelled angles\n",
-                 cell(s.angle_rms_deg, 2), cell(s.angle_offset_deg, 2), s.angles);
+    const data::Table labels = data::read_table(path);
+    const LabelScore s = score_against_labels(file, labels, path.stem().string());
+    print_label_score(s);
+    if (r.labels.size() == 1 && !follows(s)) print_pointed(r, labels, options);
   }
 }
 
@@ -170,7 +209,7 @@ bool study(const fs::path& folder, const Options& options) {
   if (r.rendered())
     print_truth(r, file);
   else if (!r.labels.empty())
-    print_labels(r, file);
+    print_labels(r, file, options);
   else
     fmt::print("  no truth and no labels: tracked only, {} bodies\n", file.tracks.size());
   print_speed(ours, ffmpeg, frames_tracked(target));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
@@ -141,6 +142,27 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
 
 namespace {
 
+Detection rim_around(const Eigen::Vector2d& at_px, double semi_major_px, double semi_minor_px) {
+  Detection rim;
+  rim.centre_px = at_px;
+  rim.semi_major_px = semi_major_px, rim.semi_minor_px = semi_minor_px;
+  rim.box = cv::Rect(static_cast<int>(at_px.x() - semi_major_px),
+                     static_cast<int>(at_px.y() - semi_minor_px),
+                     static_cast<int>(2 * semi_major_px), static_cast<int>(2 * semi_minor_px));
+  rim.area_px2 = std::numbers::pi * semi_major_px * semi_minor_px;
+  return rim;
+}
+
+/// How much of a rim is there and how closely it is an ellipse, for its size: a scrap of an edge
+/// passes for a very flat one.
+double roundness(const Sighting& seen) {
+  constexpr double kExactPx = 0.1, kPerSize = 0.02, kFlattest = 0.3;
+  const double minor = seen.rim.semi_minor_px();
+  const double flat = std::min(1.0, minor / (kFlattest * seen.rim.semi_major_px()));
+  const double there = std::max(seen.accepted, seen.evidence.edges);
+  return flat * there * there / (1.0 + seen.rms_px / (kExactPx + kPerSize * minor));
+}
+
 std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index,
                                const Background& background, const BodyFinder& finder,
                                const Eigen::Vector2d& at_px) {
@@ -152,31 +174,38 @@ std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index
             cv::Point(static_cast<int>(at_px.x()), static_cast<int>(at_px.y()))))
       guesses.push_back(body.detection);
   const double largest = 0.5 * std::min(frame.luma.rows, frame.luma.cols);
-  for (double radius = 6.0; radius < largest; radius *= 1.3) {
-    Detection circle;
-    circle.centre_px = at_px;
-    circle.semi_major_px = circle.semi_minor_px = radius;
-    const int side = static_cast<int>(2 * radius);
-    circle.box = cv::Rect(static_cast<int>(at_px.x() - radius),
-                          static_cast<int>(at_px.y() - radius), side, side);
-    circle.area_px2 = std::numbers::pi * radius * radius;
-    guesses.push_back(circle);
-  }
-  std::optional<Seed> best;
-  double best_value = 0.0;
+  // Round, and flat as an oblique camera sees it.
+  for (const double flat : {1.0, 0.7, 0.45})
+    for (double radius = 6.0; radius < largest; radius *= 1.3)
+      guesses.push_back(rim_around(at_px, radius, flat * radius));
+  std::vector<std::pair<double, Sighting>> seen_there;
+  double best = 0.0;
   for (const Detection& guess : guesses) {
     look.detection = guess;
-    const auto seen = finder.find(look);
-    if (!seen) continue;
+    auto seen = finder.find(look);
+    if (!seen || seen->accepted < 0.4) continue;
     const bool holds_point =
         (seen->rim.shape_px.inverse() * (at_px - seen->centre_px)).norm() < 1.1;
-    const double value = seen->accepted / (0.5 + seen->rms_px);
-    if (holds_point && seen->accepted > 0.4 && value > best_value) {
-      best_value = value;
-      best = Seed{index, *seen};
-    }
+    if (!holds_point) continue;
+    const double value = seen->pose ? seen->accepted / (0.5 + seen->rms_px) : roundness(*seen);
+    best = std::max(best, value);
+    seen_there.emplace_back(value, std::move(*seen));
   }
-  return best;
+  // Of rims about as good the nearest around the point: one who wants the outer of two points
+  // between them.
+  constexpr double kAboutAsGood = 0.8, kSameSize = 1.1;
+  const auto good = [best](double value, const Sighting& seen) {
+    return value >= (seen.pose ? best : kAboutAsGood * best);
+  };
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [value, seen] : seen_there)
+    if (good(value, seen)) least = std::min(least, seen.rim.semi_minor_px());
+  const Sighting* chosen = nullptr;
+  double most = 0.0;
+  for (const auto& [value, seen] : seen_there)
+    if (good(value, seen) && value > most && seen.rim.semi_minor_px() <= kSameSize * least)
+      chosen = &seen, most = value;
+  return chosen != nullptr ? std::optional(Seed{index, *chosen}) : std::nullopt;
 }
 
 }  // namespace
