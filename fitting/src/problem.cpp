@@ -170,8 +170,10 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
     std::string all;
     for (const ParameterInfo& info : predictor.parameters())
       all += (all.empty() ? "" : ", ") + info.name;
-    throw InputError(fmt::format("[fit] {}: model '{}' has no parameter '{}'; it has {}", key,
-                                 predictor.model_name(), name, all));
+    throw InputError(
+        fmt::format("[fit] {}: model '{}' has no parameter '{}'; it has {}, and those of losses "
+                    "named under [model]",
+                    key, predictor.model_name(), name, all));
   };
   for (const std::string& name : settings.free)
     if (!known(name)) complain("free", name);

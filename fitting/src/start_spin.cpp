@@ -8,29 +8,38 @@
 namespace trochoid::fitting {
 namespace {
 
-// Measured minus predicted spin angle for psi_0 = omega_s = 0, with the times since the start.
+// Measured minus predicted spin angle for psi_0 = omega_s = 0, and by how much a spin of one radian
+// per second at the start would have turned by then: the time, less where the spin decays.
 struct SpinDifference {
-  std::vector<double> t_s, angle_rad;
+  std::vector<double> turn_s, angle_rad;
 };
+
+// Columns theta and psi of every sample.
+Eigen::VectorXd predicted_angles(const Problem& problem, int arc, const Eigen::VectorXd& values) {
+  const ArcData& data = problem.arcs[arc];
+  model::PredictRequest request;
+  request.t_s = data.t_s;
+  request.start_s = data.start_s;
+  request.observables = {model::Observable::theta_rad, model::Observable::psi_rad};
+  return problem.predictor->predict(values, request).values;
+}
 
 SpinDifference spin_difference(const Problem& problem, int arc, int psi, int omega) {
   const ArcData& data = problem.arcs[arc];
   Eigen::VectorXd values = problem.base[arc];
   values[psi] = 0.0;
   if (omega >= 0) values[omega] = 0.0;
-  model::PredictRequest request;
-  request.t_s = data.t_s;
-  request.start_s = data.start_s;
-  request.observables = {model::Observable::theta_rad, model::Observable::psi_rad};
-  const model::Prediction prediction = problem.predictor->predict(values, request);
+  const Eigen::VectorXd still = predicted_angles(problem, arc, values);
+  if (omega >= 0) values[omega] = 1.0;
+  const Eigen::VectorXd turning = omega >= 0 ? predicted_angles(problem, arc, values) : still;
   SpinDifference difference;
   for (const Reading& reading : data.readings) {
     if (reading.channel != Channel::psi) continue;
+    const int row = 2 * reading.sample;
     double measured = reading.value.x();
-    if (data.folded && prediction.values[2 * reading.sample] > 0.5 * std::numbers::pi)
-      measured = std::numbers::pi - measured;
-    difference.angle_rad.push_back(measured - prediction.values[2 * reading.sample + 1]);
-    difference.t_s.push_back(data.t_s[reading.sample] - data.start_s);
+    if (data.folded && still[row] > 0.5 * std::numbers::pi) measured = std::numbers::pi - measured;
+    difference.angle_rad.push_back(measured - still[row + 1]);
+    difference.turn_s.push_back(turning[row + 1] - still[row + 1]);
   }
   return difference;
 }
@@ -39,25 +48,24 @@ SpinDifference spin_difference(const Problem& problem, int arc, int psi, int ome
 // not merely within half a turn. Returns slope and value at t = 0 of the line through them.
 std::pair<double, double> line_through(const SpinDifference& raw) {
   constexpr std::size_t kLatest = 31;
-  std::vector<double> angle;
+  const std::vector<double>&t = raw.turn_s, &d = raw.angle_rad;
+  // As the track continues its angle, at first: it may know of more than half a turn a step.
   std::deque<double> rates;
-  for (std::size_t i = 0; i < raw.t_s.size(); ++i) {
-    double d = raw.angle_rad[i];
-    if (i > 0) {
-      const double step_s = raw.t_s[i] - raw.t_s[i - 1];
-      const double expected =
-          angle.back() + (rates.empty() ? 0.0 : median({rates.begin(), rates.end()}) * step_s);
-      d = expected + std::remainder(d - expected, 2.0 * std::numbers::pi);
-      rates.push_back((d - angle.back()) / step_s);
-      if (rates.size() > kLatest) rates.pop_front();
-    }
-    angle.push_back(d);
+  for (std::size_t i = 1; i < t.size() && rates.size() < kLatest; ++i)
+    rates.push_back((d[i] - d[i - 1]) / (t[i] - t[i - 1]));
+  std::vector<double> angle{d.front()};
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    const double step_s = t[i] - t[i - 1];
+    const double expected = angle.back() + median({rates.begin(), rates.end()}) * step_s;
+    angle.push_back(expected + std::remainder(d[i] - expected, 2.0 * std::numbers::pi));
+    rates.push_back((angle[i] - angle[i - 1]) / step_s);
+    rates.pop_front();
   }
   const int n = static_cast<int>(angle.size());
-  const Eigen::Map<const Eigen::VectorXd> t(raw.t_s.data(), n), d(angle.data(), n);
-  const Eigen::VectorXd centred = t.array() - t.mean();
-  const double slope = centred.dot(d) / centred.squaredNorm();
-  return {slope, d.mean() - slope * t.mean()};
+  const Eigen::Map<const Eigen::VectorXd> turn(t.data(), n), along(angle.data(), n);
+  const Eigen::VectorXd centred = turn.array() - turn.mean();
+  const double slope = centred.dot(along) / centred.squaredNorm();
+  return {slope, along.mean() - slope * turn.mean()};
 }
 
 }  // namespace
@@ -67,7 +75,7 @@ void start_spin(Problem& problem, int arc) {
   const int omega = problem.predictor->index_of("omega_s_rad_s");
   if (psi < 0 || problem.arcs[arc].observable_index(model::Observable::psi_rad) < 0) return;
   const SpinDifference difference = spin_difference(problem, arc, psi, omega);
-  if (difference.t_s.size() < 3) return;
+  if (difference.angle_rad.size() < 3) return;
   if (omega >= 0) {
     const auto [slope, offset] = line_through(difference);
     problem.base[arc][omega] = slope;

@@ -6,6 +6,8 @@
 #include <random>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -268,6 +270,34 @@ TEST(TopFit, AdmitsThatSteadyPrecessionWithDragHidesTheTop) {
   const data::Fit result = fit_one(track, scene);
   for (const char* name : {"a_1_s2", "b_1_s", "l_m"})
     EXPECT_FALSE(result.find(name)->identifiable) << name;
+}
+
+// By scipy; its spin falls from 155 to 111 rad/s, nine radians from sample to sample.
+TEST(TopFit, FollowsASpinThatDies) {
+  const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/s11_top_drag";
+  data::Scene scene = data::read_reference_case(base + ".json").scene;
+  scene.start = {};
+  const data::Table table = data::read_table(base + ".csv");
+  const Eigen::VectorXd t = table.column("t"), x = table.column("x"), y = table.column("y");
+  const Eigen::VectorXd psi = table.column("psi");
+  constexpr double kPath_m = 1e-4, kAngle_rad = 0.02;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (Eigen::Index i = 0; i < t.size(); ++i) {
+    data::TrackSample sample;
+    sample.t_s = t[i];
+    sample.centre_m = {x[i] + kPath_m * normal(generator), y[i] + kPath_m * normal(generator)};
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPath_m * kPath_m;
+    sample.psi = data::MeasuredAngle{psi[i] + kAngle_rad * normal(generator), kAngle_rad};
+    track.samples.push_back(sample);
+  }
+  const data::Fit result = fit_one(track, scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "omega_s_rad_s", 155.0), kFar);
+  EXPECT_LT(pull(result, "gamma3_1_s", 1.5e-6 / 2.7e-5), kFar);
+  EXPECT_LT(pull(result, "I_over_Is", 5.0), kFar);
+  EXPECT_LT(result.find("omega_s_rad_s")->sigma, 0.1);
 }
 
 }  // namespace
