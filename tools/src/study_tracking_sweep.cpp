@@ -62,16 +62,66 @@ std::vector<Point> points() {
   return all;
 }
 
+// Straight from above, with any number of pixels for the same view.
+struct Overhead {
+  int side_px;
+  double px_per_m;
+  [[nodiscard]] data::Camera camera(int finer) const {
+    constexpr double kHeight_m = 0.8;
+    return data::Camera::overhead(finer * side_px, finer * side_px, finer * px_per_m, kHeight_m);
+  }
+};
+
+// A camera whose lens blurs before its pixels average: what lies within a pixel is rendered as
+// kFine x kFine of them. The mean of blurred pixels would be an edge of straight pieces.
+class Lens {
+ public:
+  Lens(const data::Body& body, const Overhead& view, const RenderStyle& style)
+      : blur_px_(kFine * style.blur_px),
+        fine_(body, view.camera(kFine), style),
+        sensor_(body, view.camera(1), sharp(style)) {}
+
+  /// Linear light on the pixels.
+  [[nodiscard]] cv::Mat light(const std::vector<data::Pose<>>& poses) const {
+    cv::Mat blurred, pixels;
+    cv::GaussianBlur(fine_.light(poses), blurred, {}, blur_px_, blur_px_, cv::BORDER_REPLICATE);
+    cv::resize(blurred, pixels, {}, 1.0 / kFine, 1.0 / kFine, cv::INTER_AREA);
+    return pixels;
+  }
+  /// Luma before noise and rounding.
+  [[nodiscard]] cv::Mat levels(const data::Pose<>& pose) const {
+    cv::Mat luma;
+    cv::cvtColor(sensor_.levels(light({pose})), luma, cv::COLOR_BGR2GRAY);
+    return luma;
+  }
+  [[nodiscard]] cv::Mat picture(const std::vector<data::Pose<>>& poses, std::int64_t draw) const {
+    cv::Mat luma;
+    cv::cvtColor(sensor_.picture(light(poses), draw), luma, cv::COLOR_BGR2GRAY);
+    return luma;
+  }
+
+ private:
+  static constexpr int kFine = 3;
+  static RenderStyle sharp(RenderStyle style) {
+    style.blur_px = 0.0;
+    return style;
+  }
+  double blur_px_;
+  PictureRenderer fine_, sensor_;
+};
+
 // A case with everything that does not change from draw to draw.
 class Studio {
  public:
   Studio(const Case& made, std::uint64_t seed)
       : case_(made),
+        seed_(seed),
         body_(disc()),
-        camera_(data::Camera::overhead(side(), side(), made.size_px / (2.0 * kRadius_m), 0.8)),
-        renderer_(body_, camera_, style(seed)),
+        view_{side(), made.size_px / (2.0 * kRadius_m)},
+        camera_(view_.camera(1)),
+        lens_(body_, view_, style(seed)),
         fitter_(body_, {data::SupportKind::floor, {}}, camera_) {
-    cv::cvtColor(renderer_.picture(renderer_.light({}), 0), plate_, cv::COLOR_BGR2GRAY);
+    plate_ = lens_.picture({}, 0);
     cv::medianBlur(plate_, plate_, made.texture > 0.0 ? 1 : 5);
   }
 
@@ -94,8 +144,7 @@ class Studio {
     std::uniform_real_distribution<double> within(-1.0, 1.0);
     std::normal_distribution<double> normal;
     const data::Pose<> truth = pose(within(random), within(random));
-    cv::Mat luma;
-    cv::cvtColor(renderer_.picture(renderer_.light({truth}), draw), luma, cv::COLOR_BGR2GRAY);
+    const cv::Mat luma = lens_.picture({truth}, draw);
     constexpr double kMissed_px = 0.5, kMissed_rad = 0.01;  // of a prediction
     const double px_m = 2.0 * kRadius_m / case_.size_px;
     data::Pose<> predicted = truth;
@@ -110,37 +159,28 @@ class Studio {
     return Error{off, 0.5 * off.dot(seen->covariance_px2.inverse() * off)};
   }
 
-  /// Cramer-Rao bound of one coordinate of the CoM [px], mean of both: pose on the floor and the
-  /// two brightnesses unknown, every pixel of the picture used.
+  /// Cramer-Rao bound of one coordinate of the CoM [px], mean of both, every pixel of the picture
+  /// used: pose on the floor, brightness of floor, face and wall, where the lamp is and how much
+  /// light comes from everywhere, and the blur are unknown, the radius known to kRadiusSd_px, as to
+  /// the fit. The transfer curve and that surfaces are plain and matt are known.
   [[nodiscard]] double bound_px() const {
-    const double px_m = 2.0 * kRadius_m / case_.size_px;
-    constexpr double kStep_px = 0.25;
-    const double turn = 2.0 * kStep_px / case_.size_px;
-    std::array<cv::Mat, 6> slopes;
-    const auto slope = [&](const std::function<void(data::Pose<>&, double)>& move) {
-      std::array<cv::Mat, 2> ends;
-      for (const double sign : {-1.0, 1.0}) {
-        data::Pose<> moved = pose(0.13, -0.21);
-        move(moved, sign);
-        moved.centre_m.z() =
-            data::height_on_floor_m(moved.theta_rad, kRadius_m, body_.half_thickness_m());
-        ends[sign > 0.0 ? 1 : 0] = luma_levels(renderer_.light({moved}));
-      }
-      return cv::Mat(0.5 * (ends[1] - ends[0]));
-    };
-    slopes[0] = slope([&](auto& p, double s) { p.centre_m.x() += s * kStep_px * px_m; });
-    slopes[1] = slope([&](auto& p, double s) { p.centre_m.y() += s * kStep_px * px_m; });
-    slopes[2] = slope([&](auto& p, double s) { p.theta_rad += s * turn; });
-    slopes[3] = slope([&](auto& p, double s) { p.phi_rad += s * turn; });
-    const cv::Mat light = renderer_.light({pose(0.13, -0.21)}), still = luma_levels(light);
-    slopes[4] = luma_levels(1.02 * light) - still;
-    slopes[5] = luma_levels(light + cv::Scalar::all(0.005)) - still;
-    Eigen::Matrix<double, 6, 6> information;
-    for (std::size_t i = 0; i < 6; ++i)
-      for (std::size_t j = 0; j < 6; ++j)
-        information(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            slopes[i].dot(slopes[j]) / luma_variance();
-    const Eigen::Matrix<double, 6, 6> covariance = information.inverse();
+    constexpr double kStep_px = 0.25, kRadiusSd_px = 0.3;
+    std::vector<cv::Mat> slopes = pose_slopes(kStep_px);
+    const std::size_t radius = slopes.size();
+    for (cv::Mat& slope : look_slopes(kStep_px)) slopes.push_back(std::move(slope));
+    const auto n = static_cast<Eigen::Index>(slopes.size());
+    Eigen::MatrixXd information(n, n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index j = 0; j < n; ++j)
+        information(i, j) =
+            slopes[static_cast<std::size_t>(i)].dot(slopes[static_cast<std::size_t>(j)]) /
+            luma_variance();
+    const auto at = static_cast<Eigen::Index>(radius);
+    information(at, at) += kStep_px * kStep_px / (kRadiusSd_px * kRadiusSd_px);
+    // The steps of what a picture may say nothing of, such as a lamp over a floor, are small.
+    constexpr double kLeast = 1e-9;
+    information.diagonal().array() += kLeast;
+    const Eigen::MatrixXd covariance = information.inverse();
     return kStep_px * std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
   }
 
@@ -163,16 +203,58 @@ class Studio {
     style.shadow = case_.shadow;
     style.blur_px = case_.blur_px;
     style.noise_levels = case_.noise_levels;
-    style.samples = 12;
+    style.samples = 6;
     style.times = 1;
     style.seed = seed;
     return style;
   }
-  /// Luma before noise and rounding, of a whole picture.
-  [[nodiscard]] cv::Mat luma_levels(const cv::Mat& light) const {
-    cv::Mat luma;
-    cv::cvtColor(renderer_.levels(light), luma, cv::COLOR_BGR2GRAY);
-    return luma;
+  /// Change of the luma by a quarter of a pixel in x and y, by turning the rim as far.
+  [[nodiscard]] std::vector<cv::Mat> pose_slopes(double step_px) const {
+    const double px_m = 2.0 * kRadius_m / case_.size_px, turn = 2.0 * step_px / case_.size_px;
+    const auto slope = [&](const std::function<void(data::Pose<>&, double)>& move) {
+      std::array<cv::Mat, 2> ends;
+      for (const double sign : {-1.0, 1.0}) {
+        data::Pose<> moved = pose(0.13, -0.21);
+        move(moved, sign);
+        moved.centre_m.z() =
+            data::height_on_floor_m(moved.theta_rad, kRadius_m, body_.half_thickness_m());
+        ends[sign > 0.0 ? 1 : 0] = lens_.levels(moved);
+      }
+      return cv::Mat(0.5 * (ends[1] - ends[0]));
+    };
+    return {slope([&](auto& p, double s) { p.centre_m.x() += s * step_px * px_m; }),
+            slope([&](auto& p, double s) { p.centre_m.y() += s * step_px * px_m; }),
+            slope([&](auto& p, double s) { p.theta_rad += s * turn; }),
+            slope([&](auto& p, double s) { p.phi_rad += s * turn; })};
+  }
+  /// Change of the luma by the radius [step_px], then by small changes of how the scene looks.
+  [[nodiscard]] std::vector<cv::Mat> look_slopes(double step_px) const {
+    const data::Pose<> still = pose(0.13, -0.21);
+    // A mark that covers the face gives it a brightness of its own.
+    data::Body faced = body_;
+    faced.marks.push_back({.distance_m = 0.0, .size_m = 2.0 * kRadius_m});
+    RenderStyle plain = style(seed_);
+    plain.mark = plain.body;
+    const auto seen = [&](const data::Body& body, const RenderStyle& look) {
+      return Lens(body, view_, look).levels(still);
+    };
+    const cv::Mat usual = seen(faced, plain);
+    data::Body larger = faced;
+    larger.radius_m += step_px * 2.0 * kRadius_m / case_.size_px;
+    std::vector<cv::Mat> slopes{seen(larger, plain) - usual};
+    const auto vary = [&](const std::function<void(RenderStyle&)>& change) {
+      RenderStyle changed = plain;
+      change(changed);
+      slopes.push_back(seen(faced, changed) - usual);
+    };
+    vary([](RenderStyle& s) { s.floor *= 1.02F; });
+    vary([](RenderStyle& s) { s.mark *= 1.05F; });
+    vary([](RenderStyle& s) { s.body *= 1.05F; });
+    vary([](RenderStyle& s) { s.ambient += 0.03; });
+    vary([](RenderStyle& s) { s.light.x() += 0.05; });
+    vary([](RenderStyle& s) { s.light.y() += 0.05; });
+    vary([](RenderStyle& s) { s.blur_px *= 1.05; });
+    return slopes;
   }
   /// Three noisy, rounded channels make one rounded luma.
   [[nodiscard]] double luma_variance() const {
@@ -182,9 +264,11 @@ class Studio {
   }
 
   Case case_;
+  std::uint64_t seed_;
   data::Body body_;
+  Overhead view_;
   data::Camera camera_;
-  PictureRenderer renderer_;
+  Lens lens_;
   tracking::OutlineFitter fitter_;
   cv::Mat plate_;
 };

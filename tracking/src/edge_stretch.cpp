@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "normal_table.hpp"
+#include "shading_prior.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -14,9 +15,7 @@ constexpr double kLeastNoise2 = 0.05;  // [8-bit levels squared]
 
 // Unknowns of the linear model: inner level, outer level and offset; slope inside and outside, bend
 // inside and outside, by how much a strip at the edge differs from the rest of the body; blur.
-constexpr int kOwn = 3, kShading = 5, kAll = kOwn + kShading + 1;
-using Shading = Eigen::Matrix<double, kShading, 1>;
-using ShadingMatrix = Eigen::Matrix<double, kShading, kShading>;
+constexpr int kOwn = 3, kAll = kOwn + kShading + 1;
 
 struct Columns {
   std::array<float, Profile::kMost> share, density, ground, strip;
@@ -200,27 +199,46 @@ std::vector<Sum> sums_of_neighbours(const std::vector<Working>& all,
   return out;
 }
 
-// Slopes and bends with levels and offset free, then the blur with all of them free.
-void find_shading(double noise2, Working& w) {
-  ShadingMatrix normal = w.shading_normal;
-  normal.diagonal() += noise2 * (w.light * largest_shading()).cwiseAbs2().cwiseInverse();
-  const ShadingMatrix inverse = Eigen::LLT<ShadingMatrix>(normal).solve(ShadingMatrix::Identity());
-  w.shading = inverse * w.shading_right;
-  w.shading_covariance = noise2 * inverse;
-  const double own = w.blur_normal - w.blur_cross.dot(inverse * w.blur_cross);
-  w.blur_information = own / noise2;
-  w.blur_step = own > 0.0 ? (w.blur_right - w.blur_cross.dot(w.shading)) / own : 0.0;
-}
-
 // How noisy samples are is known from a stretch of the outline, not from a single look.
-void find_shadings(const std::vector<StretchProfile>& profiles, std::vector<Working>& all) {
+std::vector<double> noise_of_looks(const std::vector<StretchProfile>& profiles,
+                                   const std::vector<Working>& all) {
   constexpr double kShare = 0.08;
-  const auto noise = sums_of_neighbours(
+  const auto sums = sums_of_neighbours(
       all, profiles, kShare, Eigen::Array2d(0.0, 0.0),
       [&](size_t i) { return Eigen::Array2d(all[i].left_square, all[i].freedom); });
+  std::vector<double> noise2(all.size());
   for (size_t i = 0; i < all.size(); ++i)
-    if (all[i].usable)
-      find_shading(profiles[i].profile.shared * kLeastNoise2 + noise[i][0] / noise[i][1], all[i]);
+    noise2[i] = profiles[i].profile.shared * kLeastNoise2 + sums[i][0] / std::max(sums[i][1], 1e-3);
+  return noise2;
+}
+
+std::vector<ShadingEvidence> shading_evidence(const std::vector<StretchProfile>& profiles,
+                                              const std::vector<double>& noise2,
+                                              const std::vector<Working>& all) {
+  std::vector<ShadingEvidence> evidence(all.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    const Working& w = all[i];
+    ShadingEvidence& e = evidence[i];
+    e.usable = w.usable;
+    e.curve = profiles[i].curve;
+    if (!w.usable) continue;
+    const Shading unit = w.light * largest_shading();
+    e.normal = unit.asDiagonal() * w.shading_normal * unit.asDiagonal() / noise2[i];
+    e.right = unit.cwiseProduct(w.shading_right) / noise2[i];
+  }
+  return evidence;
+}
+
+// In levels, and the blur with this shading.
+void set_shading(const ShadingEstimate& estimate, double noise2, Working& w) {
+  const Shading unit = w.light * largest_shading();
+  w.shading = unit.cwiseProduct(estimate.shading);
+  w.shading_covariance = unit.asDiagonal() * estimate.covariance * unit.asDiagonal();
+  w.blur_information = w.blur_normal / noise2 -
+                       (w.blur_cross / noise2).dot(w.shading_covariance * w.blur_cross / noise2);
+  w.blur_step = w.blur_information > 0.0
+                    ? (w.blur_right - w.blur_cross.dot(w.shading)) / noise2 / w.blur_information
+                    : 0.0;
 }
 
 // By how much the edges should be wider: the median, so that shadows that end beside some of them
@@ -236,6 +254,36 @@ double blur_step(const std::vector<Working>& all) {
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   return *middle;
+}
+
+// Makes the edges of all looks wider.
+void widen(double step, std::vector<Working>& all) {
+  for (Working& w : all) {
+    if (!w.usable) continue;
+    w.shading_right -= step * w.blur_cross;
+    w.blur_right -= step * w.blur_normal;
+  }
+}
+
+// Shading beside the edges and their common blur, which explains what it can first: a picture less
+// sharp than expected looks as if it were brighter and darker beside every edge. Returns by how
+// much the blur should grow.
+double find_shadings(const std::vector<StretchProfile>& profiles, std::vector<Working>& all) {
+  constexpr double kLittle = 0.02;  // of the largest variance
+  constexpr int kRounds = 3;
+  const std::vector<double> noise2 = noise_of_looks(profiles, all);
+  double wider = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<ShadingEvidence> evidence = shading_evidence(profiles, noise2, all);
+    const std::vector<ShadingEstimate> estimates =
+        round == 0 ? shadings_given(evidence, kLittle) : estimate_shadings(evidence);
+    for (size_t i = 0; i < all.size(); ++i)
+      if (all[i].usable) set_shading(estimates[i], noise2[i], all[i]);
+    const double step = blur_step(all);
+    wider += step;
+    if (round + 1 < kRounds) widen(step, all);
+  }
+  return wider;
 }
 
 // The level beside the edge at a distance from it.
@@ -376,7 +424,7 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
     accumulate(profiles[i], columns[i], all[i]);
     reduce(profiles[i], all[i]);
   }
-  find_shadings(profiles, all);
+  const double wider = find_shadings(profiles, all);
   for (size_t i = 0; i < profiles.size(); ++i)
     if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
   const auto noise = noise_of_neighbours(all, profiles);
@@ -391,7 +439,7 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
         1.0 / (1.0 + 1.0 / (kScatter_px * kScatter_px * std::max(all[i].blur_information, 1e-9)));
     profiles[i].edge.wider_px = seen * (all[i].blur_step - usual);
   }
-  return usual;
+  return wider;
 }
 
 }  // namespace trochoid::tracking

@@ -336,7 +336,9 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   const int n = scenery.motion.count();
   PoseMotion::Step prior(n);
   for (int i = 0; i < n; ++i) prior[i] = scenery.motion.scale(i);
-  const double least_scale_px = 0.15 * search.blur_px;
+  // Edges this share of the blur apart may belong together, whatever they claim.
+  constexpr double kLeastScale = 0.15, kLeastExactScale = 0.05;
+  const double least_scale_px = (search.exact ? kLeastExactScale : kLeastScale) * search.blur_px;
   Round round;
   // The first exact rounds only lead to where the last one looks: every second point does.
   constexpr double kSparse = 2.0;
