@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "forecast.hpp"
 #include "pose_motion.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -46,9 +48,7 @@ class Chain {
     for (std::size_t i = 1; i < nodes_.size(); ++i)
       steps.push_back(nodes_[i].t_s - nodes_[i - 1].t_s);
     if (steps.empty()) return;
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                     steps.end());
-    frame_s_ = steps[steps.size() / 2];
+    frame_s_ = data::median(std::move(steps));
   }
 
   void decide() {

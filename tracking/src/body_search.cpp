@@ -153,14 +153,16 @@ Detection rim_around(const Eigen::Vector2d& at_px, double semi_major_px, double 
   return rim;
 }
 
-/// How much of a rim is there and how closely it is an ellipse, for its size: a scrap of an edge
-/// passes for a very flat one.
-double roundness(const Sighting& seen) {
+/// How much of a rim is there, how closely it is an ellipse for its size - a scrap of an edge
+/// passes for a very flat one - and how near its middle the point is.
+/// @param off from its middle (0) to the rim (1)
+double rimness(const Sighting& seen, double off) {
   constexpr double kExactPx = 0.1, kPerSize = 0.02, kFlattest = 0.3;
   const double minor = seen.rim.semi_minor_px();
   const double flat = std::min(1.0, minor / (kFlattest * seen.rim.semi_major_px()));
   const double there = std::max(seen.accepted, seen.evidence.edges);
-  return flat * there * there / (1.0 + seen.rms_px / (kExactPx + kPerSize * minor));
+  const double rough = seen.rms_px / (kExactPx + kPerSize * minor);
+  return (1.0 - 0.5 * off) * flat * there * there / (1.0 + rough * rough);
 }
 
 std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index,
@@ -184,16 +186,15 @@ std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index
     look.detection = guess;
     auto seen = finder.find(look);
     if (!seen || seen->accepted < 0.4) continue;
-    const bool holds_point =
-        (seen->rim.shape_px.inverse() * (at_px - seen->centre_px)).norm() < 1.1;
-    if (!holds_point) continue;
-    const double value = seen->pose ? seen->accepted / (0.5 + seen->rms_px) : roundness(*seen);
+    const double off = (seen->rim.shape_px.inverse() * (at_px - seen->centre_px)).norm();
+    if (off > 1.1) continue;
+    const double value = seen->pose ? seen->accepted / (0.5 + seen->rms_px) : rimness(*seen, off);
     best = std::max(best, value);
     seen_there.emplace_back(value, std::move(*seen));
   }
   // Of rims about as good the nearest around the point: one who wants the outer of two points
   // between them.
-  constexpr double kAboutAsGood = 0.8, kSameSize = 1.1;
+  constexpr double kAboutAsGood = 0.75, kSameSize = 1.1;
   const auto good = [best](double value, const Sighting& seen) {
     return value >= (seen.pose ? best : kAboutAsGood * best);
   };

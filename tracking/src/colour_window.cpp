@@ -9,6 +9,7 @@
 
 #include "outline_samples.hpp"
 #include "pose_motion.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -17,12 +18,6 @@ struct Colour {
   Eigen::Vector2d middle;
   double scatter = 0.0;  // median deviation, the larger of both
 };
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Points on circles about the axis in the plane of the near face.
 std::vector<Eigen::Vector2d> circle_points(const data::Body& body, const data::Camera& camera,
@@ -56,10 +51,10 @@ bool colour_on_circles(const cv::Mat& chroma, const data::Body& body, const data
     cr.push_back(c[1]);
   }
   if (cb.size() < kFewestPoints) return false;
-  colour.middle = {median_of(cb), median_of(cr)};
+  colour.middle = {data::median(cb), data::median(cr)};
   for (double& v : cb) v = std::abs(v - colour.middle.x());
   for (double& v : cr) v = std::abs(v - colour.middle.y());
-  colour.scatter = std::max(median_of(cb), median_of(cr));
+  colour.scatter = std::max(data::median(cb), data::median(cr));
   return true;
 }
 
@@ -72,7 +67,7 @@ bool luma_on_circles(const cv::Mat& luma, const data::Body& body, const data::Ca
       levels.push_back(luma.at<std::uint8_t>(y, x));
   }
   if (levels.size() < kFewestPoints) return false;
-  level = median_of(levels);
+  level = data::median(levels);
   return true;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
@@ -147,12 +149,6 @@ Rays find_edges(const cv::Mat& luma, const Ellipse& ellipse, const RimSearch& se
   return rays;
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// A rim has one polarity nearly everywhere; edges of the other sign are marks, floor and shadow,
 /// unless both are common (a body of mixed brightness on a mixed floor).
 void keep_common_polarity(std::vector<Edge>& edges) {
@@ -220,7 +216,7 @@ class EllipseFit {
     }
     // A wide scale at first: the start may be pixels off, and rejecting then keeps the wrong side.
     const double floor = iteration < 2 ? 0.5 * search_.reach_px / kTukey : 0.08;
-    scale_ = std::max(1.4826 * median_of(sizes), floor);
+    scale_ = std::max(1.4826 * data::median(sizes), floor);
     normal_.setZero();
     gradient_.setZero();
     int used = 0;
@@ -303,7 +299,7 @@ RimFit report(const EllipseFit& fit, const std::vector<Edge>& edges, int asked) 
   const auto used = static_cast<double>(result.edges.size());
   result.accepted = used / asked;
   result.rms_px = std::sqrt(sum / std::max(1.0, used - 5.0));
-  result.contrast = steps.empty() ? 0.0 : median_of(steps);
+  result.contrast = steps.empty() ? 0.0 : data::median(steps);
   // The normal matrix holds weight / scale^2; the spread seen replaces the scale, which has a
   // floor.
   const double spread = std::max(result.rms_px, 0.03) / fit.scale_px();

@@ -6,18 +6,14 @@
 #include <cmath>
 #include <limits>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 using State = Eigen::Vector3d;  // value, rate, acceleration
 using Square = Eigen::Matrix3d;
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Square transition(double dt) {
   Square F = Square::Identity();
@@ -120,7 +116,7 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
   for (std::size_t i = 0; i < sigma.size(); ++i)
     if (!std::isnan(value[i]) && !std::isnan(sigma[i])) sigmas.push_back(sigma[i]);
   const bool free_scale = sigmas.empty();
-  const double step_s = median_of(steps), unit = free_scale ? 1.0 : median_of(sigmas);
+  const double step_s = data::median(steps), unit = free_scale ? 1.0 : data::median(sigmas);
   Series s;
   for (std::size_t i = 0; i < t_s.size(); ++i) {
     s.t.push_back(t_s[i] / step_s);
