@@ -164,7 +164,7 @@ class Studio {
   /// light comes from everywhere, and the blur are unknown, the radius known to kRadiusSd_px, as to
   /// the fit. The transfer curve and that surfaces are plain and matt are known.
   [[nodiscard]] double bound_px() const {
-    constexpr double kStep_px = 0.25, kRadiusSd_px = 0.3;
+    constexpr double kStep_px = 0.25, kRadiusSd_px = 0.1;
     std::vector<cv::Mat> slopes = pose_slopes(kStep_px);
     const std::size_t radius = slopes.size();
     for (cv::Mat& slope : look_slopes(kStep_px)) slopes.push_back(std::move(slope));

@@ -42,6 +42,7 @@ struct Working {
   double light = 0.0;                       // brighter level
   Shading shading = Shading::Zero();
   ShadingMatrix shading_covariance = ShadingMatrix::Zero();
+  double unevenness = 1.0;
   double blur_step = 0.0, blur_information = 0.0;
   Noise noise;
 };
@@ -233,6 +234,7 @@ std::vector<ShadingEvidence> shading_evidence(const std::vector<StretchProfile>&
 void set_shading(const ShadingEstimate& estimate, double noise2, Working& w) {
   const Shading unit = w.light * largest_shading();
   w.shading = unit.cwiseProduct(estimate.shading);
+  w.unevenness = estimate.unevenness;
   w.shading_covariance = unit.asDiagonal() * estimate.covariance * unit.asDiagonal();
   w.blur_information = w.blur_normal / noise2 -
                        (w.blur_cross / noise2).dot(w.shading_covariance * w.blur_cross / noise2);
@@ -392,6 +394,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   e.offset_px = offset;
   e.noise_variance_px2 = 1.0 / static_cast<double>(information);
   e.shading_variance_px2 = pull.dot(w.shading_covariance * pull);
+  e.unevenness = w.unevenness;
   constexpr int kStrip = kShading - 1;
   e.strip_variance_px2 = pull[kStrip] * pull[kStrip] * w.shading_covariance(kStrip, kStrip);
   const auto s = static_cast<float>(offset);

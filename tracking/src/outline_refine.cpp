@@ -124,6 +124,13 @@ double tone_of(const ProfileEdge& edge) {
   return std::clamp(std::abs(edge.contrast) / std::max(edge.mean_level, 1.0), kLeast, kMost);
 }
 
+// What is not known of the light right beside an edge, relative to usual surroundings: it goes with
+// what is seen of it a little farther off.
+double unknown_share(const ProfileEdge& edge) {
+  constexpr double kUsual = 0.15, kMost = 1.5;
+  return std::min(kMost, std::sqrt(edge.unevenness / kUsual));
+}
+
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, rounded rims, levels beyond the range of the
 // picture.
@@ -131,7 +138,8 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
   constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
   constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
-  const double shape_px = silhouette ? kShapePx / tone_of(look.edge) : kOwnShapePx;
+  const double shape_px =
+      silhouette ? unknown_share(look.edge) * kShapePx / tone_of(look.edge) : kOwnShapePx;
   const double steep_px = std::min(kMostPx, kUnderBlurPx * around.steepness);
   const double clipped_px = look.profile.clipped() ? kClippedPx : 0.0;
   // An edge wider than the picture's blur is not that of the body alone.
@@ -154,7 +162,7 @@ double common_sd_px(const Scenery& scenery, const StretchProfile& look) {
                             ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
                                            e.mean_level + 0.5 * e.contrast)
                             : 0.0;
-  return std::hypot(kUnknownPx / std::pow(tone, 1.5),
+  return std::hypot(unknown_share(e) * kUnknownPx / std::pow(tone, 1.5),
                     kMixingShare * step_px * std::min(kMostMixing, std::abs(mixing)));
 }
 

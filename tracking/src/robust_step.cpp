@@ -28,7 +28,7 @@ int pose_at(bool directions) {
 
 // The rim may be a little larger or smaller than the caliper says, edges a little towards the
 // bright side of where the transfer curve puts them.
-constexpr double kSwellSdPx = 0.3;
+constexpr double kSwellSdPx = 0.1;
 constexpr double kPolaritySdPx = 0.2;
 // An edge's shift by a transfer curve other than the usual one, per contrast over mean level.
 constexpr double kToneSdPx = 0.05;

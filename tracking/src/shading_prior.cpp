@@ -46,6 +46,7 @@ ShadingEstimate estimate(const ShadingEvidence& look, const Shading& variance) {
   ShadingEstimate out;
   out.covariance = Eigen::LLT<ShadingMatrix>(information).solve(ShadingMatrix::Identity());
   out.shading = out.covariance * look.right;
+  out.unevenness = variance.head<kShading - 1>().mean();
   return out;
 }
 

@@ -23,6 +23,8 @@ struct ShadingEvidence {
 struct ShadingEstimate {
   Shading shading = Shading::Zero();
   ShadingMatrix covariance = ShadingMatrix::Zero();
+  /// 0..1: mean variance that slopes and bends were drawn with.
+  double unevenness = 1.0;
 };
 
 /// With every look's shading drawn about zero with this variance.
