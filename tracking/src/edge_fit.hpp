@@ -8,10 +8,11 @@ struct ProfileEdge {
   double offset_px = 0.0;             ///< of the edge along the normal
   double noise_variance_px2 = 0.0;    ///< of the offset, from the noise of the samples
   double shading_variance_px2 = 0.0;  ///< from not knowing how the levels go on under the blur
-  double strip_variance_px2 = 0.0;    ///< of that, from not knowing how bright a strip beside it is
-  double unevenness = 1.0;            ///< 0..1: how much the light beside edges here changes
-  double contrast = 0.0;              ///< outer minus inner level at the edge
-  double mean_level = 0.0;            ///< of both levels at the edge
+  /// From thinking a strip beside it less than it is, alike all along the edge.
+  double strip_variance_px2 = 0.0;
+  double unevenness = 1.0;  ///< 0..1: how much the light beside edges here changes
+  double contrast = 0.0;    ///< outer minus inner level at the edge
+  double mean_level = 0.0;  ///< of both levels at the edge
   double inner_slope = 0.0, outer_slope = 0.0;  ///< of the levels at the edge [1/px]
   double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
   double gain = 0.0;      ///< log-likelihood over "no edge here", of one line

@@ -396,7 +396,9 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   e.shading_variance_px2 = pull.dot(w.shading_covariance * pull);
   e.unevenness = w.unevenness;
   constexpr int kStrip = kShading - 1;
-  e.strip_variance_px2 = pull[kStrip] * pull[kStrip] * w.shading_covariance(kStrip, kStrip);
+  const double strip_prior2 = std::pow(w.light * largest_shading()[kStrip], 2);
+  e.strip_variance_px2 =
+      std::pow(pull[kStrip] * w.shading_covariance(kStrip, kStrip), 2) / strip_prior2;
   const auto s = static_cast<float>(offset);
   const float ground = c.ground[p.profile.nearest(offset)];
   const double inner = shaded(w.inner, v[0], v[2], s) + beside;

@@ -127,8 +127,8 @@ double tone_of(const ProfileEdge& edge) {
 // What is not known of the light right beside an edge, relative to usual surroundings: it goes with
 // what is seen of it a little farther off.
 double unknown_share(const ProfileEdge& edge) {
-  constexpr double kUsual = 0.15, kMost = 1.5;
-  return std::min(kMost, std::sqrt(edge.unevenness / kUsual));
+  constexpr double kUsual = 0.1, kLeast = 0.15, kMost = 2.0;
+  return std::clamp(std::sqrt(edge.unevenness / kUsual), kLeast, kMost);
 }
 
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
@@ -177,7 +177,7 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, b
   // Walls are lit like nothing else, and all along the rim alike.
   constexpr double kLowerPx = 0.03;
   if (sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore)
-    e.lower_px = std::hypot(kLowerPx, std::sqrt(edge.strip_variance_px2));
+    e.lower_px = std::hypot(unknown_share(edge) * kLowerPx, std::sqrt(edge.strip_variance_px2));
   e.group = colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
   e.colour = colour;
   e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());

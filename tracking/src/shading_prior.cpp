@@ -33,20 +33,19 @@ struct Moments {
     squares += sign * look.normal.cwiseAbs2();
     excess += sign * (look.right.cwiseAbs2() - look.normal.diagonal());
   }
-  [[nodiscard]] Shading variances() const {
-    Shading v = least_within_bounds(squares, excess).cwiseMax(kLeastVariance);
-    v[kShading - 1] = kMostVariance;
-    return v;
-  }
+  [[nodiscard]] Shading variances() const { return least_within_bounds(squares, excess); }
 };
 
-ShadingEstimate estimate(const ShadingEvidence& look, const Shading& variance) {
+// A strip along the edge, the wall of the body mostly, is lit like nothing else.
+ShadingEstimate estimate(const ShadingEvidence& look, const Shading& seen_variance) {
+  Shading variance = seen_variance.cwiseMax(kLeastVariance);
+  variance[kShading - 1] = kMostVariance;
   ShadingMatrix information = look.normal;
   information.diagonal() += variance.cwiseInverse();
   ShadingEstimate out;
   out.covariance = Eigen::LLT<ShadingMatrix>(information).solve(ShadingMatrix::Identity());
   out.shading = out.covariance * look.right;
-  out.unevenness = variance.head<kShading - 1>().mean();
+  out.unevenness = seen_variance.head<kShading - 1>().mean();
   return out;
 }
 

@@ -23,7 +23,7 @@ struct ShadingEvidence {
 struct ShadingEstimate {
   Shading shading = Shading::Zero();
   ShadingMatrix covariance = ShadingMatrix::Zero();
-  /// 0..1: mean variance that slopes and bends were drawn with.
+  /// 0..1: mean variance that slopes and bends seem to have, 0 where none shows.
   double unevenness = 1.0;
 };
 
