@@ -140,6 +140,9 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   EXPECT_NEAR(offset, turns * std::round(offset / turns), 0.03) << "absolute: the mark's direction";
   for (const auto& s : samples) {
     ASSERT_TRUE(s.psi);
+    // A mark is read about the middle of a rim that may be a hundredth of its radius off the axis.
+    EXPECT_GE(s.psi->sigma_rad, 0.0099);
+    EXPECT_LT(s.psi->sigma_rad, 0.05);
     EXPECT_NEAR(s.psi->value_rad, psi(static_cast<int>(s.frame)) + offset, 0.03);
   }
   const double length_m = (samples.back().centre_m - samples.front().centre_m).norm();

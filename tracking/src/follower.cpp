@@ -29,6 +29,17 @@ bool is_other(const Eigen::Vector2d& centre_px, const Follower::Others& others) 
   });
 }
 
+// What the angle of a mark is wrong by because it is read about the middle of the rim: a rim is cut
+// round what turns to about a hundredth of its radius, and is measured to so much. Of two opposite
+// marks one goes forward where the other goes back.
+double centring_rad(const Sighting& seen, const SpinProfile& marks) {
+  constexpr double kEccentric = 0.01, kMarkRadius = 0.7;  // of the radius of the rim
+  if (marks.two_fold()) return 0.0;
+  const double radius_px = std::max(1.0, seen.rim.semi_major_px());
+  return std::hypot(kEccentric, std::sqrt(0.5 * seen.covariance_px2.trace()) / radius_px) /
+         kMarkRadius;
+}
+
 }  // namespace
 
 Follower::Follower(const BodyFinder& finder, const Background& background,
@@ -195,7 +206,7 @@ void Follower::read_marks(const Frame& frame, Sighting& seen, double predicted_r
   const double window = lost_ > 3 ? std::numbers::pi : 0.6;
   if (const auto turned = marks_->read(frame.luma, seen.rim, predicted_rad, window)) {
     seen.turned_rad = turned->angle_rad;
-    seen.turned_sigma_rad = turned->sigma_rad;
+    seen.turned_sigma_rad = std::hypot(turned->sigma_rad, centring_rad(seen, *marks_));
   }
 }
 
