@@ -42,9 +42,16 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
     const Bound bound = parse_bound(to, "to");
     while (last > first && coordinate(track.samples[last - 1], bound) > bound.value) --last;
   }
-  if (first >= last)
-    throw InputError(
-        fmt::format("no sample of object {} lies between '{}' and '{}'", track.object, from, to));
+  if (first >= last && track.samples.empty())
+    throw InputError(fmt::format("object {} has no sample", track.object));
+  if (first >= last) {
+    const data::TrackSample &start = track.samples.front(), &end = track.samples.back();
+    throw InputError(fmt::format(
+        "no sample of object {} lies {}{}{}{}{}: its track runs from {:.4g} to {:.4g} s, "
+        "frames {} to {}",
+        track.object, from.empty() ? "" : "from ", from, from.empty() || to.empty() ? "" : " ",
+        to.empty() ? "" : "to ", to, start.t_s, end.t_s, start.frame, end.frame));
+  }
   return {first, last};
 }
 

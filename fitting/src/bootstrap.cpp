@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/parallel.hpp"
 
 namespace trochoid::fitting {
@@ -61,22 +62,13 @@ void resample(ArcData& arc, const std::vector<SeriesOfReadings>& all,
   }
 }
 
-double quantile(std::vector<double> sorted, double share) {
-  const double place = share * static_cast<double>(sorted.size() - 1);
-  const auto low = static_cast<std::size_t>(place);
-  const double rest = place - static_cast<double>(low);
-  return low + 1 < sorted.size() ? (1.0 - rest) * sorted[low] + rest * sorted[low + 1]
-                                 : sorted.back();
-}
-
 data::BootstrapSpread spread_of(const std::string& name, std::vector<double> values) {
   double mean = 0.0, squares = 0.0;
   const auto n = static_cast<double>(values.size());
   for (const double value : values) mean += value / n;
   for (const double value : values) squares += (value - mean) * (value - mean);
-  std::sort(values.begin(), values.end());
-  return {name, std::sqrt(squares / std::max(1.0, n - 1.0)), quantile(values, 0.025),
-          quantile(values, 0.975)};
+  return {name, std::sqrt(squares / std::max(1.0, n - 1.0)), data::quantile(values, 0.025),
+          data::quantile(values, 0.975)};
 }
 
 // One draw: the values of the free parameters, angles next to the solution's; empty if it failed.

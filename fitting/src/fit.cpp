@@ -162,8 +162,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   const Found found = search_without_outliers(
       problem, {starter_for(predictor, scene), &options, start_given, relatives});
   fit.start_path = found.path;
-  if (!found.solution.usable)
-    return refuse(problem, "no start led to a prediction of the whole track", fit);
+  if (!found.solution.usable) return refuse(problem, problem.shortfalls->words(), fit);
 
   const Solution solution = polish(problem, found.solution, options, fit);
   Uncertainty error;

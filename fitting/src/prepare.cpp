@@ -122,6 +122,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   const std::string& model = predictor.model_name();
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
   problem.log = options.log;
+  problem.shortfalls = std::make_shared<Shortfalls>();
   for (int c = 0; c < kChannels; ++c)
     for (const ArcData& arc : problem.arcs)
       problem.noise_scale[c] =

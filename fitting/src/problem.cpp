@@ -132,6 +132,23 @@ int Problem::rows() const {
   return rows;
 }
 
+std::string Shortfalls::words() const {
+  int all = 0;
+  std::size_t commonest = 0;
+  for (std::size_t i = 0; i < by_outcome.size(); ++i) {
+    all += by_outcome[i];
+    if (by_outcome[i] > by_outcome[commonest]) commonest = i;
+  }
+  if (all == 0)
+    return "no start could be made from the track: is it too short, or does nothing in it move as "
+           "the model does?";
+  return fmt::format(
+      "no start led to a prediction of the whole track: {} attempts ended before it, {} of them "
+      "so: "
+      "{}",
+      all, by_outcome[commonest].load(), model::sentence(static_cast<model::Outcome>(commonest)));
+}
+
 Problem single_arc(const Problem& problem, int arc) {
   Problem part = problem;
   part.arcs = {problem.arcs[arc]};
@@ -353,6 +370,7 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
                      ? predict_timed(*problem.predictor, values, request, data, problem.timing)
                      : problem.predictor->predict(values, request);
   } catch (const Error&) {  // outside the model's range: a rejected step
+    if (problem.shortfalls) problem.shortfalls->count(model::Outcome::out_of_domain);
     return false;
   }
   count_work(problem, request.derivatives.size(), prediction.steps);
@@ -365,7 +383,10 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
     prediction.jacobian = std::move(all);
   }
   whiten(data, prediction.values, prediction.jacobian, residuals, jacobian);
-  if (!residuals.allFinite()) return false;
+  if (!residuals.allFinite()) {
+    if (problem.shortfalls) problem.shortfalls->count(prediction.outcome);
+    return false;
+  }
   if (jacobian != nullptr) {
     for (std::size_t c = 0; c < columns.size(); ++c) {
       const FreeParameter& parameter = problem.free[columns[c]];

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -30,6 +31,14 @@ struct Transform {
   [[nodiscard]] double inverse(double value) const;
 };
 
+/// Why predictions ended before the track did, counted while searching.
+struct Shortfalls {
+  std::array<std::atomic<int>, 9> by_outcome{};  ///< in the order of model::Outcome
+  void count(model::Outcome outcome) { ++by_outcome[static_cast<std::size_t>(outcome)]; }
+  /// A sentence; which reason was the commonest.
+  [[nodiscard]] std::string words() const;
+};
+
 struct FreeParameter {
   int index = 0;  ///< into Predictor::parameters()
   int arc = -1;   ///< -1: shared by all arcs
@@ -55,6 +64,7 @@ struct Problem {
   std::function<void(const std::string& line)> log;  ///< may be empty
   /// Integration steps taken so far, one with derivatives counted by its cost; null: not counted.
   std::shared_ptr<double> work;
+  std::shared_ptr<Shortfalls> shortfalls;  ///< null: not counted
 
   [[nodiscard]] int shared_count() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::fitting {
 namespace {
 
@@ -62,10 +64,7 @@ int sparse_stride(int n) {
 }  // namespace
 
 double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return values.empty() ? 0.0 : data::median(std::move(values));
 }
 
 SmoothCurve smooth(std::span<const double> t_s, const Eigen::MatrixXd& samples, int half_width) {

@@ -137,16 +137,25 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
-  const auto next = [&](int window) {
-    return std::min(static_cast<int>(growth * window) + 8, all);
-  };
-  for (int window = std::min(first_window, all);; window = next(window)) {
+  constexpr double kLost = 4.0;  // of chi-square per row: a turn was lost on the way
+  constexpr int kMostRetreats = 4, kLeastStep = 4;
+  int before = 0, retreats = 0;  // the window explained last
+  double explained = chi2_gate(all);
+  for (int window = std::min(first_window, all);;) {
     Problem part = windowed(current, window);
     // The first window settles which valley it is; the next ones only follow it.
-    const bool first = window <= first_window;
+    const bool first = before == 0;
     const Solution solution = solve(
         part, part.start(),
         {.iterations = first ? 60 : 25, .function_tolerance = first && window < all ? 1e-4 : 1e-3});
+    const double reduced = solution.chi2 / free_rows(part);
+    const bool lost = !solution.usable || reduced > kLost * explained;
+    if (!first && lost && retreats < kMostRetreats && window - before > kLeastStep) {
+      ++retreats;
+      growth = 1.0 + 0.5 * (growth - 1.0);
+      window = before + (window - before) / 2;
+      continue;
+    }
     if (!solution.usable) return {};
     part.set_base(solution.u);
     current.base = part.base;
@@ -158,8 +167,11 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
       valleys->push_back(solution.chi2);
     }
     // A window that is far from explained will not lead anywhere.
-    if (window < all && solution.chi2 / free_rows(part) > 30.0 * chi2_gate(part.rows())) return {};
+    if (window < all && reduced > 30.0 * chi2_gate(part.rows())) return {};
     if (window == all) break;
+    explained = std::max(reduced, chi2_gate(part.rows()));
+    before = window;
+    window = std::min(static_cast<int>(growth * window) + 8, all);
   }
   if (problem.rough)
     return judged(problem,

@@ -14,9 +14,11 @@ enum class ParameterStatus { free, fixed, derived, prior };
 struct FitParameter {
   std::string name;
   double value = 0.0;
-  double sigma = 0.0;  ///< standard deviation; 0 if fixed, infinity if not identifiable
+  double sigma = 0.0;  ///< standard deviation; 0 if fixed, infinity where nothing sees it
   std::string unit;
   ParameterStatus status = ParameterStatus::free;
+  /// Known to better than its own size: the standard deviation, however finite, is below the
+  /// parameter's natural size (its value, 1 rad, the extent of the path, one per duration).
   bool identifiable = true;
   std::string note;  ///< e.g. "only the product Is * omega_s is determined"
 };

@@ -1,0 +1,212 @@
+#include "rung.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "arcs.hpp"
+#include "observed.hpp"
+#include "softness.hpp"
+#include "timing.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+bool usable(const data::Fit& fit) {
+  return !fit.parameters.empty() && std::isfinite(fit.chi2);
+}
+
+std::map<std::string, double> values_of(const data::Fit& fit) {
+  const bool single = fit.arcs.size() < 2;
+  const auto predictor_like = [&](const data::FitParameter& parameter) {
+    return parameter.status != data::ParameterStatus::derived &&
+           parameter.name.find('@') == std::string::npos && std::isfinite(parameter.value);
+  };
+  std::map<std::string, double> values;
+  for (const data::FitParameter& parameter : fit.parameters)
+    if (single && predictor_like(parameter)) values[parameter.name] = parameter.value;
+  return values;
+}
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kHeldBack = 1.0 / 3.0;
+
+// Wrong by at most what a camera would see: squares of (prediction - measurement)/sigma.
+struct Squares {
+  double sum = 0.0;
+  int rows = 0;
+  void add(double deviation) {
+    sum += deviation * deviation;
+    ++rows;
+  }
+};
+
+void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
+                 Squares& squares) {
+  if (angle_only && sample.psi) {
+    const double off = std::remainder(predicted[2] - sample.psi->value_rad, 2.0 * std::numbers::pi);
+    squares.add(off / sample.psi->sigma_rad);
+  }
+  if (angle_only || !sample.has_metres()) return;
+  const Eigen::Vector2d off = predicted.head<2>() - sample.centre_m;
+  // Without covariances in metres; the caller divides by the fitted part's rms.
+  const Eigen::Matrix2d covariance =
+      sample.has_covariance() ? sample.covariance_m2 : Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d L = covariance.llt().matrixL();
+  const Eigen::Vector2d whitened = L.triangularView<Eigen::Lower>().solve(off);
+  squares.add(whitened.x());
+  squares.add(whitened.y());
+}
+
+// When and where in the image samples were seen.
+ArcData seen_at(const std::vector<const data::TrackSample*>& samples) {
+  ArcData arc;
+  for (const data::TrackSample* sample : samples) {
+    arc.t_s.push_back(sample->t_s);
+    arc.row_px.push_back(sample->centre_px.y());
+  }
+  return arc;
+}
+
+// Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
+Squares squares_of(const data::Track& track, int first, int last, int track_index,
+                   const data::Scene& scene, const data::Fit& fit) {
+  Squares squares;
+  int arc = -1;
+  for (std::size_t i = 0; i < fit.arcs.size(); ++i)
+    if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
+  if (arc < 0) return squares;
+  const auto plain = model::make_predictor(scene);
+  data::Scene measured = scene;
+  const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
+  const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
+  const auto& parameters = predictor->parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::string own = arc > 0 ? fmt::format("{}@{}", parameters[i].name, arc) : "";
+    const data::FitParameter* fitted = own.empty() ? nullptr : fit.find(own);
+    if (fitted == nullptr) fitted = fit.find(parameters[i].name);
+    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
+  }
+  std::vector<double> t_s;
+  std::vector<const data::TrackSample*> samples;
+  for (int i = first; i < last; ++i) {
+    const data::TrackSample& sample = track.samples[static_cast<std::size_t>(i)];
+    if (sample.t_s < fit.arcs[static_cast<std::size_t>(arc)].from_s) continue;
+    t_s.push_back(sample.t_s);
+    samples.push_back(&sample);
+  }
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = fit.arcs[static_cast<std::size_t>(arc)].from_s;
+  request.observables.push_back(model::Observable::psi_rad);
+  const bool angle_only = fit.model == "pivot";
+  const model::Prediction run = has_timing(*predictor)
+                                    ? predict_timed(*predictor, values, request, seen_at(samples),
+                                                    timing_of(*predictor, measured))
+                                    : predictor->predict(values, request);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Eigen::Vector3d at = run.values.segment<3>(3 * static_cast<Eigen::Index>(i));
+    if (at.allFinite())
+      add_squares(*samples[i], at, angle_only, squares);
+    else
+      squares.add(kInfinity);  // the model ends before the body does
+  }
+  return squares;
+}
+
+// Fits the first two thirds, predicts the rest.
+double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptions options) {
+  options.start = values_of(rung.fit);
+  if (!options.start.empty()) options.strategy = "single";
+  options.hold_back = kHeldBack;
+  const data::Fit early = fit(tracks, rung.scene, options);
+  if (!usable(early)) return kInfinity;
+  Squares seen, unseen;
+  bool sigma_known = true;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
+    const int split = kept_samples(first, last, kHeldBack);
+    const int index = static_cast<int>(i);
+    const Squares before = squares_of(tracks[i], first, split, index, rung.scene, early);
+    const Squares after = squares_of(tracks[i], split, last, index, rung.scene, early);
+    seen.sum += before.sum, seen.rows += before.rows;
+    unseen.sum += after.sum, unseen.rows += after.rows;
+    for (const data::TrackSample& sample : tracks[i].samples)
+      sigma_known = sigma_known && (early.model == "pivot" || sample.has_covariance());
+  }
+  if (unseen.rows == 0 || seen.rows == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double rms = std::sqrt(unseen.sum / unseen.rows);
+  return sigma_known ? rms : rms / std::sqrt(std::max(seen.sum / seen.rows, 1e-300));
+}
+
+// A model that has no answer to part of the track does not predict the rest.
+double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& rung,
+                             const FitOptions& options) {
+  try {
+    return held_back(tracks, rung, options);
+  } catch (const Error&) {
+    return kInfinity;
+  }
+}
+
+// Parameters that `below` does not have start at a fiftieth of their typical size: near the known
+// solution.
+std::map<std::string, double> extended_start(const Rung& below, const Rung& rung) {
+  constexpr double kLittle = 0.02;
+  std::map<std::string, double> start = values_of(below.fit);
+  const auto predictor = model::make_predictor(rung.scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (info.role == model::ParameterInfo::Role::dynamics && below.fit.find(info.name) == nullptr)
+      start[info.name] = kLittle * info.value;
+  return start;
+}
+
+void keep_better(data::Fit fit, Rung& rung) {
+  if (!usable(rung.fit) || (usable(fit) && fit.chi2 < rung.fit.chi2)) rung.fit = std::move(fit);
+}
+
+}  // namespace
+
+void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
+              const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  try {
+    const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
+    if (extends) {
+      own.start = extended_start(*below, rung);
+      own.strategy = "single";
+      rung.fit = fit(tracks, rung.scene, own);
+    }
+    // Near a solution that explains nothing there is nothing to be found.
+    const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
+                      rung.fit.chi2 <= below->fit.chi2 * (1.0 + 1e-6);
+    if (!near && (!usable(rung.fit) || rung.fit.whiteness_p < kWhite)) {
+      own.start = options.start;
+      if (term != nullptr)
+        for (const auto& [name, value] : term->start) own.start[name] = value;
+      own.strategy = "auto";
+      if (softness_is_open(rung))
+        fit_softly(tracks, own, rung);
+      else
+        keep_better(fit(tracks, rung.scene, own), rung);
+    }
+    rung.fitted = usable(rung.fit);
+    if (rung.fitted && rung.fit.converged)
+      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
+  } catch (const NumericalError&) {
+    rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
+  }
+  rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
+  if (!rung.fitted) return;
+  rung.aicc = rung.fit.aicc;
+  rung.bic = rung.fit.bic;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,45 @@
+#pragma once
+#include <limits>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+
+#include "ladder.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+
+// Evidence by differences of BIC (Kass and Raftery, J. Am. Stat. Assoc. 90, 773, 1995): up to 2
+// "not worth more than a bare mention", above 6 "strong", above 10 "very strong". Trackers err a
+// little with the motion itself: a further term needs strong evidence.
+inline constexpr double kStrong = 6.0, kVeryStrong = 10.0;
+/// p-value above which residuals count as white.
+inline constexpr double kWhite = 0.01;
+
+/// A model of the ladder and what became of it.
+struct Rung {
+  std::set<int> terms;  ///< indices into Ladder::terms
+  std::string name;
+  data::Scene scene;
+  data::Fit fit;
+  bool fitted = false;
+  double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
+  int parameters = 0;
+  double aicc = std::numeric_limits<double>::infinity();
+  double bic = std::numeric_limits<double>::infinity();
+};
+
+/// Whether a fit came to an end, good or bad.
+[[nodiscard]] bool usable(const data::Fit& fit);
+
+/// Free and fixed values by name; empty where there are several arcs.
+[[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
+
+/// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back
+/// third.
+/// @param below  the fitted rung this one extends by one term; null for the plainest.
+void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
+              const FitOptions& options, Rung& rung);
+
+}  // namespace trochoid::fitting

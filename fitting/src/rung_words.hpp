@@ -1,0 +1,13 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "rung.hpp"
+
+namespace trochoid::fitting {
+
+/// What the comparison of all rungs says, as a sentence or two.
+[[nodiscard]] std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen,
+                                   const Ladder& ladder);
+
+}  // namespace trochoid::fitting
