@@ -328,18 +328,25 @@ void doubt(const Expected& expected, Sighting& seen) {
   pose.covariance_m2 += m2, pose.common.m2 += m2;
 }
 
-/// A poor fit is doubted sooner.
+/// A poor fit is doubted sooner; whichever frames around are asked, with the poor ones and without,
+/// have to agree.
 void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses) {
   constexpr double kPoorOff_rad = 0.1;
   const std::vector<Glimpse> was = glimpses;
-  const std::vector<bool> poor = poor_fits(was);
+  const std::vector<bool> poor = poor_fits(was), none(was.size(), false);
   for (std::size_t i = 0; i < was.size(); ++i) {
     if (!was[i].posed() || was[i].seen->attitude_doubtful) continue;
-    const auto expected = expected_at(finder, was, i, poor);
-    if (!expected) continue;
-    const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
-    if (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad))
-      doubt(*expected, *glimpses[i].seen);
+    std::optional<Expected> nearest;
+    double least_rad = std::numeric_limits<double>::infinity();
+    bool doubted = true;
+    for (const std::vector<bool>& but : {poor, none}) {
+      auto expected = expected_at(finder, was, i, but);
+      if (!expected) continue;
+      const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
+      doubted = doubted && (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad));
+      if (off < least_rad) least_rad = off, nearest = std::move(expected);
+    }
+    if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);
   }
 }
 
