@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <numbers>
 
 #include "smoothing.hpp"
@@ -76,6 +78,10 @@ void start_spin(Problem& problem, int arc) {
   if (psi < 0 || problem.arcs[arc].observable_index(model::Observable::psi_rad) < 0) return;
   const SpinDifference difference = spin_difference(problem, arc, psi, omega);
   if (difference.angle_rad.size() < 3) return;
+  // A spin that is gone before the track ends tells nothing of its start.
+  if (omega >= 0 && std::adjacent_find(difference.turn_s.begin(), difference.turn_s.end(),
+                                       std::greater_equal<>()) != difference.turn_s.end())
+    return;
   if (omega >= 0) {
     const auto [slope, offset] = line_through(difference);
     problem.base[arc][omega] = slope;

@@ -141,8 +141,8 @@ bool follows(const LabelScore& s) {
 void print_pointed(const Recording& r, const data::Table& labels, const Options& options) {
   constexpr Eigen::Index kTries = 8;
   const fs::path target = options.out / (r.name + ".pointed.track.csv");
-  const auto column = [&](const char* name) { return labels.column(name); };
-  const Eigen::VectorXd frame = column("frame"), x = column("x_px"), y = column("y_px");
+  const Eigen::VectorXd frame = labels.column("frame"), x = labels.column("x_px"),
+                        y = labels.column("y_px");
   for (Eigen::Index k = 0; k < kTries; ++k) {
     const Eigen::Index row = k * frame.size() / kTries;
     const auto first = static_cast<std::int64_t>(frame[row]);

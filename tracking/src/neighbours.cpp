@@ -1,7 +1,6 @@
 #include "neighbours.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -85,11 +84,11 @@ struct Neighbours {
   /// The axis moves on in about one direction, be it through the vertical, where tilt and
   /// precession do not; not so where it turns by much of a round from frame to frame.
   static bool goes_on(const std::vector<Eigen::Vector2d>& level) {
-    constexpr double kLeastCosine = 0.0, kStill = 0.02;
+    constexpr double kStill = 0.02;
     for (std::size_t k = 2; k < level.size(); ++k) {
       const Eigen::Vector2d first = level[k - 1] - level[k - 2], then = level[k] - level[k - 1];
       if (std::max(first.norm(), then.norm()) < kStill) continue;
-      if (first.dot(then) < kLeastCosine * first.norm() * then.norm()) return false;
+      if (first.dot(then) < 0.0) return false;
     }
     return true;
   }
@@ -116,11 +115,11 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
   std::vector<bool> poor(glimpses.size(), false);
   std::vector<double> around, off;
   for (std::size_t i = 0; i < glimpses.size(); ++i) {
-    if (!glimpses[i].seen || !glimpses[i].seen->pose) continue;
+    if (!glimpses[i].posed()) continue;
     around.clear(), off.clear();
     for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
          ++k)
-      if (const Glimpse& g = glimpses[k]; g.seen && g.seen->pose) around.push_back(worth(*g.seen));
+      if (const Glimpse& g = glimpses[k]; g.posed()) around.push_back(worth(*g.seen));
     if (around.size() < kFewest) continue;
     const double usual = data::median(around);
     for (const double value : around) off.push_back(std::abs(value - usual));
@@ -226,9 +225,10 @@ void measure_smeared(const Background& background, const BodyFinder& finder,
   if (!(fraction > 0.0)) return;
   const bool alike = finder.faces_look_alike();
   const std::vector<Glimpse> was = glimpses;
-  const auto posed = [&](std::size_t i) { return was[i].seen && was[i].seen->pose; };
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
-    if (i == 0 || i + 1 >= was.size() || !posed(i) || !posed(i - 1) || !posed(i + 1)) return;
+    if (i == 0 || i + 1 >= was.size() || !was[i].posed() || !was[i - 1].posed() ||
+        !was[i + 1].posed())
+      return;
     const Sighting& seen = *was[i].seen;
     if (seen.attitude_doubtful) return;
     const double way_px = apart_px(*was[i - 1].seen, seen) + apart_px(seen, *was[i + 1].seen);
