@@ -55,6 +55,7 @@ void score_keys(Visit&& visit) {
   visit("whiteness_p", &ModelScore::whiteness_p);
   visit("held_back_rms_sigma", &ModelScore::held_back_rms_sigma);
   visit("recommended", &ModelScore::recommended);
+  visit("reason", &ModelScore::reason);
 }
 
 template <class Visit>

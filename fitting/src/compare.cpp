@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "adequacy.hpp"
 #include "ladder.hpp"
@@ -129,9 +130,17 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
 }
 
 data::ModelScore table_row(const Rung& rung, bool recommended) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (!rung.fitted) return {rung.name, kNone, kNone, kNone, kNone, kNone, 0, false, rung.reason};
   return {rung.name,       rung.fit.chi2,        rung.aicc,
           rung.bic,        rung.fit.whiteness_p, rung.held_back_rms_sigma,
-          rung.parameters, recommended};
+          rung.parameters, recommended,          rung.reason};
+}
+
+std::vector<data::ModelScore> table_of(const std::vector<Rung>& rungs, const Rung* chosen) {
+  std::vector<data::ModelScore> table;
+  for (const Rung& rung : rungs) table.push_back(table_row(rung, &rung == chosen));
+  return table;
 }
 
 }  // namespace
@@ -146,7 +155,11 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   const Ladder ladder = ladder_of(named);
   const std::vector<Rung> rungs = climb(ladder, tracks, options);
   const Rung* chosen = simplest_sufficient(rungs);
-  if (chosen == nullptr) return {rungs[0].fit, rungs[0].scene};
+  if (chosen == nullptr) {
+    Comparison none{rungs[0].fit, rungs[0].scene};
+    none.fit.comparison = table_of(rungs, nullptr);
+    return none;
+  }
   Comparison result{chosen->fit, chosen->scene};
   if (options.profile || options.bootstrap > 0) {
     FitOptions again = options;
@@ -159,8 +172,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
       result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
     }
   }
-  for (const Rung& rung : rungs)
-    if (rung.fitted) result.fit.comparison.push_back(table_row(rung, &rung == chosen));
+  result.fit.comparison = table_of(rungs, chosen);
   result.fit.recommendation = sentence(rungs, *chosen, ladder);
   return result;
 }

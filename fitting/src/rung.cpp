@@ -200,9 +200,12 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
-  } catch (const NumericalError&) {
+  } catch (const NumericalError& error) {
     rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
+    rung.reason = error.what();
   }
+  if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
+  if (!rung.fitted && rung.reason.empty()) rung.reason = rung.fit.reason;
   rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
   if (!rung.fitted) return;
   rung.aicc = rung.fit.aicc;

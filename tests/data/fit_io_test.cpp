@@ -35,7 +35,7 @@ Fit full_fit() {
   fit.integration_error_sigma = 1e-3;
   fit.time_origin_s = 0.5;
   fit.arcs = {{0, 1, 0.5, 2.5, 200}};
-  fit.comparison = {{"top", 1.0, 2.0, 3.0, 0.5, 1.1, 6, true}};
+  fit.comparison = {{"top", 1.0, 2.0, 3.0, 0.5, 1.1, 6, true, "why"}};
   fit.recommendation = "top suffices";
   fit.profiles = {{"a_1_s2", "one-sided", 0.0, 2.5, {1.0, 2.0, 3.0}, {0.5, 0.0, 7.0}}};
   fit.bootstrap = {200, 1, 0.25, {{"a_1_s2", 0.5, 1.5, 2.5}}};

@@ -156,6 +156,22 @@ TEST(Compare, SaysWhetherATopNeedsDrag) {
             4.0 * found.fit.find("gamma1_1_s")->sigma);
 }
 
+// A body that is now here, now there moves as no top does. Whatever becomes of a model, it is
+// listed.
+TEST(Compare, ListsModelsThatExplainNothingWithTheirReason) {
+  data::Track jumping = track_of(top(), {{"theta_rad", 0.8}}, 2.0, 60, 1e-4, 9);
+  std::mt19937_64 generator(9);
+  std::uniform_real_distribution<double> anywhere(-0.1, 0.1);
+  for (data::TrackSample& sample : jumping.samples)
+    sample.centre_m = Eigen::Vector2d(anywhere(generator), anywhere(generator));
+  const Comparison none = compare_one(jumping, top());
+  ASSERT_EQ(none.fit.comparison.size(), 2U);
+  for (const data::ModelScore& score : none.fit.comparison) {
+    EXPECT_FALSE(score.reason.empty()) << score.model;
+    EXPECT_FALSE(score.recommended && std::isnan(score.bic)) << score.model;
+  }
+}
+
 // A disc on a pivot with nothing said of its tilt: turning face-on, or a top?
 TEST(Compare, TakesABodyThatStraysFromItsPivotForATop) {
   const Values start{{"a_1_s2", 3.0},    {"b_1_s", 5.0},      {"l_m", 0.1},

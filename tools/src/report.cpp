@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "report_assets.hpp"
@@ -223,15 +224,21 @@ std::string identifiability_section(const data::Fit& fit) {
 
 std::string comparison_section(const data::Fit& fit) {
   if (fit.comparison.empty()) return {};
-  double least = fit.comparison.front().aicc;
-  for (const data::ModelScore& score : fit.comparison) least = std::min(least, score.aicc);
+  double least = std::numeric_limits<double>::infinity();
+  for (const data::ModelScore& score : fit.comparison)
+    if (score.aicc < least) least = score.aicc;
   std::string html =
       "<section class=\"long\"><h2>Models compared</h2><div class=\"scroll\"><table "
       "id=\"comparison\"><thead><tr><th>model</th><th class=\"number\">parameters</th><th "
       "class=\"number\">ΔAICc</th><th class=\"number\">BIC</th><th class=\"number\">χ²</th><th "
       "class=\"number\">whiteness p</th><th class=\"number\">held-back part "
       "[sigma]</th></tr></thead><tbody>";
-  for (const data::ModelScore& score : fit.comparison)
+  for (const data::ModelScore& score : fit.comparison) {
+    if (!std::isfinite(score.bic)) {
+      html += fmt::format("<tr><td>{}</td><td colspan=\"6\">not fitted: {}</td></tr>",
+                          escaped(score.model), escaped(score.reason));
+      continue;
+    }
     html += fmt::format(
         "<tr><td{}>{}{}</td><td class=\"number\">{}</td><td class=\"number\">{:.1f}</td><td "
         "class=\"number\">{:.1f}</td><td class=\"number\">{:.5g}</td><td "
@@ -239,6 +246,11 @@ std::string comparison_section(const data::Fit& fit) {
         score.recommended ? " class=\"strong\"" : "", escaped(score.model),
         score.recommended ? " (recommended)" : "", score.parameters, score.aicc - least, score.bic,
         score.chi2, score.whiteness_p, score.held_back_rms_sigma);
+    if (!score.reason.empty())
+      html +=
+          fmt::format("<tr class=\"quiet\"><td></td><td colspan=\"6\">not accepted: {}</td></tr>",
+                      escaped(score.reason));
+  }
   return html +
          "</tbody></table></div><p class=\"quiet\">Lower ΔAICc and BIC are better; “held-back "
          "part” is the rms error of predicting the last part of the track from the rest. The "

@@ -224,7 +224,8 @@ void add_fit_values(py::module_& module) {
       .def_readonly("whiteness_p", &ModelScore::whiteness_p)
       .def_readonly("held_back_rms_sigma", &ModelScore::held_back_rms_sigma)
       .def_readonly("parameters", &ModelScore::parameters)
-      .def_readonly("recommended", &ModelScore::recommended);
+      .def_readonly("recommended", &ModelScore::recommended)
+      .def_readonly("reason", &ModelScore::reason);
   py::class_<Fit>(module, "FitValue")
       .def_readonly("model", &Fit::model)
       .def_readonly("converged", &Fit::converged)

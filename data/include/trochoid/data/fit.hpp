@@ -38,7 +38,7 @@ struct NullVector {
   std::string words;
 };
 
-/// A rung of the ladder that was tried.
+/// A rung of the ladder that was tried. Figures of a model that has no fit are NaN.
 struct ModelScore {
   std::string model;
   double chi2 = 0.0, aicc = 0.0, bic = 0.0;
@@ -46,6 +46,7 @@ struct ModelScore {
   double held_back_rms_sigma = 0.0;  ///< prediction of the held-back last third, in sigmas
   int parameters = 0;
   bool recommended = false;
+  std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
 };
 
 /// How well the best fit of everything else holds at fixed values of one parameter.

@@ -8,7 +8,8 @@
 
 namespace trochoid::fitting {
 
-/// The simplest model that suffices, with all that were tried in `fit.comparison`.
+/// The simplest model that suffices, with all that were tried in `fit.comparison`, also
+/// those that could not be fitted.
 struct Comparison {
   data::Fit fit;      ///< of the recommended model; `recommendation` says why in a sentence
   data::Scene scene;  ///< the given one with that model's terms, so that the fit can be replayed
