@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "consensus.hpp"
 #include "smoothing.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -56,12 +57,18 @@ Eigen::Matrix2d whitener_of(const Eigen::Matrix2d& covariance) {
   return lower.inverse().transpose();
 }
 
-void guess_position_noise(ArcData& arc) {
-  const double sigma_m = noise_about_smooth_curve(arc.t_s, arc.positions_m());
+void set_position_noise(ArcData& arc, double sigma_m) {
   for (Reading& reading : arc.readings)
     if (reading.channel == Channel::position)
       reading.whitener = Eigen::Matrix2d::Identity() / sigma_m;
+}
+
+// From the scatter about a smooth curve of the samples one body can have visited.
+void guess_position_noise(ArcData& arc) {
   arc.sigma_unknown = true;
+  set_position_noise(arc, noise_about_smooth_curve(arc.t_s, arc.positions_m()));
+  const ArcData kept = arc.keep(consistent_samples(arc));
+  set_position_noise(arc, noise_about_smooth_curve(kept.t_s, kept.positions_m()));
 }
 
 }  // namespace
@@ -211,16 +218,31 @@ std::vector<double> neighbour_distance(const ArcData& arc,
   return distance;
 }
 
+// The samples whose positions no body can have visited on its way between the others.
+void doubt_path(const ArcData& arc, std::vector<bool>& doubtful) {
+  if (arc.observable_index(Observable::x_m) < 0) return;
+  constexpr double kAnything = 1e-3;  // of a guess, so that the path itself says how noisy it is
+  const double unit = (arc.sigma_unknown ? kAnything : 1.0) * std::sqrt(2.0);
+  std::vector<double> sigma_m;
+  for (const Reading& reading : arc.readings)
+    if (reading.channel == Channel::position) sigma_m.push_back(unit / reading.whitener.norm());
+  std::vector<bool> off(arc.t_s.size(), true);
+  for (const int i : consistent_path(arc.t_s, arc.positions_m(), sigma_m)) off[i] = false;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (off[i]) doubtful[i] = true;
+}
+
 }  // namespace
 
 std::vector<int> consistent_samples(const ArcData& arc) {
   constexpr double kFar = 10.0;  // times the typical distance: curvature varies by a few
   const int n = static_cast<int>(arc.t_s.size());
   std::vector<bool> doubtful(n, false);
-  for (const Channel channel : {Channel::position, Channel::theta, Channel::phi}) {
+  doubt_path(arc, doubtful);
+  for (const Channel channel : {Channel::theta, Channel::phi}) {
     std::vector<const Reading*> readings;
     for (const Reading& reading : arc.readings)
-      if (reading.channel == channel) readings.push_back(&reading);
+      if (reading.channel == channel && !doubtful[reading.sample]) readings.push_back(&reading);
     if (readings.size() < 24) continue;
     const std::vector<double> distance = neighbour_distance(arc, readings);
     const double limit = kFar * median(distance);

@@ -123,10 +123,12 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
   problem.log = options.log;
   problem.shortfalls = std::make_shared<Shortfalls>();
-  for (int c = 0; c < kChannels; ++c)
-    for (const ArcData& arc : problem.arcs)
+  for (const ArcData& whole : problem.arcs) {
+    const ArcData arc = whole.keep(consistent_samples(whole));
+    for (int c = 0; c < kChannels; ++c)
       problem.noise_scale[c] =
           std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
+  }
   suit_to_data(problem, scene);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)

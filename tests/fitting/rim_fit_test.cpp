@@ -145,6 +145,30 @@ TEST_F(RimFit, IsNotMisledByEveryFifthSample) {
   EXPECT_LT(pull(retrograde, "air_linear_N_m_s[3]", 1.5e-5), kFar);
 }
 
+// From positions alone: single ones 5 to 50 mm off, or eight in a row, as when the tracker follows
+// something else for a while. Nothing else in the track says which they are.
+TEST_F(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
+  for (const int run : {1, 8}) {
+    Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+    std::mt19937_64 generator(5);
+    std::uniform_real_distribution<double> far_m(5e-3, 50e-3), uniform;
+    const double begins = 0.15 / run;
+    for (std::size_t i = 20; i + 20 < c.track.samples.size(); ++i) {
+      if (uniform(generator) > begins) continue;
+      const double way_rad = 2.0 * std::numbers::pi * uniform(generator);
+      const Eigen::Vector2d off_m =
+          far_m(generator) * Eigen::Vector2d(std::cos(way_rad), std::sin(way_rad));
+      for (int k = 0; k < run; ++k) c.track.samples[i++].centre_m += off_m;
+    }
+    const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+    ASSERT_TRUE(fit.converged) << fit.reason << ", " << run << " in a row";
+    EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar) << run << " in a row";
+    EXPECT_LT(pull(fit, "w2_rad_s", 22.5526228988618), kFar) << run << " in a row";
+    EXPECT_LT(pull(fit, "w3_rad_s", 3.0), kFar) << run << " in a row";
+    EXPECT_NEAR(fit.noise_scale, 1.0, 0.15) << run << " in a row";
+  }
+}
+
 TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
   Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-5, 1e-5, 4e-6);  // off by factors of four

@@ -1,0 +1,91 @@
+#include "consensus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+namespace trochoid::fitting {
+namespace {
+
+struct Walk {
+  std::vector<double> t_s, sigma_m;
+  Eigen::MatrixX2d xy_m;
+  std::set<int> wrong;
+};
+
+// A body going round on a path that drifts, seen with noise.
+Walk walk(int samples, std::uint64_t seed) {
+  constexpr double kSigma_m = 3e-4;
+  Walk walk;
+  walk.xy_m.resize(samples, 2);
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> noise(0.0, kSigma_m);
+  for (int i = 0; i < samples; ++i) {
+    const double t = i / 120.0;
+    walk.t_s.push_back(t);
+    walk.sigma_m.push_back(kSigma_m);
+    walk.xy_m(i, 0) = 0.03 * std::cos(9.0 * t) + 0.05 * t + noise(generator);
+    walk.xy_m(i, 1) = 0.03 * std::sin(9.0 * t) - 0.02 * t * t + noise(generator);
+  }
+  return walk;
+}
+
+// Runs of `length` samples moved by 8 to 50 mm each, until a share of all is wrong.
+void go_wrong(Walk& walk, double share, int length, std::uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  const int n = static_cast<int>(walk.t_s.size());
+  std::uniform_int_distribution<int> anywhere(0, n - length);
+  std::uniform_real_distribution<double> far_m(8e-3, 50e-3), way_rad(0.0, 2.0 * M_PI);
+  while (static_cast<double>(walk.wrong.size()) < share * n) {
+    const int first = anywhere(generator);
+    const double distance_m = far_m(generator), angle_rad = way_rad(generator);
+    for (int i = first; i < first + length; ++i)
+      if (walk.wrong.insert(i).second)
+        walk.xy_m.row(i) +=
+            distance_m * Eigen::RowVector2d(std::cos(angle_rad), std::sin(angle_rad));
+  }
+}
+
+TEST(Consensus, KeepsEverySampleOfANoisyPath) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Walk clean = walk(400, seed);
+    EXPECT_EQ(consistent_path(clean.t_s, clean.xy_m, clean.sigma_m).size(), 400U) << seed;
+  }
+}
+
+// A run that happens to lie on the way may be taken for part of it, and right samples beside a
+// wrong one go with it: together two in a hundred.
+TEST(Consensus, LeavesOutWrongPlacesSingleOnesAndRunsOfThem) {
+  constexpr int kSamples = 400, kSeeds = 5;
+  constexpr double kMistaken = 0.02 * kSamples * kSeeds;
+  for (const int length : {1, 4, 10})
+    for (const double share : {0.05, 0.15, 0.25}) {
+      std::size_t wrong_kept = 0, right_lost = 0;
+      for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        Walk path = walk(kSamples, seed);
+        go_wrong(path, share, length, seed);
+        const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+        const auto wrong = static_cast<std::size_t>(
+            std::count_if(kept.begin(), kept.end(), [&](int i) { return path.wrong.contains(i); }));
+        wrong_kept += wrong;
+        right_lost += kSamples - path.wrong.size() - (kept.size() - wrong);
+      }
+      EXPECT_LE(static_cast<double>(wrong_kept + right_lost), kMistaken)
+          << length << " in a row, share " << share << ": " << wrong_kept << " wrong kept, "
+          << right_lost << " right lost";
+    }
+}
+
+TEST(Consensus, NeedsNoTrueNoiseToBeStated) {
+  Walk path = walk(400, 3);
+  go_wrong(path, 0.15, 4, 3);
+  const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+  for (double& sigma : path.sigma_m) sigma *= 0.05;
+  EXPECT_EQ(consistent_path(path.t_s, path.xy_m, path.sigma_m), kept);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
