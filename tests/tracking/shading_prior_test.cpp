@@ -55,9 +55,9 @@ double mean_variance(const Drawn& drawn, const std::vector<ShadingEstimate>& est
 TEST(ShadingPrior, OnPlainSurfacesFreeShadingCostsLittle) {
   const Drawn drawn = looks_beside(0.0, 1);
   const double free = mean_variance(drawn, shadings_given(drawn.looks, 1.0));
-  const double learnt = mean_variance(drawn, estimate_shadings(drawn.looks));
+  const double learnt = mean_variance(drawn, estimate_shadings(drawn.looks, {}));
   EXPECT_LT(learnt, 0.6 * free);
-  const double square = mean_over(drawn, estimate_shadings(drawn.looks),
+  const double square = mean_over(drawn, estimate_shadings(drawn.looks, {}),
                                   [](const ShadingEstimate& e, const Shading& /*truth*/, int k) {
                                     return e.shading[k] * e.shading[k];
                                   });
@@ -67,7 +67,7 @@ TEST(ShadingPrior, OnPlainSurfacesFreeShadingCostsLittle) {
 
 TEST(ShadingPrior, BesideShadowsShadingIsAsFreeAsItIsLarge) {
   const Drawn drawn = looks_beside(0.8, 2);
-  const std::vector<ShadingEstimate> estimates = estimate_shadings(drawn.looks);
+  const std::vector<ShadingEstimate> estimates = estimate_shadings(drawn.looks, {});
   const double free = mean_variance(drawn, shadings_given(drawn.looks, 1.0));
   EXPECT_GT(mean_variance(drawn, estimates), 0.85 * free);
   const double normalised =
@@ -82,7 +82,7 @@ TEST(ShadingPrior, AShadowBesideOneSideLeavesTheOtherPlain) {
   Drawn plain = looks_beside(0.0, 3);
   const Drawn shaded = looks_beside(0.8, 4);
   for (size_t i = 0; i < kLooks / 3; ++i) plain.looks[i] = shaded.looks[i];
-  const std::vector<ShadingEstimate> estimates = estimate_shadings(plain.looks);
+  const std::vector<ShadingEstimate> estimates = estimate_shadings(plain.looks, {});
   const auto variance = [&](size_t i) { return estimates[i].covariance(0, 0); };
   EXPECT_GT(variance(kLooks / 6), 1.3 * variance(2 * kLooks / 3));
 }
@@ -91,7 +91,7 @@ TEST(ShadingPrior, UnusableLooksAreLeftAlone) {
   Drawn drawn = looks_beside(0.5, 5);
   drawn.looks[7].usable = false;
   drawn.looks[7].right.setConstant(1e6);
-  const std::vector<ShadingEstimate> estimates = estimate_shadings(drawn.looks);
+  const std::vector<ShadingEstimate> estimates = estimate_shadings(drawn.looks, {});
   EXPECT_EQ(estimates[7].shading, Shading(Shading::Zero()));
   EXPECT_LT(estimates[8].shading.norm(), 10.0);
 }

@@ -105,7 +105,8 @@ class CylinderFinder final : public BodyFinder {
         .chroma = look.frame.chroma,
         .background_chroma = look.background.chroma,
         .blur_px = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->blur_px)
-                                                           : std::nullopt};
+                                                           : std::nullopt,
+        .shading = look.shading};
     auto measured = fitter_.measure(evidence);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,
@@ -140,7 +141,6 @@ class CylinderFinder final : public BodyFinder {
       return 0.0;
     }
   }
-  [[nodiscard]] double exposure_fraction() const override { return exposure_fraction_; }
   [[nodiscard]] bool faces_look_alike() const override { return alike_; }
   [[nodiscard]] double mark_rad() const override {
     return body_.marks.empty() ? 0.0 : body_.marks.front().angle_rad;

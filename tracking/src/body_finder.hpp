@@ -35,6 +35,7 @@ struct Look {
   double reach_px = 4.0;           ///< how far off the prediction may be
   double shape_sigma_px = 1.0;     ///< how well the predicted rim's shape is known
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< per frame
+  const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
 };
 
 /// Measures one body where it is expected. Stateless: used from several threads.
@@ -55,8 +56,6 @@ class BodyFinder {
     return 0.0;
   }
   /// Poses (theta, phi) and (pi - theta, phi + pi) show the same picture.
-  /// Shutter time over frame interval; 0: not known.
-  [[nodiscard]] virtual double exposure_fraction() const { return 0.0; }
   [[nodiscard]] virtual bool faces_look_alike() const { return false; }
   /// Angle of the spin mark in the body, 0 without one.
   [[nodiscard]] virtual double mark_rad() const { return 0.0; }

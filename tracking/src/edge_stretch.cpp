@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "normal_table.hpp"
-#include "shading_prior.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -222,6 +221,7 @@ std::vector<ShadingEvidence> shading_evidence(const std::vector<StretchProfile>&
     ShadingEvidence& e = evidence[i];
     e.usable = w.usable;
     e.curve = profiles[i].curve;
+    e.direction_rad = profiles[i].direction_rad;
     if (!w.usable) continue;
     const Shading unit = w.light * largest_shading();
     e.normal = unit.asDiagonal() * w.shading_normal * unit.asDiagonal() / noise2[i];
@@ -270,22 +270,23 @@ void widen(double step, std::vector<Working>& all) {
 // Shading beside the edges and their common blur, which explains what it can first: a picture less
 // sharp than expected looks as if it were brighter and darker beside every edge. Returns by how
 // much the blur should grow.
-double find_shadings(const std::vector<StretchProfile>& profiles, std::vector<Working>& all) {
+StretchFit find_shadings(const std::vector<StretchProfile>& profiles, const ShadingMemory& known,
+                         std::vector<Working>& all) {
   constexpr double kLittle = 0.02;  // of the largest variance
   constexpr int kRounds = 3;
   const std::vector<double> noise2 = noise_of_looks(profiles, all);
-  double wider = 0.0;
+  StretchFit out;
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<ShadingEvidence> evidence = shading_evidence(profiles, noise2, all);
+    out.shading = shading_evidence(profiles, noise2, all);
     const std::vector<ShadingEstimate> estimates =
-        round == 0 ? shadings_given(evidence, kLittle) : estimate_shadings(evidence);
+        round == 0 ? shadings_given(out.shading, kLittle) : estimate_shadings(out.shading, known);
     for (size_t i = 0; i < all.size(); ++i)
       if (all[i].usable) set_shading(estimates[i], noise2[i], all[i]);
     const double step = blur_step(all);
-    wider += step;
+    out.wider_px += step;
     if (round + 1 < kRounds) widen(step, all);
   }
-  return wider;
+  return out;
 }
 
 // The level beside the edge at a distance from it.
@@ -419,7 +420,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
 
 }  // namespace
 
-double fit_stretches(std::vector<StretchProfile>& profiles) {
+StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known) {
   std::vector<Working> all(profiles.size());
   std::vector<Columns> columns(profiles.size());
   for (size_t i = 0; i < profiles.size(); ++i) {
@@ -429,7 +430,7 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
     accumulate(profiles[i], columns[i], all[i]);
     reduce(profiles[i], all[i]);
   }
-  const double wider = find_shadings(profiles, all);
+  StretchFit out = find_shadings(profiles, known, all);
   for (size_t i = 0; i < profiles.size(); ++i)
     if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
   const auto noise = noise_of_neighbours(all, profiles);
@@ -444,7 +445,7 @@ double fit_stretches(std::vector<StretchProfile>& profiles) {
         1.0 / (1.0 + 1.0 / (kScatter_px * kScatter_px * std::max(all[i].blur_information, 1e-9)));
     profiles[i].edge.wider_px = seen * (all[i].blur_step - usual);
   }
-  return wider;
+  return out;
 }
 
 }  // namespace trochoid::tracking

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "edge_fit.hpp"
+#include "shading_prior.hpp"
 
 namespace trochoid::tracking {
 
@@ -16,8 +17,9 @@ struct StretchProfile {
   int steps = 0;
   std::array<float, kMostSteps> step_at_px{};
   double sharp_px = 0.7;
-  bool plate = false;  ///< the outer level is a multiple of the background plate
-  int curve = 0;       ///< neighbours are profiles of the same curve
+  bool plate = false;          ///< the outer level is a multiple of the background plate
+  int curve = 0;               ///< neighbours are profiles of the same curve
+  double direction_rad = 0.0;  ///< of the normal, in the picture
   /// Distance inwards to an edge of the body itself, too near to look between: a strip of unknown
   /// level; 0: none.
   double strip_px = 0.0;
@@ -26,12 +28,17 @@ struct StretchProfile {
   ProfileEdge edge{};     ///< out
 };
 
+struct StretchFit {
+  double wider_px = 0.0;  ///< by how much the blur should be larger, 0 if the edges do not tell
+  std::vector<ShadingEvidence> shading;  ///< of each profile
+};
+
 /// Fits the profiles of an outline, linearly about s = 0: the best estimate for averaging, however
 /// noisy. Each has its own levels, which may change along the normal, linearly and with a bend, by
 /// a few per cent of the light (shading, soft shadows); how noisy either side is, is common to
 /// neighbours: the relief of a coin and the floor are not equally noisy, and a single profile has
 /// too few degrees of freedom to know its own.
-/// @returns by how much the blur of the edges should be larger [px], 0 if they do not tell.
-double fit_stretches(std::vector<StretchProfile>& profiles);
+/// @param known what other frames show of the light beside these curves.
+StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known = {});
 
 }  // namespace trochoid::tracking

@@ -16,7 +16,8 @@ double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool ali
 }
 
 std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,
-                                              const std::optional<data::Pose<>>& near) {
+                                              const std::optional<data::Pose<>>& near,
+                                              const ShadingMemory* shading) {
   finder_.place(guess);
   const double half_px = 1.6 * guess.rim.semi_major_px() + 24.0;
   const cv::Rect box = cv::Rect(static_cast<int>(guess.centre_px.x() - half_px),
@@ -27,6 +28,7 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
   background_.scaled_into(plate_, background_.gain(frame.luma), box);
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
+  look.shading = shading;
   Sighting last = guess;
   if (near) {
     last.pose->pose = *near;

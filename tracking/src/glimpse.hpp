@@ -25,8 +25,10 @@ class Measuring {
       : background_(background), finder_(finder) {}
 
   /// @param near its pose one frame earlier or later, if known: how far it smears.
+  /// @param shading light beside its outline in other frames, if known.
   [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
-                                                   const std::optional<data::Pose<>>& near);
+                                                   const std::optional<data::Pose<>>& near,
+                                                   const ShadingMemory* shading = nullptr);
 
  private:
   const Background& background_;

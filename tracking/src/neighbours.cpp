@@ -8,6 +8,7 @@
 
 #include "forecast.hpp"
 #include "pose_motion.hpp"
+#include "shading_prior.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -216,13 +217,21 @@ Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
   return earlier;
 }
 
-/// Frames in which the body moves far during the exposure are measured again with how it moves as
-/// the frames on both sides know it: while it was followed, only the past did.
-void measure_smeared(const Background& background, const BodyFinder& finder,
-                     std::vector<Glimpse>& glimpses) {
-  constexpr double kLeastSmear_px = 1.5, kAsGood = 0.95, kNear = 0.25;
-  const double fraction = finder.exposure_fraction();
-  if (!(fraction > 0.0)) return;
+/// The light beside the outline in the frames around frame i.
+ShadingMemory shading_around(const std::vector<Glimpse>& glimpses, std::size_t i) {
+  constexpr std::size_t kReach = 6;
+  ShadingMemory sum;
+  for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1); ++k)
+    if (k != i && glimpses[k].posed() && glimpses[k].seen->pose->shading)
+      sum.add(*glimpses[k].seen->pose->shading);
+  return sum;
+}
+
+/// All frames are measured again with what those on both sides know: how the body moves during the
+/// exposure, and the light beside its outline. While it was followed only the past was known.
+void measure_again(const Background& background, const BodyFinder& finder,
+                   std::vector<Glimpse>& glimpses) {
+  constexpr double kAsGood = 0.95, kNear = 0.25;
   const bool alike = finder.faces_look_alike();
   const std::vector<Glimpse> was = glimpses;
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
@@ -231,12 +240,11 @@ void measure_smeared(const Background& background, const BodyFinder& finder,
       return;
     const Sighting& seen = *was[i].seen;
     if (seen.attitude_doubtful) return;
-    const double way_px = apart_px(*was[i - 1].seen, seen) + apart_px(seen, *was[i + 1].seen);
-    if (0.5 * fraction * way_px < kLeastSmear_px) return;
     const Pose pose = seen.pose->pose;
     Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
     if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
-    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after));
+    const ShadingMemory shading = shading_around(was, i);
+    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after), &shading);
     if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
     const double off =
         std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
@@ -375,7 +383,7 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
            mended[i] && k < std::min(was.size(), i + kReach + 1); ++k)
         open[k] = 1;
   }
-  measure_smeared(background, finder, glimpses);
+  measure_again(background, finder, glimpses);
   doubt_what_is_contradicted(finder, glimpses);
 }
 

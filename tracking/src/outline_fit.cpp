@@ -248,12 +248,15 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.blur_px = fitted.blur_px;
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
+  ShadingMemory shading;
   for (size_t i = 0; i < r.equations.size(); ++i) {
     const EdgeEquation& e = r.equations[i];
     if (e.weight < 0.5) continue;
+    shading.add(r.shading[i]);
     m.edges.push_back({r.samples[i].image_px + e.offset_px * r.samples[i].normal_px,
                        r.samples[i].normal_px, std::sqrt(e.variance_px2), e.residual_px});
   }
+  m.shading = std::make_shared<ShadingMemory>(std::move(shading));
   return m;
 }
 
@@ -336,7 +339,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       evidence.predicted && evidence.previous && evidence.exposure_fraction > 0.0
           ? std::optional(
                 ExposureMotion(*evidence.previous, starts.front(), evidence.exposure_fraction))
-          : std::nullopt};
+          : std::nullopt,
+      evidence.shading};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;

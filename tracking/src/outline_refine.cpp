@@ -83,7 +83,8 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
           : sample_profile(picture, plate, sample.image_px + middle * sample.normal_px,
                            sample.normal_px, {inside, outside}, look.profile);
   if (!sampled) return false;
-  look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8);
+  look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8) + (colour ? 16 : 0);
+  look.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
   look.plate = plate_explains(look.profile, std::max(1.5 * look.blur_px, half_range));
   return true;
@@ -244,7 +245,8 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
                 looks[places.size()]))
       places.push_back(i);
   looks.resize(places.size());
-  const double wider = fit_stretches(looks);
+  static const ShadingMemory kNothing;
+  StretchFit fit = fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing);
   const std::vector<Surroundings> around = surroundings_of(looks);
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
@@ -253,9 +255,10 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
     equation.common_px = common_sd_px(scenery, looks[i]);
     keep(sample, looks[i].edge, equation, out);
+    out.shading.push_back(fit.shading[i]);
     out.places.push_back(places[i]);
   }
-  return wider;
+  return fit.wider_px;
 }
 
 // Sweeps longer than the blur are ramps; shorter ones only widen the edges.
@@ -298,6 +301,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
   out.samples.clear();
   out.edges.clear();
   out.equations.clear();
+  out.shading.clear();
   out.places.clear();
   for (const bool colour : {false, true}) {
     if (colour && scenery.colour.empty()) continue;

@@ -25,6 +25,7 @@ struct Scenery {
   PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
   std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
+  const ShadingMemory* shading = nullptr;    ///< what other frames show; may be null
 
   /// The same with both windows blurred.
   [[nodiscard]] Scenery blurred(double sigma_px) const {
@@ -37,7 +38,8 @@ struct Scenery {
             most_looks,
             smear,
             tints,
-            exposure};
+            exposure,
+            shading};
   }
 };
 
@@ -60,11 +62,12 @@ struct Refined {
   std::vector<OutlineSample> samples;  ///< those with an edge
   std::vector<ProfileEdge> edges;
   std::vector<EdgeEquation> equations;
-  std::vector<size_t> places;  ///< along the outline of all samples
-  double outline_px = 0.0;     ///< length of the predicted silhouette
-  double seen_px = 0.0;        ///< of it, with an edge exactly there
-  double covered = 0.0;        ///< share of the predicted outline with an accepted edge
-  double wider_px = 0.0;       ///< exact: by how much the edges are wider than the model's
+  std::vector<ShadingEvidence> shading;  ///< exact: beside each edge
+  std::vector<size_t> places;            ///< along the outline of all samples
+  double outline_px = 0.0;               ///< length of the predicted silhouette
+  double seen_px = 0.0;                  ///< of it, with an edge exactly there
+  double covered = 0.0;                  ///< share of the predicted outline with an accepted edge
+  double wider_px = 0.0;  ///< exact: by how much the edges are wider than the model's
 };
 
 /// Iterates edges and pose; nothing if too few edges are found.

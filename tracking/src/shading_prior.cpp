@@ -1,7 +1,10 @@
 #include "shading_prior.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace trochoid::tracking {
 namespace {
@@ -10,10 +13,9 @@ namespace {
 constexpr double kLeastVariance = 0.03, kMostVariance = 1.0;
 
 // Minimises x^T A x / 2 - b^T x over 0 <= x <= kMostVariance, A positive semidefinite, one
-// coordinate at a time.
-Shading least_within_bounds(const ShadingMatrix& A, const Shading& b) {
-  constexpr int kSweeps = 12;
-  Shading x = Shading::Zero();
+// coordinate at a time, from x.
+Shading least_within_bounds(const ShadingMatrix& A, const Shading& b, Shading x) {
+  constexpr int kSweeps = 3;
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int k = 0; k < kShading; ++k) {
       if (!(A(k, k) > 0.0)) continue;
@@ -29,24 +31,33 @@ struct Moments {
   ShadingMatrix squares = ShadingMatrix::Zero();
   Shading excess = Shading::Zero();
 
-  void add(const ShadingEvidence& look, double sign) {
+  void add(const ShadingEvidence& look, const Shading& rest, double sign) {
     squares += sign * look.normal.cwiseAbs2();
-    excess += sign * (look.right.cwiseAbs2() - look.normal.diagonal());
+    excess += sign * (rest.cwiseAbs2() - look.normal.diagonal());
   }
-  [[nodiscard]] Shading variances() const { return least_within_bounds(squares, excess); }
+  // From those of a look nearby.
+  [[nodiscard]] Shading variances(const Shading& nearby) const {
+    return least_within_bounds(squares, excess, nearby);
+  }
 };
 
 // A strip along the edge, the wall of the body mostly, is lit like nothing else.
-ShadingEstimate estimate(const ShadingEvidence& look, const Shading& seen_variance) {
+ShadingEstimate estimate(const ShadingEvidence& look, const Shading& expected,
+                         const Shading& seen_variance) {
   Shading variance = seen_variance.cwiseMax(kLeastVariance);
   variance[kShading - 1] = kMostVariance;
   ShadingMatrix information = look.normal;
   information.diagonal() += variance.cwiseInverse();
   ShadingEstimate out;
   out.covariance = Eigen::LLT<ShadingMatrix>(information).solve(ShadingMatrix::Identity());
-  out.shading = out.covariance * look.right;
+  out.shading = expected + out.covariance * (look.right - look.normal * expected);
   out.unevenness = seen_variance.head<kShading - 1>().mean();
   return out;
+}
+
+// Where the normal points, in sectors.
+double sectors_round(double direction_rad, int sectors) {
+  return (direction_rad / (2.0 * std::numbers::pi) + 1.0) * sectors;
 }
 
 }  // namespace
@@ -55,29 +66,72 @@ std::vector<ShadingEstimate> shadings_given(const std::vector<ShadingEvidence>& 
                                             double variance) {
   std::vector<ShadingEstimate> out(looks.size());
   for (std::size_t i = 0; i < looks.size(); ++i)
-    if (looks[i].usable) out[i] = estimate(looks[i], Shading::Constant(variance));
+    if (looks[i].usable) out[i] = estimate(looks[i], Shading::Zero(), Shading::Constant(variance));
   return out;
 }
 
-std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence>& looks) {
+std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence>& looks,
+                                               const ShadingMemory& known) {
   constexpr std::size_t kLeastReach = 8;
   constexpr double kShare = 0.12;  // of the curve to either side
   std::vector<ShadingEstimate> out(looks.size());
+  std::vector<Shading> expected(looks.size()), rest(looks.size());
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    expected[i] = known.expected(looks[i].curve, looks[i].direction_rad);
+    rest[i] = looks[i].right - looks[i].normal * expected[i];
+  }
   for (std::size_t first = 0, end = 0; first < looks.size(); first = end) {
     while (end < looks.size() && looks[end].curve == looks[first].curve) ++end;
     const auto share = static_cast<std::size_t>(kShare * static_cast<double>(end - first));
     const std::size_t reach = std::max(kLeastReach, share);
     Moments around;
     const auto add = [&](std::size_t i, double sign) {
-      if (looks[i].usable) around.add(looks[i], sign);
+      if (looks[i].usable) around.add(looks[i], rest[i], sign);
     };
     for (std::size_t i = first; i < std::min(end, first + reach); ++i) add(i, 1.0);
+    constexpr int kFirstRounds = 4;
+    Shading variances = Shading::Zero();
+    for (int round = 0; round < kFirstRounds; ++round) variances = around.variances(variances);
     for (std::size_t i = first; i < end; ++i) {
       if (i + reach < end) add(i + reach, 1.0);
       if (i > first + reach) add(i - reach - 1, -1.0);
-      if (looks[i].usable) out[i] = estimate(looks[i], around.variances());
+      variances = around.variances(variances);
+      if (looks[i].usable) out[i] = estimate(looks[i], expected[i], variances);
     }
   }
+  return out;
+}
+
+Eigen::Vector2d ShadingMemory::Sector::slopes() const {
+  constexpr double kUsualVariance = 0.02;  // about zero
+  return (normal + Eigen::Matrix2d::Identity() / kUsualVariance).inverse() * right;
+}
+
+void ShadingMemory::add(const ShadingEvidence& look) {
+  if (!look.usable) return;
+  const auto nearest =
+      static_cast<std::size_t>(std::lround(sectors_round(look.direction_rad, kSectors)));
+  Sector& sector = curves_[look.curve][nearest % kSectors];
+  sector.normal += look.normal.topLeftCorner<2, 2>();
+  sector.right += look.right.head<2>();
+}
+
+void ShadingMemory::add(const ShadingMemory& other) {
+  for (const auto& [curve, sectors] : other.curves_) {
+    auto& own = curves_[curve];
+    for (std::size_t k = 0; k < sectors.size(); ++k)
+      own[k].normal += sectors[k].normal, own[k].right += sectors[k].right;
+  }
+}
+
+Shading ShadingMemory::expected(int curve, double direction_rad) const {
+  Shading out = Shading::Zero();
+  const auto at = curves_.find(curve);
+  if (at == curves_.end()) return out;
+  const double place = sectors_round(direction_rad, kSectors), part = place - std::floor(place);
+  const auto before = static_cast<std::size_t>(place);
+  out.head<2>() = (1.0 - part) * at->second[before % kSectors].slopes() +
+                  part * at->second[(before + 1) % kSectors].slopes();
   return out;
 }
 

@@ -243,7 +243,9 @@ class Tracking {
     mend_from_neighbours(background_, *finder_, glimpses);
     for (Glimpse& g : glimpses) {
       path.frames.erase(g.frame->index);
-      if (g.seen) path.frames[g.frame->index] = {g.frame->t_s, trimmed(std::move(*g.seen))};
+      if (!g.seen) continue;
+      if (g.seen->pose) g.seen->pose->shading.reset();
+      path.frames[g.frame->index] = {g.frame->t_s, trimmed(std::move(*g.seen))};
     }
     // Enough for the forecast to learn how the body moves.
     constexpr int kLast = 6;

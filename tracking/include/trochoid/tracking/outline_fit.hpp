@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tracking {
+
+class ShadingMemory;
 
 /// An edge found in the image that the fit accepted.
 struct EdgePoint {
@@ -51,6 +54,8 @@ struct PoseMeasurement {
   /// less their misfit: compares fits to one picture.
   double evidence = 0.0;
   double blur_px = 0.0;  ///< of the edges of this picture, for the next one
+  /// Light beside the outline in this picture, for others.
+  std::shared_ptr<const ShadingMemory> shading;
   std::vector<EdgePoint> edges;
 };
 
@@ -68,6 +73,7 @@ struct OutlineEvidence {
   cv::Mat background_chroma{};             ///< what it would be without the body, or empty
   /// PoseMeasurement::blur_px of the frame before; without, it is found by looking repeatedly.
   std::optional<double> blur_px{};
+  const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
