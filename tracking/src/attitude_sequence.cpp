@@ -85,9 +85,10 @@ class Chain {
     return chosen;
   }
 
-  /// Measures the mirrored reading and compares what speaks for the two.
+  /// Measures the mirrored reading and compares what speaks for the two. What tells them apart, the
+  /// wall, is the narrower the less the body tilts, and errors of the edges are not.
   void weigh(const std::vector<std::size_t>& chosen) {
-    constexpr double kPerShare = 6.0, kMost = 1.5, kNothingThere = 0.6;
+    constexpr double kPerShare = 6.0, kMost = 1.5, kNothingThere = 0.6, kSteep_rad = 0.75;
     on_both_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
       Node& node = nodes_[chosen[k]];
       if (node.weighed || node.tilt_rad < kLeastTilt) return;
@@ -98,9 +99,10 @@ class Chain {
         node.speaks = kNothingThere;
         return;
       }
+      const double seen_wall = std::min(1.0, node.tilt_rad / kSteep_rad);
       const double ours = glimpse.seen->pose->evidence, theirs = node.other->pose->evidence;
       const double share = (ours - theirs) / std::max({ours, theirs, 1e-9});
-      node.speaks = std::clamp(kPerShare * share, -kMost, kMost);
+      node.speaks = seen_wall * seen_wall * std::clamp(kPerShare * share, -kMost, kMost);
     });
   }
 
