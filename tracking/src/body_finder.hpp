@@ -20,7 +20,7 @@ struct Sighting {
   double turned_sigma_rad = 0.0;
   double rms_px = 0.0;
   double accepted = 0.0;           ///< share of the outline with an edge
-  bool attitude_doubtful = false;  ///< it may be the mirror image of what is said
+  bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
   Evidence evidence{};
   std::vector<EdgePoint> edges;
 };

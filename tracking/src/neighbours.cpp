@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "forecast.hpp"
+#include "polynomial.hpp"
 #include "pose_motion.hpp"
 #include "shading_prior.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -16,19 +17,6 @@ namespace {
 
 using Pose = data::Pose<>;
 constexpr double kTurn = 2.0 * std::numbers::pi;
-
-/// The polynomial through all the values [Lagrange].
-template <class Value>
-Value through(const std::vector<double>& times, const std::vector<Value>& values, double t) {
-  Value sum = 0.0 * values[0];
-  for (std::size_t k = 0; k < times.size(); ++k) {
-    double weight = 1.0;
-    for (std::size_t l = 0; l < times.size(); ++l)
-      if (l != k) weight *= (t - times[l]) / (times[k] - times[l]);
-    sum += weight * values[k];
-  }
-  return sum;
-}
 
 /// Where neighbours at a and b (and those before and after them) put the body at time t.
 struct Neighbours {

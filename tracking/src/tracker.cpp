@@ -11,6 +11,7 @@
 #include "body_search.hpp"
 #include "neighbours.hpp"
 #include "path_motion.hpp"
+#include "path_outliers.hpp"
 #include "recording.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
@@ -241,6 +242,7 @@ class Tracking {
     }
     decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
+    doubt_what_leaves_the_path(glimpses);
     for (Glimpse& g : glimpses) {
       path.frames.erase(g.frame->index);
       if (!g.seen) continue;

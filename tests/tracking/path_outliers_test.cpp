@@ -1,0 +1,78 @@
+#include "path_outliers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include <vector>
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr int kFrames = 30, kHit = 15;
+constexpr double kSigmaPx = 0.05;
+
+// Centres along a bent path that breaks in frame kHit: there the body strikes something.
+struct Recorded {
+  std::vector<Frame> frames{kFrames};
+  std::vector<Glimpse> glimpses;
+
+  Recorded() {
+    for (int i = 0; i < kFrames; ++i) {
+      Frame& frame = frames[static_cast<std::size_t>(i)];
+      frame.index = i;
+      frame.t_s = i / 100.0;
+      Sighting seen;
+      seen.rim = Ellipse::from_axes({0.0, 0.0}, 40.0, 30.0, 0.0);
+      const double since = i - kHit, jitter = 0.02 * (i % 3 - 1);
+      const double y = since < 0 ? 0.03 * since * since : -6.0 * since + 0.03 * since * since;
+      seen.centre_px = {100.0 + 4.0 * since + jitter, 80.0 + y};
+      seen.covariance_px2 = kSigmaPx * kSigmaPx * Eigen::Matrix2d::Identity();
+      seen.pose.emplace();
+      seen.pose->pose.centre_m = {1e-3 * seen.centre_px.x(), 1e-3 * seen.centre_px.y(), 0.0};
+      seen.pose->covariance_px2 = seen.covariance_px2;
+      seen.pose->covariance_m2 = 1e-6 * seen.covariance_px2;
+      glimpses.push_back({&frame, seen});
+    }
+  }
+};
+
+std::vector<int> doubted(const std::vector<Glimpse>& glimpses) {
+  std::vector<int> out;
+  for (const Glimpse& g : glimpses)
+    if (g.seen->attitude_doubtful) out.push_back(static_cast<int>(g.frame->index));
+  return out;
+}
+
+TEST(PathOutliers, AnImpactIsNotDoubted) {
+  Recorded recorded;
+  doubt_what_leaves_the_path(recorded.glimpses);
+  EXPECT_EQ(doubted(recorded.glimpses), std::vector<int>{});
+}
+
+TEST(PathOutliers, AFitThatWentAstrayIsDoubtedAndItsNeighboursAreNot) {
+  Recorded recorded;
+  Sighting& astray = *recorded.glimpses[7].seen;
+  const Eigen::Vector2d off_px(1.5, -1.0);
+  astray.centre_px += off_px;
+  astray.pose->pose.centre_m.head<2>() += 1e-3 * off_px;
+  const Eigen::Vector2d seen_px = astray.centre_px;
+  doubt_what_leaves_the_path(recorded.glimpses);
+  EXPECT_EQ(doubted(recorded.glimpses), std::vector<int>{7});
+  EXPECT_EQ(astray.centre_px, seen_px);
+  // The true place is well within two standard deviations then.
+  EXPECT_LT(off_px.dot(astray.covariance_px2.inverse() * off_px), 2.0);
+  const Eigen::Vector2d off_m = 1e-3 * off_px;
+  EXPECT_LT(off_m.dot(astray.pose->covariance_m2.inverse() * off_m), 2.0);
+}
+
+TEST(PathOutliers, WhereTooFewFramesAreNearNothingIsDoubted) {
+  Recorded recorded;
+  std::vector<Glimpse> few{recorded.glimpses[0], recorded.glimpses[10], recorded.glimpses[20]};
+  few[1].seen->centre_px.x() += 20.0;
+  doubt_what_leaves_the_path(few);
+  EXPECT_EQ(doubted(few), std::vector<int>{});
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,126 @@
+#include "path_outliers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "polynomial.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+/// Ways to tell where the centre was from other frames.
+enum Way : std::size_t { kFromBefore, kFromAfter, kFromBoth, kWays };
+
+struct Place {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero(), m = Eigen::Vector2d::Zero();
+};
+
+class Path {
+ public:
+  explicit Path(const std::vector<Glimpse>& glimpses) : glimpses_(glimpses) {
+    for (std::size_t i = 0; i < glimpses.size(); ++i)
+      if (glimpses[i].posed()) posed_.push_back(i);
+    std::array<std::vector<double>, kWays> bends;
+    for (std::size_t k = 0; k < posed_.size(); ++k)
+      for (std::size_t way = 0; way < kWays; ++way)
+        if (const auto place = expected(k, static_cast<Way>(way)))
+          bends[way].push_back((place->px - seen(k).centre_px).norm());
+    constexpr double kLeastPx = 0.02;
+    for (std::size_t way = 0; way < kWays; ++way)
+      usual_px_[way] = bends[way].empty() ? 0.0 : std::max(kLeastPx, data::median(bends[way]));
+  }
+
+  /// Frames off the path, the farthest first, and where the path was. Those taken out no longer
+  /// speak for others.
+  [[nodiscard]] std::vector<std::pair<std::size_t, Place>> take_out() {
+    constexpr double kFar = 6.0, kMostShare = 0.25;
+    std::vector<std::pair<std::size_t, Place>> out;
+    const auto most = static_cast<std::size_t>(kMostShare * static_cast<double>(posed_.size()));
+    while (out.size() < most) {
+      double farthest = kFar;
+      std::optional<std::pair<std::size_t, Place>> worst;
+      for (std::size_t k = 0; k < posed_.size(); ++k)
+        if (auto [off, place] = off_path(k); off > farthest) farthest = off, worst = {k, place};
+      if (!worst) break;
+      out.emplace_back(posed_[worst->first], worst->second);
+      posed_.erase(posed_.begin() + static_cast<std::ptrdiff_t>(worst->first));
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] const Sighting& seen(std::size_t k) const { return *glimpses_[posed_[k]].seen; }
+
+  /// How far off, over what is usual and known, and where the path was: the way that is
+  /// contradicted least counts; those that lead beyond where they come from are contradicted sooner
+  /// than that between both sides. Zero where too few frames are near.
+  [[nodiscard]] std::pair<double, Place> off_path(std::size_t k) const {
+    constexpr std::array<double, kWays> kSooner{2.5, 2.5, 1.0};
+    const double known_px = std::sqrt(0.5 * seen(k).covariance_px2.trace());
+    std::pair<double, Place> least{0.0, {}};
+    bool any = false;
+    for (std::size_t way = 0; way < kWays; ++way) {
+      const auto place = expected(k, static_cast<Way>(way));
+      if (!place) continue;
+      const double off =
+          kSooner[way] * (place->px - seen(k).centre_px).norm() / (usual_px_[way] + known_px);
+      if (!any || off < least.first) least = {off, *place};
+      any = true;
+    }
+    return least;
+  }
+
+  /// Where three frames before or after, or two on either side, lead; nothing if there are none so
+  /// near.
+  [[nodiscard]] std::optional<Place> expected(std::size_t k, Way way) const {
+    constexpr std::ptrdiff_t kMostFrames = 4;
+    static constexpr std::array<std::array<std::ptrdiff_t, 4>, kWays> kSteps{
+        {{-3, -2, -1, 0}, {1, 2, 3, 0}, {-2, -1, 1, 2}}};
+    std::vector<double> times;
+    std::vector<Eigen::Vector2d> px, m;
+    for (const std::ptrdiff_t step : kSteps[way]) {
+      if (step == 0) continue;
+      const auto l = static_cast<std::ptrdiff_t>(k) + step;
+      if (l < 0 || l >= static_cast<std::ptrdiff_t>(posed_.size())) return std::nullopt;
+      const auto at = posed_[static_cast<std::size_t>(l)];
+      if (std::abs(static_cast<std::ptrdiff_t>(at) - static_cast<std::ptrdiff_t>(posed_[k])) >
+          kMostFrames)
+        return std::nullopt;
+      times.push_back(glimpses_[at].frame->t_s);
+      px.push_back(glimpses_[at].seen->centre_px);
+      m.emplace_back(glimpses_[at].pose().centre_m.head<2>());
+    }
+    const double t_s = glimpses_[posed_[k]].frame->t_s;
+    return Place{through(times, px, t_s), through(times, m, t_s)};
+  }
+
+  const std::vector<Glimpse>& glimpses_;
+  std::vector<std::size_t> posed_;  ///< frames that count
+  std::array<double, kWays> usual_px_{};
+};
+
+}  // namespace
+
+void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
+  for (const auto& [i, place] : Path(glimpses).take_out()) {
+    Sighting& seen = *glimpses[i].seen;
+    PoseMeasurement& pose = *seen.pose;
+    const Eigen::Vector2d px = place.px - seen.centre_px;
+    const Eigen::Vector2d m = place.m - pose.pose.centre_m.head<2>();
+    const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
+    seen.attitude_doubtful = true;
+    seen.covariance_px2 += px2;
+    pose.covariance_px2 += px2, pose.common.px2 += px2;
+    pose.covariance_m2 += m2, pose.common.m2 += m2;
+    // A fit that went astray did so in all it says.
+    const double astray_rad = px.norm() / seen.rim.semi_major_px();
+    pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
+    pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  }
+}
+
+}  // namespace trochoid::tracking

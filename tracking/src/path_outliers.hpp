@@ -1,0 +1,14 @@
+#pragma once
+#include <vector>
+
+#include "glimpse.hpp"
+
+namespace trochoid::tracking {
+
+/// Doubts sightings whose centre is off its path, much farther than such paths usually bend and
+/// than their covariance allows for: neither the frames before nor those after nor those on both
+/// sides lead there (an impact contradicts only some of them). The covariance of such a sighting
+/// then holds the place on the path as well; what was seen is not moved.
+void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses);
+
+}  // namespace trochoid::tracking
