@@ -122,7 +122,10 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
     const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
     if (last != current && explains(last)) return rungs;
   }
-  if (const auto all = all_that_usually_acts(ladder, rungs[current].terms); !all.empty()) {
+  // What helped a model that explains nothing tells nothing.
+  const std::set<int> helped =
+      rungs[current].fit.converged ? rungs[current].terms : std::set<int>{};
+  if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
     fit_rung(tracks, nullptr, nullptr, options, rungs.back());
   }
