@@ -179,6 +179,33 @@ class Recording(unittest.TestCase):
             self.assertGreater(output.stat().st_size, 1000)
             self.assertGreater(still.stat().st_size, 1000)
 
+    def test_a_quick_look_is_written_smoothed_as_well(self):
+        with tempfile.TemporaryDirectory() as folder:
+            smooth = pathlib.Path(folder) / "smooth.csv"
+            file = trochoid.track(SAMPLE / "video.mp4", SAMPLE / "scene.toml", to="f40",
+                                  effort="quick", smooth=smooth)
+            header = [line for line in smooth.read_text().splitlines() if not line.startswith("#")][0]
+            self.assertIn("vx_m_s", header.split(","))
+            self.assertEqual(file.summary["interpolated"], 0)
+        with self.assertRaisesRegex(trochoid.InputError, "quick, normal or exact"):
+            trochoid.track(SAMPLE / "video.mp4", effort="hasty")
+
+    def test_a_signal_handler_s_own_exception_comes_through(self):
+        class Enough(Exception):
+            pass
+
+        def enough(*_):
+            raise Enough
+
+        before = signal.signal(signal.SIGALRM, enough)
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.2)
+            with self.assertRaises(Enough):
+                trochoid.track(SAMPLE / "video.mp4")
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
+
     def test_control_c_ends_tracking(self):
         threading.Timer(0.2, _thread.interrupt_main).start()
         with self.assertRaises(KeyboardInterrupt):

@@ -27,6 +27,12 @@ bool is_effort(const std::string& name) {
   return kEfforts.contains(name);
 }
 
+tracking::Effort effort_named(const std::string& name) {
+  if (!is_effort(name))
+    throw InputError(fmt::format("effort = '{}': it is quick, normal or exact", name));
+  return kEfforts.at(name);
+}
+
 std::string effort_name(tracking::Effort effort) {
   for (const auto& [name, value] : kEfforts)
     if (value == effort) return name;

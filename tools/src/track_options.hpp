@@ -11,6 +11,8 @@ namespace trochoid::tools {
 void add_effort(CLI::App& command, tracking::Effort& effort, const std::string& words);
 [[nodiscard]] std::string effort_name(tracking::Effort effort);
 [[nodiscard]] bool is_effort(const std::string& name);
+/// @throws InputError unless the name is quick, normal or exact.
+[[nodiscard]] tracking::Effort effort_named(const std::string& name);
 
 /// --at x,y: a point on the body, for recordings in which it is not found by itself.
 void add_at(CLI::App& command, std::string& at);

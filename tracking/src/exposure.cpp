@@ -12,10 +12,6 @@ using Pose = data::Pose<>;
 using Edge = data::OutlinePoint::Edge;
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-Eigen::Vector3d axis_of(const Pose& pose) {
-  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
-}
-
 Eigen::Vector3d turned(const Eigen::Vector3d& v, double angle_rad) {
   return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * v;
 }

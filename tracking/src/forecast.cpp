@@ -32,10 +32,6 @@ struct Three {
   }
 };
 
-Eigen::Vector3d axis_of(const Pose& pose) {
-  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
-}
-
 /// Near the vertical, precession means nothing: there the axis goes on along its great circle.
 bool steep(const Pose& pose) {
   constexpr double kLeastSine = 0.2;

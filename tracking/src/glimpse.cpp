@@ -6,10 +6,6 @@
 
 namespace trochoid::tracking {
 
-Eigen::Vector3d axis_of(const data::Pose<>& pose) {
-  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
-}
-
 double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike) {
   const double cosine = a.dot(b);
   return std::acos(std::clamp(alike ? std::abs(cosine) : cosine, -1.0, 1.0));

@@ -40,7 +40,6 @@ class Measuring {
 void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
                    const std::function<void(Measuring&, std::size_t)>& work);
 
-[[nodiscard]] Eigen::Vector3d axis_of(const data::Pose<>& pose);
 /// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
 [[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
 

@@ -7,16 +7,11 @@
 #include "body_search.hpp"
 #include "path_motion.hpp"
 #include "recording.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
 namespace trochoid::tracking {
 namespace {
-
-double quantile(std::vector<double> values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
 
 /// Share of the band between two multiples of the rim that looks like the floor.
 double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim, double noise,
@@ -79,11 +74,11 @@ Watch watch(const std::vector<Frame>& held, const Background& background, const 
 Inspection::Body body_of(const Watch& seen) {
   // The floor seen through a tilted ring is hidden by its wall: the flattest third decides.
   constexpr double kRobust = 0.05, kBore = 0.5;
-  return {.radius_px = quantile(seen.radii, 1.0 - kRobust),
-          .least_axis_ratio = quantile(seen.ratios, kRobust),
-          .usual_axis_ratio = quantile(seen.ratios, 0.5),
+  return {.radius_px = data::quantile(seen.radii, 1.0 - kRobust),
+          .least_axis_ratio = data::quantile(seen.ratios, kRobust),
+          .usual_axis_ratio = data::quantile(seen.ratios, 0.5),
           .travel_px = std::hypot(seen.box.width, seen.box.height),
-          .bore_shows = quantile(seen.bore, 2.0 / 3.0) > kBore,
+          .bore_shows = data::quantile(seen.bore, 2.0 / 3.0) > kBore,
           .frames = static_cast<int>(seen.radii.size())};
 }
 

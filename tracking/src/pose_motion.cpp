@@ -15,6 +15,10 @@ Eigen::Vector3d ascent(const data::Pose<>& pose) {
   return {-std::sin(pose.phi_rad) * c, std::cos(pose.phi_rad) * c, s};
 }
 
+Eigen::Vector3d axis_of(const data::Pose<>& pose) {
+  return data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+}
+
 void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose) {
   constexpr double kVertical = 1e-12;
   const double across = std::hypot(axis.x(), axis.y());

@@ -46,6 +46,7 @@ class PoseMotion {
 /// e2 of the node frame: steepest ascent in the plane of the disc.
 [[nodiscard]] Eigen::Vector3d ascent(const data::Pose<>& pose);
 [[nodiscard]] Eigen::Vector3d node_line(const data::Pose<>& pose);
+[[nodiscard]] Eigen::Vector3d axis_of(const data::Pose<>& pose);
 /// theta and phi of a direction; phi is kept where the axis is vertical.
 void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose);
 

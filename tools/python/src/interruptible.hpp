@@ -22,9 +22,9 @@ class Interrupt {
 };
 
 /// Runs `work` in a thread of its own without the GIL, while the calling thread looks for signals
-/// several times a second; returns or throws what `work` does. After Ctrl-C `work` is asked to stop
-/// at its next interrupt.check() and KeyboardInterrupt is raised when it has. Call with the GIL
-/// held.
+/// several times a second; returns or throws what `work` does. When a signal's handler raises (as
+/// Ctrl-C's does, KeyboardInterrupt) `work` is asked to stop at its next interrupt.check(), and
+/// that exception goes on when it has. Call with the GIL held.
 void run_interruptibly(const std::function<void(const Interrupt&)>& work);
 
 }  // namespace trochoid::python

@@ -17,6 +17,8 @@
 #ifdef TROCHOID_HAS_TRACKING
 #include "overlay.hpp"
 #include "run_folder.hpp"
+#include "track_options.hpp"
+#include "trochoid/tracking/smooth.hpp"
 #include "trochoid/tracking/tracker.hpp"
 #endif
 
@@ -139,6 +141,7 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   how.objects = with.tracking.objects;
   how.from = options["from"].cast<std::string>();
   how.to = options["to"].cast<std::string>();
+  how.effort = tools::effort_named(options["effort"].cast<std::string>());
   if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {
@@ -148,6 +151,12 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   const tracking::TrackSummary& s = result.summary;
   py::dict summary;
+  if (!options["smooth"].is_none()) {
+    const auto target = options["smooth"].cast<fs::path>();
+    const tracking::SmoothTrack smoothed = tracking::smooth_track(result.file);
+    data::write_table(smoothed.table, target);
+    summary["interpolated"] = smoothed.interpolated;
+  }
   summary["frames"] = s.frames;
   summary["found"] = s.found;
   summary["lost"] = s.lost;

@@ -166,7 +166,8 @@ def _moment(value: Moment) -> str:
 def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
           camera: Optional[Path] = None, objects: Optional[int] = None, from_: Moment = None,
           to: Moment = None, at_px: Optional[tuple[float, float]] = None,
-          rate_hz: Optional[float] = None, edges: Optional[Path] = None,
+          rate_hz: Optional[float] = None, effort: str = "normal",
+          edges: Optional[Path] = None, smooth: Optional[Path] = None,
           output: Optional[Path] = None) -> TrackFile:
     """Follows the moving bodies of a recording (``trochoid track``).
 
@@ -176,11 +177,13 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
     from_, to  first and last moment: seconds (1.5) or a frame ("f120")
     at_px    a point (x, y) [px] on the body in the first frame used
     rate_hz  true frame rate [Hz] where the file's is not (slow motion)
+    effort   how closely the outline is looked at: "quick", "normal" or "exact"
     edges    write the accepted edge points into this CSV
+    smooth   write smoothed positions and velocities [m, m/s] into this CSV; never fit these
     output   write the track into this CSV
     """
     options = {"objects": objects, "from": _moment(from_), "to": _moment(to), "at_px": at_px,
-               "rate_hz": rate_hz, "edges": edges}
+               "rate_hz": rate_hz, "effort": effort, "edges": edges, "smooth": smooth}
     values, summary = _core.track(video, Scene(scene)._value, camera, options)
     file = _file(values, summary)
     if output is not None:
