@@ -83,6 +83,31 @@ Found look_about(const Problem& problem, Found found) {
   return hop(problem, std::move(found), kMisses);
 }
 
+// A start that rolls for `window` samples, with the coefficients of friction that explain most of
+// somewhat more than that: the best few, best first.
+std::vector<Start> with_frictions(const Problem& problem, const Start& start, int window) {
+  constexpr double kFurther = 1.3;
+  constexpr std::size_t kTried = 2;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const Problem longer = windowed(problem, std::min(static_cast<int>(kFurther * window) + 8, all));
+  std::vector<std::pair<double, Start>> scored;
+  for (const double friction : {0.1, 0.14, 0.18, 0.23, 0.3, 0.38, 0.48, 0.6, 0.8}) {
+    Start trial = start;
+    trial.values["friction"] = friction;
+    Problem at = longer;
+    apply(trial, at);
+    Eigen::VectorXd residuals;
+    if (evaluate(at, 0, at.start(), residuals, nullptr))
+      scored.emplace_back(residuals.squaredNorm(), std::move(trial));
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Start> best;
+  for (std::size_t i = 0; i < std::min(kTried, scored.size()); ++i)
+    best.push_back(std::move(scored[i].second));
+  return best;
+}
+
 // The search proper, on a problem whose spin angle is out of the way.
 Found search_path(const Problem& problem, const Quest& quest) {
   constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
@@ -105,15 +130,46 @@ Found search_path(const Problem& problem, const Quest& quest) {
     // From positions alone neighbouring valleys are many, and a start has to be near the right one.
     easier.rough = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
     const bool rolls = relative.model->model_name() == "rolling";
+    easier.partial = rolls ? std::make_shared<Partial>() : nullptr;
     const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
-    if (!rough.solution.usable || rough.unexplained > kRoughly) continue;
-    easier.set_base(rough.solution.u);
-    const Start near = start_from(easier, rough.path);
-    if (take(grow(problem, carried_over(problem, relative, near), all))) return best;
-    const Start plain = with_given_losses(problem, near);
-    if (take(grow(problem, plain, std::max(24, all / 4), kSlowly))) return best;
+    if (rough.solution.usable && rough.unexplained < kRoughly) {
+      easier.set_base(rough.solution.u);
+      const Start near = start_from(easier, rough.path);
+      if (take(grow(problem, carried_over(problem, relative, near), all))) return best;
+      const Start plain = with_given_losses(problem, near);
+      if (take(grow(problem, plain, std::max(24, all / 4), kSlowly))) return best;
+    }
+    // A body may roll for a while and slide then.
+    if (!rolls || easier.partial->samples == 0) continue;
+    easier.base[0] = easier.partial->values;
+    const int window = easier.partial->samples;
+    // An extra try: it may end in a neighbouring valley, so the search goes on as without it.
+    const double work = *problem.work;
+    for (const Start& start : with_frictions(problem, start_from(easier, "rolls_first"), window))
+      if (take(grow(problem, start, window, kSlowly)) && easier.rough) return best;
+    *problem.work = work;
   }
   if (!searched && !exhausted(problem, best)) take(search(problem, quest.starter));
+  return best;
+}
+
+// Where nothing passed, losses that start weaker or stronger may lead elsewhere: a top's nutation
+// is lost with its phase. Only where a search takes milliseconds.
+Found with_other_losses(const Problem& problem, const Quest& quest, Found best) {
+  constexpr double kQuick = 3e5;  // steps
+  for (const double factor : {4.0, 0.25, 16.0, 0.06}) {
+    Problem other = problem;
+    bool any = false;
+    for (FreeParameter& parameter : other.free) {
+      if (!is_loss(other, parameter)) continue;
+      any = true;
+      parameter.given *= factor;
+      for (Eigen::VectorXd& base : other.base) base[parameter.index] *= factor;
+    }
+    if (!any || best.passed || *problem.work > kQuick) return best;
+    Found found = search_path(other, quest);
+    if (better(found, best)) best = std::move(found);
+  }
   return best;
 }
 
@@ -141,7 +197,7 @@ Found find_arc(Problem problem, const Quest& quest) {
     throw InputError(
         fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
                     options.strategy));
-  Found best = search_path(problem, quest);
+  Found best = with_other_losses(problem, quest, search_path(problem, quest));
   if (best.passed || !quest.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
   return from_given.solution.usable &&

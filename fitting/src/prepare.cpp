@@ -115,6 +115,23 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
 }
 
+// Rates of decay start where they show in the record and let the body go on through it, whatever
+// the scene's first value: a start decades away ends before the track does or moves nothing.
+void start_decay_within_sight(Problem& problem) {
+  constexpr double kLeast = 0.01, kTypical = 0.3, kMost = 3.0;  // decay over the whole record
+  double longest_s = 0.0;
+  for (const ArcData& arc : problem.arcs) longest_s = std::max(longest_s, arc.duration_s());
+  if (!(longest_s > 0.0)) return;
+  for (FreeParameter& parameter : problem.free) {
+    const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+    if (info.unit != "1/s" || !is_loss(problem, parameter)) continue;
+    const double decay = parameter.given * longest_s;
+    if (decay > kLeast && decay < kMost) continue;
+    parameter.given = kTypical / longest_s;
+    for (Eigen::VectorXd& base : problem.base) base[parameter.index] = parameter.given;
+  }
+}
+
 }  // namespace
 
 Problem prepare(std::span<const data::Track> tracks, const model::Predictor& predictor,
@@ -135,6 +152,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
     throw InputError(fmt::format(
         "{} measurements{} cannot determine {} parameters of model '{}'", problem.rows(),
         problem.arcs.front().held ? " after the body is let go" : "", needed, model));
+  start_decay_within_sight(problem);
   for (const auto& [name, value] : options.start)
     if (const int index = predictor.index_of(name); index >= 0)
       for (Eigen::VectorXd& base : problem.base) base[index] = value;

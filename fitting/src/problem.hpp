@@ -39,6 +39,12 @@ struct Shortfalls {
   [[nodiscard]] std::string words() const;
 };
 
+/// The longest window from the first sample on that a search explained, and with which values.
+struct Partial {
+  int samples = 0;
+  Eigen::VectorXd values;  ///< of all predictor parameters
+};
+
 struct FreeParameter {
   int index = 0;  ///< into Predictor::parameters()
   int arc = -1;   ///< -1: shared by all arcs
@@ -65,6 +71,7 @@ struct Problem {
   /// Integration steps taken so far, one with derivatives counted by its cost; null: not counted.
   std::shared_ptr<double> work;
   std::shared_ptr<Shortfalls> shortfalls;  ///< null: not counted
+  std::shared_ptr<Partial> partial;        ///< of a single-arc problem; null: not kept
 
   [[nodiscard]] int shared_count() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0

@@ -168,6 +168,8 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     }
     // A window that is far from explained will not lead anywhere.
     if (window < all && reduced > 30.0 * chi2_gate(part.rows())) return {};
+    if (problem.partial && window > problem.partial->samples && reduced < chi2_gate(part.rows()))
+      *problem.partial = {window, part.base[0]};
     if (window == all) break;
     explained = std::max(reduced, chi2_gate(part.rows()));
     before = window;

@@ -47,10 +47,10 @@ std::vector<Entry> entries(const TopSettings& top) {
   if (top.drag) {
     list.push_back({kGamma1,
                     {"gamma1_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma1_1_s,
-                     true, "drag across the axis, c1 / I"}});
+                     top.transverse_drag, "drag across the axis, c1 / I"}});
     list.push_back({kGamma3,
                     {"gamma3_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma3_1_s,
-                     true, "drag on the spin, c3 / Is"}});
+                     top.spin_drag, "drag on the spin, c3 / Is"}});
   }
   const std::vector<Entry> rest{
       {kTheta, {"theta_rad", "rad", Role::initial, 0.0, M_PI, false, top.theta_rad, true, "tilt"}},

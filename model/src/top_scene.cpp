@@ -95,7 +95,9 @@ void check(const TopSettings& top) {
 
 TopSettings common(const data::Scene& scene) {
   TopSettings top;
-  top.drag = scene.model.drag_transverse_N_m_s || scene.model.drag_spin_N_m_s;
+  top.transverse_drag = scene.model.drag_transverse_N_m_s.has_value();
+  top.spin_drag = scene.model.drag_spin_N_m_s.has_value();
+  top.drag = top.transverse_drag || top.spin_drag;
   top.l_m = pivot_distance_m(scene).value_or(0.1);
   top.theta_rad = scene.start.theta_rad.value_or(M_PI / 4.0);
   if (scene.support.pivot_m) {
@@ -113,7 +115,9 @@ TopSettings top_for_prediction(const data::Scene& scene) {
   if (scene.body && knows_moments(*scene.body)) {
     read_body(scene, top);
   } else if (top.drag) {
-    top.gamma1_1_s = top.gamma3_1_s = 0.1;  // somewhere to start: a tenth of the speed per second
+    constexpr double kStart_1_s = 0.1;  // somewhere to start: a tenth of the speed per second
+    if (top.transverse_drag) top.gamma1_1_s = kStart_1_s;
+    if (top.spin_drag) top.gamma3_1_s = kStart_1_s;
   }
   check(top);
   return top;

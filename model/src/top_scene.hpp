@@ -5,12 +5,13 @@ namespace trochoid::model {
 
 /// What a scene says about a top, with the groups that enter its dynamics.
 struct TopSettings {
-  double a_1_s2 = 1.0;      ///< m g l / I
-  double b_1_s = 1.0;       ///< Is omega_s / I
-  double l_m = 0.1;         ///< pivot to CoM
-  double gamma1_1_s = 0.0;  ///< c1 / I
-  double gamma3_1_s = 0.0;  ///< c3 / Is
-  bool drag = false;
+  double a_1_s2 = 1.0;                              ///< m g l / I
+  double b_1_s = 1.0;                               ///< Is omega_s / I
+  double l_m = 0.1;                                 ///< pivot to CoM
+  double gamma1_1_s = 0.0;                          ///< c1 / I
+  double gamma3_1_s = 0.0;                          ///< c3 / Is
+  bool drag = false;                                ///< either of the two
+  bool transverse_drag = false, spin_drag = false;  ///< named in the scene
   double omega_s_rad_s = 1.0;
   double theta_rad = 0.0, phi_rad = 0.0, psi_rad = 0.0;
   double dtheta_rad_s = 0.0, dphi_rad_s = 0.0;

@@ -273,31 +273,66 @@ TEST(TopFit, AdmitsThatSteadyPrecessionWithDragHidesTheTop) {
 }
 
 // By scipy; its spin falls from 155 to 111 rad/s, nine radians from sample to sample.
-TEST(TopFit, FollowsASpinThatDies) {
+struct DyingTop {
+  data::Scene scene;
+  data::Track track;
+};
+
+DyingTop dying_top() {
   const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/s11_top_drag";
-  data::Scene scene = data::read_reference_case(base + ".json").scene;
-  scene.start = {};
+  DyingTop top{data::read_reference_case(base + ".json").scene, {}};
+  top.scene.start = {};
   const data::Table table = data::read_table(base + ".csv");
   const Eigen::VectorXd t = table.column("t"), x = table.column("x"), y = table.column("y");
   const Eigen::VectorXd psi = table.column("psi");
   constexpr double kPath_m = 1e-4, kAngle_rad = 0.02;
   std::mt19937_64 generator(5);
   std::normal_distribution<double> normal;
-  data::Track track;
   for (Eigen::Index i = 0; i < t.size(); ++i) {
     data::TrackSample sample;
     sample.t_s = t[i];
     sample.centre_m = {x[i] + kPath_m * normal(generator), y[i] + kPath_m * normal(generator)};
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPath_m * kPath_m;
     sample.psi = data::MeasuredAngle{psi[i] + kAngle_rad * normal(generator), kAngle_rad};
-    track.samples.push_back(sample);
+    top.track.samples.push_back(sample);
   }
-  const data::Fit result = fit_one(track, scene);
+  return top;
+}
+
+TEST(TopFit, FollowsASpinThatDies) {
+  const DyingTop top = dying_top();
+  const data::Fit result = fit_one(top.track, top.scene);
   ASSERT_TRUE(result.converged) << result.reason;
   EXPECT_LT(pull(result, "omega_s_rad_s", 155.0), kFar);
   EXPECT_LT(pull(result, "gamma3_1_s", 1.5e-6 / 2.7e-5), kFar);
   EXPECT_LT(pull(result, "I_over_Is", 5.0), kFar);
   EXPECT_LT(result.find("omega_s_rad_s")->sigma, 0.1);
+}
+
+// A first value is no more than that: the answer is the same from drags that would stop the top
+// between two samples and from drags nothing would ever show.
+TEST(TopFit, FindsItsDragsWhereverTheyStart) {
+  DyingTop top = dying_top();
+  const data::Fit plain = fit_one(top.track, top.scene);
+  ASSERT_TRUE(plain.converged) << plain.reason;
+  for (const double drag_N_m_s : {0.0, 1e-12, 1e-1}) {
+    top.scene.model.drag_transverse_N_m_s = top.scene.model.drag_spin_N_m_s = drag_N_m_s;
+    const data::Fit result = fit_one(top.track, top.scene);
+    ASSERT_TRUE(result.converged) << drag_N_m_s << ": " << result.reason;
+    constexpr double kSameMinimum = 0.05;  // of a standard deviation
+    for (const char* name : {"gamma1_1_s", "gamma3_1_s"})
+      EXPECT_LT(pull(result, name, plain.find(name)->value), kSameMinimum) << drag_N_m_s;
+  }
+}
+
+TEST(TopFit, FitsNoDragThatTheSceneDoesNotName) {
+  DyingTop top = dying_top();
+  top.scene.model.drag_transverse_N_m_s.reset();
+  const data::Fit result = fit_one(top.track, top.scene);
+  ASSERT_NE(result.find("gamma1_1_s"), nullptr);
+  EXPECT_EQ(result.find("gamma1_1_s")->status, data::ParameterStatus::fixed);
+  EXPECT_EQ(result.find("gamma1_1_s")->value, 0.0);
+  EXPECT_EQ(result.find("gamma3_1_s")->status, data::ParameterStatus::free);
 }
 
 }  // namespace
