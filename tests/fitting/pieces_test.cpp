@@ -1,0 +1,124 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "arcs.hpp"
+#include "problem.hpp"
+#include "segments.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/model/predictor.hpp"
+
+// What of a track is fitted, and what is said where nothing can be.
+namespace trochoid::fitting {
+namespace {
+
+constexpr double kStep_s = 0.02;
+
+// A spin angle that follows a given one.
+template <class Angle>
+data::Track turning(int samples, Angle&& angle_rad) {
+  data::Track track;
+  for (int i = 0; i < samples; ++i) {
+    data::TrackSample sample;
+    sample.frame = 100 + i;
+    sample.t_s = kStep_s * i;
+    sample.psi = data::MeasuredAngle{angle_rad(sample.t_s), 0.01};
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+std::string refusal(const data::Track& track, const std::string& from, const std::string& to) {
+  try {
+    static_cast<void>(chosen_range(track, from, to));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Pieces, ABoundBeyondTheTrackIsRefusedWithWhatTheTrackHas) {
+  const data::Track track = turning(51, [](double) { return 0.0; });
+  EXPECT_EQ(chosen_range(track, "0.5", "f140"), SampleRange(25, 41));
+  for (const auto& message : {refusal(track, "1.5", ""), refusal(track, "f151", ""),
+                              refusal(track, "", "f99"), refusal(track, "0.8", "0.2")}) {
+    EXPECT_THAT(message, testing::HasSubstr("runs from 0 to 1 s")) << message;
+    EXPECT_THAT(message, testing::HasSubstr("frames 100 to 150")) << message;
+  }
+  EXPECT_THAT(refusal(track, "late", ""), testing::HasSubstr("--from late: give seconds"));
+}
+
+// Held for a second, pushed for half a second to 20 rad/s, then free.
+TEST(Pieces, ASpinIsLetGoWhenThePushEnds) {
+  constexpr double kHeld_s = 1.0, kPush_s = 0.5, kSpin_rad_s = 20.0, kSpeedWindow_s = 8 * kStep_s;
+  const data::Track pushed = turning(300, [=](double t_s) {
+    const double push = std::clamp(t_s - kHeld_s, 0.0, kPush_s);
+    const double free = std::max(0.0, t_s - kHeld_s - kPush_s);
+    return kSpin_rad_s * (0.5 * push * push / kPush_s + free - 0.05 * free * free);
+  });
+  const double released_s = kStep_s * released_at(pushed, {0, 300});
+  EXPECT_GE(released_s, kHeld_s + kPush_s - kStep_s);
+  EXPECT_LE(released_s, kHeld_s + kPush_s + kSpeedWindow_s);
+}
+
+TEST(Pieces, ASpinThatIsFreeFromTheFirstSampleOnIsTakenWhole) {
+  const data::Track free = turning(300, [=](double t_s) { return 20.0 * t_s - t_s * t_s; });
+  EXPECT_EQ(released_at(free, {7, 300}), 7);
+  // A pendulum let go from rest gets fast slowly: nothing pushes it.
+  const data::Track pendulum = turning(300, [=](double t_s) { return 2.0 * std::cos(1.5 * t_s); });
+  EXPECT_EQ(released_at(pendulum, {0, 300}), 0);
+}
+
+TEST(Pieces, WhyNoStartLedAnywhereIsTheCommonestReason) {
+  Shortfalls none;
+  EXPECT_THAT(none.words(), testing::HasSubstr("no start could be made from the track"));
+  Shortfalls some;
+  for (int i = 0; i < 3; ++i) some.count(model::Outcome::out_of_domain);
+  some.count(model::Outcome::flat);
+  EXPECT_THAT(some.words(), testing::HasSubstr("4 attempts"));
+  EXPECT_THAT(some.words(), testing::HasSubstr("3 of them"));
+  EXPECT_THAT(some.words(),
+              testing::HasSubstr(std::string(model::sentence(model::Outcome::out_of_domain))));
+}
+
+data::Scene slanting_disc() {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::disc;
+  body.radius_m = 0.03;
+  body.thickness_m = 0.002;
+  body.mass_kg = 0.02;
+  scene.model.name = "rolling";
+  scene.start.theta_rad = 0.4;
+  scene.start.w1_rad_s = scene.start.w2_rad_s = scene.start.w3_rad_s = 0.0;
+  return scene;
+}
+
+// A disc let go at a slant topples within a fifth of a second; the track goes on for two.
+TEST(Pieces, ABodyThatFellFlatLiesStillFromThenOn) {
+  const data::Scene scene = slanting_disc();
+  const auto predictor = model::make_predictor(scene);
+  data::Track track = turning(100, [](double) { return 0.0; });
+  for (data::TrackSample& sample : track.samples) {
+    sample.psi.reset();
+    sample.centre_m = Eigen::Vector2d::Zero();
+    sample.covariance_m2 = Eigen::Matrix2d::Identity();
+  }
+  const Problem problem = make_problem(*predictor, {make_arc(track, 0, 100, {}, true)}, scene);
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd jacobian;
+  ASSERT_TRUE(evaluate(problem, 0, problem.start(), residuals, &jacobian));
+  const Eigen::Index rows = residuals.size();
+  ASSERT_EQ(rows, 200);
+  for (Eigen::Index row = rows / 2; row < rows; ++row) {
+    EXPECT_EQ(residuals[row], residuals[row - 2]) << row;
+    EXPECT_EQ((jacobian.row(row) - jacobian.row(row - 2)).norm(), 0.0) << row;
+  }
+  EXPECT_NE(residuals[1], residuals[rows - 1]) << "it has moved before";
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
