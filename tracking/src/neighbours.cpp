@@ -349,7 +349,7 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
 }  // namespace
 
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
-                          std::vector<Glimpse>& glimpses) {
+                          std::vector<Glimpse>& glimpses, Effort effort) {
   constexpr int kMostRounds = 3;
   constexpr std::size_t kReach = 6;
   if (std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) { return g.posed(); }) <
@@ -371,7 +371,7 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
            mended[i] && k < std::min(was.size(), i + kReach + 1); ++k)
         open[k] = 1;
   }
-  measure_again(background, finder, glimpses);
+  if (effort != Effort::quick) measure_again(background, finder, glimpses);
   doubt_what_is_contradicted(finder, glimpses);
 }
 

@@ -241,7 +241,7 @@ class Tracking {
         glimpses.back().seen = std::move(at->second.seen);
     }
     decide_attitudes(background_, *finder_, glimpses);
-    mend_from_neighbours(background_, *finder_, glimpses);
+    mend_from_neighbours(background_, *finder_, glimpses, options_.effort);
     doubt_what_leaves_the_path(glimpses);
     for (Glimpse& g : glimpses) {
       path.frames.erase(g.frame->index);

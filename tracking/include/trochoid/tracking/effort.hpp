@@ -2,8 +2,8 @@
 
 namespace trochoid::tracking {
 
-/// How closely an outline is looked at: quick is for a first look and long recordings, exact for a
-/// last look. `trochoid study chain` shows what each costs and gives.
+/// How closely an outline is looked at: quick, which looks only once, is for a first look and long
+/// recordings, exact for a last look. `trochoid study chain` shows what each costs and gives.
 enum class Effort { quick, normal, exact };
 
 /// In how many places edges are looked for along an outline, at most about so many: one for each
