@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "smoothing.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -123,11 +124,18 @@ std::vector<double> second_differences(const Path& path) {
   return sizes;
 }
 
-double quantile(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+// A chain that could not go on for long has met another kind of motion, not wrong places: a body at
+// rest that is struck, one that begins to wobble. What lies beyond its ends is not doubted.
+std::vector<int> with_what_lies_beyond(const std::vector<int>& chain, int count) {
+  constexpr int kMostWrong = 20;
+  const int last = chain.back();
+  const int first = chain.front() > kMostWrong ? 0 : chain.front();
+  const int end = count - 1 - last > kMostWrong ? count : last + 1;
+  std::vector<int> out;
+  for (int at = first; at < chain.front(); ++at) out.push_back(at);
+  out.insert(out.end(), chain.begin(), chain.end());
+  for (int at = last + 1; at < end; ++at) out.push_back(at);
+  return out;
 }
 
 }  // namespace
@@ -141,12 +149,13 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
   Path path{t_s, xy_m, sigma_m};
   const std::vector<double> bends = second_differences(path);
   constexpr double kOrdinary = 8.0;  // times a low quantile: curvature varies by a few
-  if (*std::max_element(bends.begin(), bends.end()) < kOrdinary * quantile(bends, 0.3)) return all;
+  if (*std::max_element(bends.begin(), bends.end()) < kOrdinary * data::quantile(bends, 0.3))
+    return all;
   // A low quantile of what noise and bends make together bounds the noise: stated sigmas may be
   // too small, and what is wrong here and there must not pass for noise.
   constexpr double kRayleigh = 0.845, kWeights = 1.225;  // 0.3 quantile; of (-1/2, 1, -1/2)
   const double stated_m = median({sigma_m.begin(), sigma_m.end()});
-  const double bound_m = quantile(bends, 0.3) / (kRayleigh * kWeights);
+  const double bound_m = data::quantile(bends, 0.3) / (kRayleigh * kWeights);
   const double noise_m = std::max(stated_m, std::min(bound_m, noise_about_smooth_curve(t_s, xy_m)));
   std::vector<double> noises_m;
   for (const double sigma : sigma_m) noises_m.push_back(sigma * noise_m / stated_m);
@@ -157,7 +166,7 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
     speeds.push_back((xy_m.row(i) - xy_m.row(i - 1)).norm() / steps_s.back());
   }
   const double step_s = median(steps_s);
-  path.speed_m_s = 3.0 * quantile(speeds, 0.7);
+  path.speed_m_s = 3.0 * data::quantile(speeds, 0.7);
   path.acceleration_m_s2 = path.speed_m_s / (4.0 * step_s);
   constexpr int kEnough = 1000;  // samples that tell how strong the jerk is
   constexpr std::array kOverNoise{0.01, 0.05, 0.2, 1.0, 5.0};  // what it adds from step to step
@@ -167,7 +176,7 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
     const Chain chain = best_chain(path, std::min(n, kEnough), trial);
     if (chain.gain > highest) highest = chain.gain, jerk2_s = trial;
   }
-  return best_chain(path, n, jerk2_s).samples;
+  return with_what_lies_beyond(best_chain(path, n, jerk2_s).samples, n);
 }
 
 }  // namespace trochoid::fitting

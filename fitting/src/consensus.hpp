@@ -15,7 +15,8 @@ namespace trochoid::fitting {
 /// @param t_s      increasing.
 /// @param xy_m     n x 2.
 /// @param sigma_m  stated noise of each coordinate per sample, > 0; its scale may be too small.
-/// @returns indices in ascending order; all where every sample follows from those around it.
+/// @returns indices in ascending order; all where there are fewer than 12 samples or the path bends
+/// evenly. What lies beyond a chain that ends long before the path does is kept as well.
 [[nodiscard]] std::vector<int> consistent_path(std::span<const double> t_s,
                                                const Eigen::MatrixX2d& xy_m,
                                                std::span<const double> sigma_m);

@@ -170,11 +170,10 @@ double local_rate(const ArcData& arc, const std::vector<const Reading*>& reading
   return median(std::move(rates));
 }
 
-// How far a reading lies off the chord between the readings m before and after it, and what a
-// curved path adds to that per unit of its second derivative.
+// How far an angle lies off the chord between the readings m before and after it, and what a curved
+// path adds to that per unit of its second derivative.
 struct OffChord {
-  Eigen::Vector2d off;
-  double sag_s2;
+  double off_rad, sag_s2;
 };
 
 OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readings, int at, int m,
@@ -182,16 +181,13 @@ OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readin
   const Reading &before = *readings[at - m], &after = *readings[at + m];
   const double whole_s = arc.t_s[after.sample] - arc.t_s[before.sample];
   const double part_s = arc.t_s[readings[at]->sample] - arc.t_s[before.sample];
-  const Eigen::Vector2d here = readings[at]->value - before.value;
-  const Eigen::Vector2d way = after.value - before.value;
-  const double sag_s2 = 0.5 * part_s * (whole_s - part_s);
-  if (before.channel == Channel::position) return {here - part_s / whole_s * way, sag_s2};
-  const double off =
-      wrapped(here.x() - rate * part_s - part_s / whole_s * wrapped(way.x() - rate * whole_s));
-  return {{off, 0.0}, sag_s2};
+  const double here = readings[at]->value.x() - before.value.x();
+  const double way = after.value.x() - before.value.x();
+  return {wrapped(here - rate * part_s - part_s / whole_s * wrapped(way - rate * whole_s)),
+          0.5 * part_s * (whole_s - part_s)};
 }
 
-// Distance of each reading of a channel from the parabola through two pairs of its neighbours, the
+// Distance of each angle of a channel from the parabola through two pairs of its neighbours, the
 // lower third over such pairs: where every fifth reading is wrong, more than half of them are.
 std::vector<double> neighbour_distance(const ArcData& arc,
                                        const std::vector<const Reading*>& readings) {
@@ -199,8 +195,7 @@ std::vector<double> neighbour_distance(const ArcData& arc,
   const int n = static_cast<int>(readings.size());
   std::vector<double> distance(n, 0.0);
   for (int i = 0; i < n; ++i) {
-    const bool planar = readings[i]->channel == Channel::position;
-    const double rate = planar ? 0.0 : local_rate(arc, readings, i);
+    const double rate = local_rate(arc, readings, i);
     std::vector<OffChord> chords;
     for (int m = 1; m <= std::min({kFarthest, i, n - 1 - i}); ++m)
       chords.push_back(off_chord(arc, readings, i, m, rate));
@@ -208,7 +203,7 @@ std::vector<double> neighbour_distance(const ArcData& arc,
     for (const OffChord& near : chords)
       for (const OffChord& far : chords)
         if (far.sag_s2 > 2.0 * near.sag_s2)
-          off.push_back((far.sag_s2 * near.off - near.sag_s2 * far.off).norm() /
+          off.push_back(std::abs(far.sag_s2 * near.off_rad - near.sag_s2 * far.off_rad) /
                         (far.sag_s2 - near.sag_s2));
     if (off.empty()) continue;
     const auto third = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 3);

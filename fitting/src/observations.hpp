@@ -59,9 +59,9 @@ struct ChannelChoice {
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
                                const ChannelChoice& choice, bool folded);
 
-/// The samples that lie where their neighbours on both sides let expect them, in every channel: a
-/// tilt taken for its mirror image, or another body's outline, stands out by far. All of them if
-/// two fifths or more would go.
+/// The samples on a path that one body can have taken (consistent_path) and whose angles lie where
+/// their neighbours on both sides let expect them: a tilt taken for its mirror image, or another
+/// body's outline, stands out by far. All of them if two fifths or more would go.
 [[nodiscard]] std::vector<int> consistent_samples(const ArcData& arc);
 
 /// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their

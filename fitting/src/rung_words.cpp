@@ -52,10 +52,8 @@ std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chos
 
 std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const Ladder& ladder) {
   if (!chosen.fit.converged)
-    return fmt::format(
-        "none of the {} models tried explains the track; {} comes nearest.",
-        std::count_if(rungs.begin(), rungs.end(), [](const Rung& rung) { return rung.fitted; }),
-        chosen.name);
+    return fmt::format("none of the {} models tried explains the track; {} comes nearest.",
+                       rungs.size(), chosen.name);
   std::string words = fmt::format(
       "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
       chosen.name, chosen.parameters, chosen.fit.whiteness_p > 0.01 ? "white" : "not white",

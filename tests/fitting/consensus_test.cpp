@@ -56,6 +56,32 @@ TEST(Consensus, KeepsEverySampleOfANoisyPath) {
   }
 }
 
+TEST(Consensus, ARestThatEndsIsNotTakenForAllThereIs) {
+  constexpr int kRest = 200, kSamples = 500;
+  Walk path = walk(kSamples, 3);
+  std::mt19937_64 generator(4);
+  std::normal_distribution<double> noise(0.0, 2e-5);
+  for (int i = 0; i < kSamples; ++i) {
+    const double t = i < kRest ? 0.0 : (i - kRest) / 120.0;  // struck, it turns nine times a second
+    path.sigma_m[static_cast<std::size_t>(i)] = 2e-5;
+    path.xy_m(i, 0) = 0.03 * std::cos(56.0 * t) + 1.2 * t + noise(generator);
+    path.xy_m(i, 1) = 0.03 * std::sin(56.0 * t) + noise(generator);
+  }
+  const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+  const auto moving = std::count_if(kept.begin(), kept.end(), [](int i) { return i >= kRest; });
+  EXPECT_GT(moving, (kSamples - kRest) * 9 / 10);
+}
+
+TEST(Consensus, OneWrongPlaceCostsNoOther) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Walk path = walk(400, seed);
+    path.xy_m.row(200) += Eigen::RowVector2d(0.02, 0.01);
+    const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+    EXPECT_FALSE(std::count(kept.begin(), kept.end(), 200)) << seed;
+    EXPECT_GE(kept.size(), 397U) << seed;
+  }
+}
+
 // A run that happens to lie on the way may be taken for part of it, and right samples beside a
 // wrong one go with it: together two in a hundred.
 TEST(Consensus, LeavesOutWrongPlacesSingleOnesAndRunsOfThem) {

@@ -187,6 +187,10 @@ class Recording(unittest.TestCase):
             header = [line for line in smooth.read_text().splitlines() if not line.startswith("#")][0]
             self.assertIn("vx_m_s", header.split(","))
             self.assertEqual(file.summary["interpolated"], 0)
+            before = (SAMPLE / "video.mp4").read_bytes()
+            with self.assertRaises(trochoid.InputError):
+                trochoid.track(SAMPLE / "video.mp4", to="f5", smooth=SAMPLE / "video.mp4")
+            self.assertEqual((SAMPLE / "video.mp4").read_bytes(), before)
         with self.assertRaisesRegex(trochoid.InputError, "quick, normal or exact"):
             trochoid.track(SAMPLE / "video.mp4", effort="hasty")
 

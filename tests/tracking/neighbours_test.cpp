@@ -51,6 +51,7 @@ TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {
   const StubbornOracle oracle(30, wrong_rad);
   auto glimpses = tracked(oracle, [](int) { return false; });
   mend_from_neighbours(background_, oracle, glimpses);
+  doubt_what_is_contradicted(oracle, glimpses);
   for (std::size_t i = 0; i < glimpses.size(); ++i)
     EXPECT_EQ(glimpses[i].seen->attitude_doubtful, i == 30) << i;
   EXPECT_TRUE(std::isinf(glimpses[30].seen->pose->sigma_phi_rad));

@@ -67,13 +67,15 @@ void print(const data::Fit& fit) {
     fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
                b.lower_95, b.upper_95);
   for (const data::ModelScore& m : fit.comparison) {
-    if (!std::isfinite(m.bic)) {
+    if (std::isnan(m.bic)) {
       fmt::print("    {:<32} not fitted: {}\n", m.model, m.reason);
       continue;
     }
-    fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {:8.2f} sigma  {} parameters\n",
-               m.recommended ? "*" : " ", m.model, m.aicc, m.bic, m.held_back_rms_sigma,
-               m.parameters);
+    const std::string held_back = std::isnan(m.held_back_rms_sigma)
+                                      ? "       -"
+                                      : fmt::format("{:8.2f}", m.held_back_rms_sigma);
+    fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {} sigma  {} parameters\n",
+               m.recommended ? "*" : " ", m.model, m.aicc, m.bic, held_back, m.parameters);
     if (!m.reason.empty()) fmt::print("      not accepted: {}\n", m.reason);
   }
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);

@@ -234,7 +234,7 @@ std::string comparison_section(const data::Fit& fit) {
       "class=\"number\">whiteness p</th><th class=\"number\">held-back part "
       "[sigma]</th></tr></thead><tbody>";
   for (const data::ModelScore& score : fit.comparison) {
-    if (!std::isfinite(score.bic)) {
+    if (std::isnan(score.bic)) {
       html += fmt::format("<tr><td>{}</td><td colspan=\"6\">not fitted: {}</td></tr>",
                           escaped(score.model), escaped(score.reason));
       continue;
@@ -242,10 +242,12 @@ std::string comparison_section(const data::Fit& fit) {
     html += fmt::format(
         "<tr><td{}>{}{}</td><td class=\"number\">{}</td><td class=\"number\">{:.1f}</td><td "
         "class=\"number\">{:.1f}</td><td class=\"number\">{:.5g}</td><td "
-        "class=\"number\">{:.2g}</td><td class=\"number\">{:.3g}</td></tr>",
+        "class=\"number\">{:.2g}</td><td class=\"number\">{}</td></tr>",
         score.recommended ? " class=\"strong\"" : "", escaped(score.model),
         score.recommended ? " (recommended)" : "", score.parameters, score.aicc - least, score.bic,
-        score.chi2, score.whiteness_p, score.held_back_rms_sigma);
+        score.chi2, score.whiteness_p,
+        std::isnan(score.held_back_rms_sigma) ? "–"
+                                              : fmt::format("{:.3g}", score.held_back_rms_sigma));
     if (!score.reason.empty())
       html +=
           fmt::format("<tr class=\"quiet\"><td></td><td colspan=\"6\">not accepted: {}</td></tr>",

@@ -268,8 +268,7 @@ void widen(double step, std::vector<Working>& all) {
 }
 
 // Shading beside the edges and their common blur, which explains what it can first: a picture less
-// sharp than expected looks as if it were brighter and darker beside every edge. Returns by how
-// much the blur should grow.
+// sharp than expected looks as if it were brighter and darker beside every edge.
 StretchFit find_shadings(const std::vector<StretchProfile>& profiles, const ShadingMemory& known,
                          std::vector<Working>& all) {
   constexpr double kLittle = 0.02;  // of the largest variance

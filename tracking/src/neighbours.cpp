@@ -215,34 +215,6 @@ ShadingMemory shading_around(const std::vector<Glimpse>& glimpses, std::size_t i
   return sum;
 }
 
-/// All frames are measured again with what those on both sides know: how the body moves during the
-/// exposure, and the light beside its outline. While it was followed only the past was known.
-void measure_again(const Background& background, const BodyFinder& finder,
-                   std::vector<Glimpse>& glimpses) {
-  constexpr double kAsGood = 0.95, kNear = 0.25;
-  const bool alike = finder.faces_look_alike();
-  const std::vector<Glimpse> was = glimpses;
-  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
-    if (i == 0 || i + 1 >= was.size() || !was[i].posed() || !was[i - 1].posed() ||
-        !was[i + 1].posed())
-      return;
-    const Sighting& seen = *was[i].seen;
-    if (seen.attitude_doubtful) return;
-    const Pose pose = seen.pose->pose;
-    Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
-    if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
-    const ShadingMemory shading = shading_around(was, i);
-    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after), &shading);
-    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
-    const double off =
-        std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
-                 (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
-    if (off > kNear) return;
-    again->turned_rad = seen.turned_rad;
-    glimpses[i].seen = std::move(again);
-  });
-}
-
 /// Measures a frame again where its neighbours contradict it. Nothing if what was seen stands.
 class Mending {
  public:
@@ -324,32 +296,10 @@ void doubt(const Expected& expected, Sighting& seen) {
   pose.covariance_m2 += m2, pose.common.m2 += m2;
 }
 
-/// A poor fit is doubted sooner; whichever frames around are asked, with the poor ones and without,
-/// have to agree.
-void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses) {
-  constexpr double kPoorOff_rad = 0.1;
-  const std::vector<Glimpse> was = glimpses;
-  const std::vector<bool> poor = poor_fits(was), none(was.size(), false);
-  for (std::size_t i = 0; i < was.size(); ++i) {
-    if (!was[i].posed() || was[i].seen->attitude_doubtful) continue;
-    std::optional<Expected> nearest;
-    double least_rad = std::numeric_limits<double>::infinity();
-    bool doubted = true;
-    for (const std::vector<bool>& but : {poor, none}) {
-      auto expected = expected_at(finder, was, i, but);
-      if (!expected) continue;
-      const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
-      doubted = doubted && (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad));
-      if (off < least_rad) least_rad = off, nearest = std::move(expected);
-    }
-    if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);
-  }
-}
-
 }  // namespace
 
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
-                          std::vector<Glimpse>& glimpses, Effort effort) {
+                          std::vector<Glimpse>& glimpses) {
   constexpr int kMostRounds = 3;
   constexpr std::size_t kReach = 6;
   if (std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) { return g.posed(); }) <
@@ -371,8 +321,52 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
            mended[i] && k < std::min(was.size(), i + kReach + 1); ++k)
         open[k] = 1;
   }
-  if (effort != Effort::quick) measure_again(background, finder, glimpses);
-  doubt_what_is_contradicted(finder, glimpses);
+}
+
+void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,
+                   std::vector<Glimpse>& glimpses) {
+  constexpr double kAsGood = 0.95, kNear = 0.25;
+  const bool alike = finder.faces_look_alike();
+  const std::vector<Glimpse> was = glimpses;
+  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+    if (i == 0 || i < settled || i + 1 >= was.size() || !was[i].posed() || !was[i - 1].posed() ||
+        !was[i + 1].posed())
+      return;
+    const Sighting& seen = *was[i].seen;
+    if (seen.attitude_doubtful) return;
+    const Pose pose = seen.pose->pose;
+    Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
+    if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
+    const ShadingMemory shading = shading_around(was, i);
+    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after), &shading);
+    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
+    const double off =
+        std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
+                 (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
+    if (off > kNear) return;
+    again->turned_rad = seen.turned_rad;
+    glimpses[i].seen = std::move(again);
+  });
+}
+
+void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses) {
+  constexpr double kPoorOff_rad = 0.1;
+  const std::vector<Glimpse> was = glimpses;
+  const std::vector<bool> poor = poor_fits(was), none(was.size(), false);
+  for (std::size_t i = 0; i < was.size(); ++i) {
+    if (!was[i].posed() || was[i].seen->attitude_doubtful) continue;
+    std::optional<Expected> nearest;
+    double least_rad = std::numeric_limits<double>::infinity();
+    bool doubted = true;
+    for (const std::vector<bool>& but : {poor, none}) {
+      auto expected = expected_at(finder, was, i, but);
+      if (!expected) continue;
+      const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
+      doubted = doubted && (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad));
+      if (off < least_rad) least_rad = off, nearest = std::move(expected);
+    }
+    if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);
+  }
 }
 
 }  // namespace trochoid::tracking

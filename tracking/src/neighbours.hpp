@@ -1,16 +1,26 @@
 #pragma once
+#include <cstddef>
 #include <vector>
 
 #include "glimpse.hpp"
-#include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tracking {
 
 /// Measures frames again, from where their neighbours on both sides say the body was: those in
 /// which it was lost, seen in an attitude these contradict, or fitted clearly worse than around.
-/// Then, but for a quick look, all frames from where they are, with the motion and the light that
-/// the frames around know.
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
-                          std::vector<Glimpse>& glimpses, Effort effort = Effort::normal);
+                          std::vector<Glimpse>& glimpses);
+
+/// Measures frames again from where they are, with what the frames on both sides know: how the body
+/// moves during the exposure, and the light beside its outline. While it was followed only the past
+/// was known. Not those beside a gap, nor doubtful ones.
+/// @param settled so many frames at the front stay as they are.
+void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,
+                   std::vector<Glimpse>& glimpses);
+
+/// Doubts attitudes that the frames around still contradict: their covariance then holds both
+/// places. A poor fit is doubted sooner; whichever frames around are asked, with the poor ones and
+/// without, have to agree.
+void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses);
 
 }  // namespace trochoid::tracking

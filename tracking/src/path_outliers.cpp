@@ -68,6 +68,7 @@ class Path {
       if (!place) continue;
       const double off =
           kSooner[way] * (place->px - seen(k).centre_px).norm() / (usual_px_[way] + known_px);
+      if (!std::isfinite(off)) continue;
       if (!any || off < least.first) least = {off, *place};
       any = true;
     }

@@ -228,12 +228,14 @@ class Tracking {
     follow(*ahead, 1, path.frames);
     backward.get();
     path.frames.merge(before);
-    if (seed.seen.pose) decide(path, window, *ahead);
+    if (seed.seen.pose) decide(path, window, 0, *ahead);
     return {std::move(path), std::move(ahead)};
   }
 
   /// What consecutive frames say together: attitudes, and frames their neighbours can help.
-  void decide(BodyPath& path, const std::vector<Frame>& frames, Follower& ahead) const {
+  /// @param settled so many at the front have been looked at with all their neighbours.
+  void decide(BodyPath& path, const std::vector<Frame>& frames, std::size_t settled,
+              Follower& ahead) const {
     std::vector<Glimpse> glimpses;
     for (const Frame& frame : frames) {
       glimpses.push_back({&frame, {}});
@@ -241,12 +243,16 @@ class Tracking {
         glimpses.back().seen = std::move(at->second.seen);
     }
     decide_attitudes(background_, *finder_, glimpses);
-    mend_from_neighbours(background_, *finder_, glimpses, options_.effort);
+    mend_from_neighbours(background_, *finder_, glimpses);
+    if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
+    doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
-    for (Glimpse& g : glimpses) {
+    for (std::size_t i = 0; i < glimpses.size(); ++i) {
+      Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
       if (!g.seen) continue;
-      if (g.seen->pose) g.seen->pose->shading.reset();
+      const bool begins_next_window = i + kOverlap >= glimpses.size();
+      if (g.seen->pose && !begins_next_window) g.seen->pose->shading.reset();
       path.frames[g.frame->index] = {g.frame->t_s, trimmed(std::move(*g.seen))};
     }
     // Enough for the forecast to learn how the body moves.
@@ -283,7 +289,7 @@ class Tracking {
     if (window.size() <= kOverlap) return;
     for (std::size_t k = 0; k < followers_.size(); ++k)
       if (!paths_[k].frames.empty() && paths_[k].frames.begin()->second.seen.pose)
-        decide(paths_[k], window, *followers_[k]);
+        decide(paths_[k], window, kOverlap / 2, *followers_[k]);
   }
 
   void report_progress() const {

@@ -25,7 +25,8 @@ void run_interruptibly(const std::function<void(const Interrupt&)>& work) {
     }
     try {
       done.get();
-    } catch (const Interrupted&) {
+    } catch (...) {
+      if (!raised) throw;
     }
   }
   if (raised) throw *raised;

@@ -15,6 +15,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
 #ifdef TROCHOID_HAS_TRACKING
+#include "outputs.hpp"
 #include "overlay.hpp"
 #include "run_folder.hpp"
 #include "track_options.hpp"
@@ -142,6 +143,9 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   how.from = options["from"].cast<std::string>();
   how.to = options["to"].cast<std::string>();
   how.effort = tools::effort_named(options["effort"].cast<std::string>());
+  for (const char* target : {"edges", "smooth"})
+    if (!options[target].is_none())
+      tools::check_output(options[target].cast<fs::path>(), {video, camera_file.value_or("")});
   if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {
