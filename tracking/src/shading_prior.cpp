@@ -103,7 +103,7 @@ std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence
 }
 
 Eigen::Vector2d ShadingMemory::Sector::slopes() const {
-  constexpr double kUsualVariance = 0.02;  // about zero
+  constexpr double kUsualVariance = 0.01;  // about zero
   return (normal + Eigen::Matrix2d::Identity() / kUsualVariance).inverse() * right;
 }
 
