@@ -233,13 +233,8 @@ class Chain {
       seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
       if (!other) return;
       // Either of two places: half their distance is the standard deviation.
-      const Eigen::Vector2d px = 0.5 * (other->centre_px - seen->centre_px);
-      const Eigen::Vector2d m =
-          0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>();
-      const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
-      seen->covariance_px2 += px2;
-      seen->pose->covariance_px2 += px2, seen->pose->common.px2 += px2;
-      seen->pose->covariance_m2 += m2, seen->pose->common.m2 += m2;
+      allow_for(0.5 * (other->centre_px - seen->centre_px),
+                0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>(), *seen);
     });
   }
 

@@ -6,6 +6,13 @@
 
 namespace trochoid::tracking {
 
+void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen) {
+  const Eigen::Matrix2d px2 = off_px * off_px.transpose(), m2 = off_m * off_m.transpose();
+  seen.covariance_px2 += px2;
+  seen.pose->covariance_px2 += px2, seen.pose->common.px2 += px2;
+  seen.pose->covariance_m2 += m2, seen.pose->common.m2 += m2;
+}
+
 double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike) {
   const double cosine = a.dot(b);
   return std::acos(std::clamp(alike ? std::abs(cosine) : cosine, -1.0, 1.0));

@@ -40,6 +40,8 @@ class Measuring {
 void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
                    const std::function<void(Measuring&, std::size_t)>& work);
 
+/// Allows for the centre being this far off as well, in the picture and on the floor.
+void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen);
 /// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
 [[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
 

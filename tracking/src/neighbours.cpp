@@ -288,12 +288,8 @@ void doubt(const Expected& expected, Sighting& seen) {
   pose.sigma_theta_rad =
       std::hypot(pose.sigma_theta_rad, expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
   pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d px = expected.seen.centre_px - seen.centre_px;
-  const Eigen::Vector2d m = (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>();
-  const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
-  seen.covariance_px2 += px2;
-  pose.covariance_px2 += px2, pose.common.px2 += px2;
-  pose.covariance_m2 += m2, pose.common.m2 += m2;
+  allow_for(expected.seen.centre_px - seen.centre_px,
+            (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>(), seen);
 }
 
 }  // namespace

@@ -111,12 +111,8 @@ void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
     Sighting& seen = *glimpses[i].seen;
     PoseMeasurement& pose = *seen.pose;
     const Eigen::Vector2d px = place.px - seen.centre_px;
-    const Eigen::Vector2d m = place.m - pose.pose.centre_m.head<2>();
-    const Eigen::Matrix2d px2 = px * px.transpose(), m2 = m * m.transpose();
     seen.attitude_doubtful = true;
-    seen.covariance_px2 += px2;
-    pose.covariance_px2 += px2, pose.common.px2 += px2;
-    pose.covariance_m2 += m2, pose.common.m2 += m2;
+    allow_for(px, place.m - pose.pose.centre_m.head<2>(), seen);
     // A fit that went astray did so in all it says.
     const double astray_rad = px.norm() / seen.rim.semi_major_px();
     pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
