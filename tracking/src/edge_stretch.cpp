@@ -22,9 +22,24 @@ struct Columns {
       widening;  // of the share: derivative by the logarithm of the blur
 };
 
+// Sums of squared residuals and their degrees of freedom beside the edge, inside and outside, and
+// on it: pixels that an edge crosses are noisier than either side (coding, sampling of the scene).
 struct Noise {
-  double inner = 0.0, outer = 0.0, inner_freedom = 0.0, outer_freedom = 0.0;
+  Eigen::Array3d square = Eigen::Array3d::Zero(), freedom = Eigen::Array3d::Zero();
 };
+
+using Variances = std::array<float, 3>;  // of a sample inside, outside and on the edge
+
+// How a sample, of which such a share is outside, belongs to inside, outside and the edge.
+Variances parts_of(float share) {
+  const float on = 4.0f * share * (1.0f - share), beside = 1.0f - on;
+  return {beside * (1.0f - share), beside * share, on};
+}
+
+float variance_at(const Variances& noise, float share) {
+  const Variances part = parts_of(share);
+  return part[0] * noise[0] + part[1] * noise[1] + part[2] * noise[2];
+}
 
 // One profile with the sums over its model columns and what they say.
 struct Working {
@@ -98,8 +113,8 @@ bool plain_levels(const StretchProfile& p, const Columns& c, Working& w) {
   return true;
 }
 
-// Sums of all columns; the right side is what the plain step leaves.
-void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
+// Sums of all columns, samples weighed by their noise; the right side is what the plain step leaves.
+void accumulate(const StretchProfile& p, const Columns& c, const Variances& noise, Working& w) {
   // Samples along the first index, so that the sums are dot products of whole vectors.
   Eigen::Matrix<float, Profile::kMost, kAll + 1> rows;
   const int count = p.profile.count, whole = (count + 3) / 4 * 4;
@@ -113,6 +128,7 @@ void accumulate(const StretchProfile& p, const Columns& c, Working& w) {
     rows(j, 3) = sa, rows(j, 4) = sb, rows(j, 5) = s * sa, rows(j, 6) = s * sb;
     rows(j, 7) = c.strip[k], rows(j, 8) = contrast * c.widening[k];
     rows(j, kAll) = p.profile.light[k] - w.inner * a - w.outer * b;
+    rows.row(j) *= 1.0f / std::sqrt(variance_at(noise, c.share[k]));
   }
   rows.middleRows(count, whole - count).setZero();
   const auto sum = [&](int m, int n) {
@@ -269,11 +285,11 @@ void widen(double step, std::vector<Working>& all) {
 
 // Shading beside the edges and their common blur, which explains what it can first: a picture less
 // sharp than expected looks as if it were brighter and darker beside every edge.
-StretchFit find_shadings(const std::vector<StretchProfile>& profiles, const ShadingMemory& known,
+StretchFit find_shadings(const std::vector<StretchProfile>& profiles,
+                         const std::vector<double>& noise2, const ShadingMemory& known,
                          std::vector<Working>& all) {
   constexpr double kLittle = 0.02;  // of the largest variance
   constexpr int kRounds = 3;
-  const std::vector<double> noise2 = noise_of_looks(profiles, all);
   StretchFit out;
   for (int round = 0; round < kRounds; ++round) {
     out.shading = shading_evidence(profiles, noise2, all);
@@ -309,48 +325,47 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   const Eigen::Vector3f own = m.ldlt().solve(r).cast<float>();
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float inner = w.inner + own[0], outer = w.outer + own[1];
-  const auto own_share = static_cast<float>(1.0 / p.profile.shared);
-  float inner_square = 0, outer_square = 0, inner_count = 0, outer_count = 0;
+  const double own_share = 1.0 / p.profile.shared;
+  w.noise = {};
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px[k], a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
     const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
                        shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] -
                        own[2] * (w.inner - w.outer * c.ground[k]) * c.density[k];
-    const float square = own_share * rest * rest;
-    inner_square += a * square, outer_square += c.share[k] * square;
-    inner_count += own_share * a, outer_count += own_share * c.share[k];
+    const Variances part = parts_of(c.share[k]);
+    const Eigen::Array3d parts = own_share * Eigen::Array3d(part[0], part[1], part[2]);
+    w.noise.square += parts * static_cast<double>(rest * rest);
+    w.noise.freedom += parts;
   }
   w.inner = inner, w.outer = outer;
-  // Half of what was fitted comes from either side; priors make slopes and bends count less.
-  constexpr float kFitted = 1.9f, kLeastFreedom = 0.2f;
-  w.noise = {inner_square, outer_square, std::max(kLeastFreedom, inner_count - kFitted),
-             std::max(kLeastFreedom, outer_count - kFitted)};
+  // Levels come from either side, the offset from the edge; priors make slopes and bends count less.
+  const Eigen::Array3d fitted(1.4, 1.4, 1.0);
+  constexpr double kLeastFreedom = 0.2;
+  w.noise.freedom = (w.noise.freedom - fitted).max(kLeastFreedom);
 }
 
-// Variances of a sample on either side, from a stretch of the outline.
-std::vector<std::array<float, 2>> noise_of_neighbours(const std::vector<Working>& all,
-                                                      const std::vector<StretchProfile>& profiles) {
+// Variances of a sample from a stretch of the outline.
+std::vector<Variances> noise_of_neighbours(const std::vector<Working>& all,
+                                           const std::vector<StretchProfile>& profiles) {
   constexpr double kShare = 0.07;
-  const auto sums = sums_of_neighbours(
-      all, profiles, kShare, Eigen::Array4d(Eigen::Array4d::Constant(0.0)), [&](size_t i) {
-        const Noise& n = all[i].noise;
-        return Eigen::Array4d(n.inner, n.inner_freedom, n.outer, n.outer_freedom);
-      });
-  std::vector<std::array<float, 2>> out(all.size());
-  for (size_t i = 0; i < all.size(); ++i) {
-    const double shared = profiles[i].profile.shared;
-    const auto of = [shared](double square, double freedom) {
-      return static_cast<float>(shared * std::max(square / std::max(freedom, 1e-3), kLeastNoise2));
-    };
-    out[i] = {of(sums[i][0], sums[i][1]), of(sums[i][2], sums[i][3])};
-  }
+  const auto square = sums_of_neighbours(all, profiles, kShare,
+                                         Eigen::Array3d(Eigen::Array3d::Zero()),
+                                         [&](size_t i) { return all[i].noise.square; });
+  const auto freedom = sums_of_neighbours(all, profiles, kShare,
+                                          Eigen::Array3d(Eigen::Array3d::Zero()),
+                                          [&](size_t i) { return all[i].noise.freedom; });
+  std::vector<Variances> out(all.size());
+  for (size_t i = 0; i < all.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      out[i][static_cast<size_t>(k)] = static_cast<float>(
+          profiles[i].profile.shared *
+          std::max(square[i][k] / std::max(freedom[i][k], 1e-3), kLeastNoise2));
   return out;
 }
 
 // The offset with slopes given, samples weighed by the noise of their side.
-void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>& noise,
-                const Working& w) {
+void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, const Working& w) {
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float beside = p.strip_px > 0.0 ? v[4] : 0.0f;  // of the edge the strip's level counts
   // a, b, d and the residual, the first three with their weights beside; then the shading.
@@ -361,7 +376,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
     const float s = p.profile.s_px[k], ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
     const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
-    const float weight = 1.0f / (noise[0] + share * (noise[1] - noise[0]));
+    const float weight = 1.0f / variance_at(noise, share);
     const float d = (inner + beside - outer * ground) * c.density[k];
     const float sa = s * a, sb = s * b;
     rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
@@ -406,8 +421,8 @@ void fit_offset(StretchProfile& p, const Columns& c, const std::array<float, 2>&
   e.mean_level = inner + 0.5 * e.contrast;
   e.inner_slope = v[0] + 2.0f * s * v[2];
   e.outer_slope = (v[1] + 2.0f * s * v[3]) * ground;
-  const double square = w.noise.inner + w.noise.outer;
-  const double freedom = std::max(1.0, w.noise.inner_freedom + w.noise.outer_freedom);
+  const double square = w.noise.square.sum();
+  const double freedom = std::max(1.0, w.noise.freedom.sum());
   constexpr double kLeastGainNoise2 = 0.1;
   e.lines = p.profile.lines;
   e.gain = 0.5 * freedom / p.profile.lines *
@@ -426,13 +441,19 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
     columns_of(profiles[i], columns[i]);
     all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
     if (!all[i].usable) continue;
-    accumulate(profiles[i], columns[i], all[i]);
+    accumulate(profiles[i], columns[i], {1.0f, 1.0f, 1.0f}, all[i]);
     reduce(profiles[i], all[i]);
   }
-  StretchFit out = find_shadings(profiles, known, all);
+  find_shadings(profiles, noise_of_looks(profiles, all), known, all);
   for (size_t i = 0; i < profiles.size(); ++i)
     if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
-  const auto noise = noise_of_neighbours(all, profiles);
+  const std::vector<Variances> noise = noise_of_neighbours(all, profiles);
+  for (size_t i = 0; i < profiles.size(); ++i) {
+    if (!all[i].usable) continue;
+    accumulate(profiles[i], columns[i], noise[i], all[i]);
+    reduce(profiles[i], all[i]);
+  }
+  StretchFit out = find_shadings(profiles, std::vector<double>(all.size(), 1.0), known, all);
   for (size_t i = 0; i < profiles.size(); ++i) {
     profiles[i].found = false;
     if (all[i].usable) fit_offset(profiles[i], columns[i], noise[i], all[i]);
