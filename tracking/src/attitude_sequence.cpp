@@ -25,8 +25,17 @@ struct Node {
   std::array<Pose, 2> poses;  ///< as tracked, mirrored
   double tilt_rad;            ///< half the angle between the two axes
   bool weighed = false;
-  double speaks = 0.0;  ///< how much the picture speaks for the first
-  std::optional<Sighting> other{};
+  double speaks = 0.0;              ///< how much the picture speaks for the first
+  std::optional<Sighting> again{};  ///< the first measured afresh, where more speaks for it then
+  std::optional<Sighting> other{};  ///< the second
+
+  /// How well the two can be told apart: what does it, the wall, is the narrower the less the body
+  /// tilts, and errors of the edges are not.
+  [[nodiscard]] double wall() const {
+    constexpr double kSteep_rad = 0.75;
+    const double share = std::min(1.0, tilt_rad / kSteep_rad);
+    return share * share;
+  }
 };
 
 class Chain {
@@ -57,6 +66,8 @@ class Chain {
     solve();
     weigh(in_doubt());
     solve();
+    discount();
+    solve();
     apply();
   }
 
@@ -85,25 +96,41 @@ class Chain {
     return chosen;
   }
 
-  /// Measures the mirrored reading and compares what speaks for the two. What tells them apart, the
-  /// wall, is the narrower the less the body tilts, and errors of the edges are not.
+  /// Measures both readings and compares what speaks for them.
   void weigh(const std::vector<std::size_t>& chosen) {
-    constexpr double kPerShare = 6.0, kMost = 1.5, kNothingThere = 0.6, kSteep_rad = 0.75;
+    constexpr double kPerShare = 9.0, kMost = 1.5, kNothingThere = 0.6;
     on_both_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
       Node& node = nodes_[chosen[k]];
       if (node.weighed || node.tilt_rad < kLeastTilt) return;
       node.weighed = true;
       const Glimpse& glimpse = glimpses_[node.at];
-      node.other = measured_mirrored(measure, chosen[k]);
+      if (auto again = measured(measure, chosen[k], 0);
+          again && again->pose->evidence > glimpse.seen->pose->evidence)
+        node.again = std::move(again);
+      node.other = measured(measure, chosen[k], 1);
       if (!node.other) {
-        node.speaks = kNothingThere;
+        node.speaks = node.wall() * kNothingThere;
         return;
       }
-      const double seen_wall = std::min(1.0, node.tilt_rad / kSteep_rad);
-      const double ours = glimpse.seen->pose->evidence, theirs = node.other->pose->evidence;
+      const Sighting& own = node.again ? *node.again : *glimpse.seen;
+      const double ours = own.pose->evidence, theirs = node.other->pose->evidence;
       const double share = (ours - theirs) / std::max({ours, theirs, 1e-9});
-      node.speaks = seen_wall * seen_wall * std::clamp(kPerShare * share, -kMost, kMost);
+      node.speaks = node.wall() * std::clamp(kPerShare * share, -kMost, kMost);
     });
+  }
+
+  /// What pictures of one body say has errors that all of them share (a raised rim, a shadow): if
+  /// they speak for the chosen sequence by no more than that, it is not known, however many.
+  void discount() {
+    constexpr double kShared = 0.15, kSure = 0.38;
+    double speaks = 0.0, wall = 1e-9;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      if (nodes_[i].weighed) {
+        speaks += std::copysign(nodes_[i].speaks, nodes_[i].speaks * margin_[i]);
+        wall += nodes_[i].wall();
+      }
+    const double trust = std::clamp((speaks / wall - kShared) / (kSure - kShared), 0.0, 1.0);
+    for (Node& node : nodes_) node.speaks *= trust;
   }
 
   /// Where the body was one frame from node i, in the reading that takes less of a turn.
@@ -123,12 +150,14 @@ class Chain {
     return std::nullopt;
   }
 
-  /// The mirrored reading of node i; nothing if the picture leads elsewhere.
-  [[nodiscard]] std::optional<Sighting> measured_mirrored(Measuring& measure, std::size_t i) const {
+  /// A reading of node i measured afresh; nothing if the picture leads elsewhere.
+  [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
+                                                 std::size_t reading) const {
     const Node& node = nodes_[i];
+    const Pose &wanted = node.poses[reading], &unwanted = node.poses[1 - reading];
     Sighting guess = *glimpses_[node.at].seen;
-    guess.pose->pose = node.poses[1];
-    auto seen = measure(*glimpses_[node.at].frame, guess, near(i, node.poses[1]));
+    guess.pose->pose = wanted;
+    auto seen = measure(*glimpses_[node.at].frame, guess, near(i, wanted));
     if (!seen || !seen->pose) return std::nullopt;
     // The centres of the two readings are apart by the thickness of the body at most.
     constexpr double kApart = 0.12;
@@ -136,9 +165,9 @@ class Chain {
     if ((seen->centre_px - ours.centre_px).norm() > kApart * ours.rim.semi_major_px())
       return std::nullopt;
     const Eigen::Vector3d axis = axis_of(seen->pose->pose);
-    if (between_axes(axis, axis_of(node.poses[1]), alike_) >
-        between_axes(axis, axis_of(node.poses[0]), alike_))
+    if (between_axes(axis, axis_of(wanted), alike_) > between_axes(axis, axis_of(unwanted), alike_))
       return std::nullopt;
+    seen->turned_rad = ours.turned_rad;
     return seen;
   }
 
@@ -222,10 +251,10 @@ class Chain {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       auto& seen = glimpses_[node.at].seen;
+      if (node.again) seen.swap(node.again);
       std::optional<Sighting>& other = node.other;
       if (margin_[i] < 0.0) {
-        if (!other) other = measured_mirrored(measure, i);
-        if (other) other->turned_rad = seen->turned_rad;
+        if (!other) other = measured(measure, i, 1);
         seen.swap(other);
       }
       if (!seen || !seen->pose || std::abs(margin_[i]) >= kDoubtful) return;

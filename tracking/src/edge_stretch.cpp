@@ -113,7 +113,8 @@ bool plain_levels(const StretchProfile& p, const Columns& c, Working& w) {
   return true;
 }
 
-// Sums of all columns, samples weighed by their noise; the right side is what the plain step leaves.
+// Sums of all columns, samples weighed by their noise; the right side is what the plain step
+// leaves.
 void accumulate(const StretchProfile& p, const Columns& c, const Variances& noise, Working& w) {
   // Samples along the first index, so that the sums are dot products of whole vectors.
   Eigen::Matrix<float, Profile::kMost, kAll + 1> rows;
@@ -158,7 +159,7 @@ void reduce(const StretchProfile& p, Working& w) {
     for (size_t j = 0; j <= i; ++j) m[i][j] = static_cast<double>(w.normal[i][j]);
     r[i] = static_cast<double>(w.right[i]);
   }
-  m[2][2] += 1.0;  // without contrast any offset fits; about a pixel is possible
+  m[2][2] += 0.05;  // without contrast any offset fits; a few pixels are possible
   double square = static_cast<double>(w.square);
   const auto eliminate = [&](size_t k) {
     const double pivot = m[k][k];
@@ -339,7 +340,8 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
     w.noise.freedom += parts;
   }
   w.inner = inner, w.outer = outer;
-  // Levels come from either side, the offset from the edge; priors make slopes and bends count less.
+  // Levels come from either side, the offset from the edge; priors make slopes and bends count
+  // less.
   const Eigen::Array3d fitted(1.4, 1.4, 1.0);
   constexpr double kLeastFreedom = 0.2;
   w.noise.freedom = (w.noise.freedom - fitted).max(kLeastFreedom);
@@ -349,18 +351,18 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
 std::vector<Variances> noise_of_neighbours(const std::vector<Working>& all,
                                            const std::vector<StretchProfile>& profiles) {
   constexpr double kShare = 0.07;
-  const auto square = sums_of_neighbours(all, profiles, kShare,
-                                         Eigen::Array3d(Eigen::Array3d::Zero()),
-                                         [&](size_t i) { return all[i].noise.square; });
-  const auto freedom = sums_of_neighbours(all, profiles, kShare,
-                                          Eigen::Array3d(Eigen::Array3d::Zero()),
-                                          [&](size_t i) { return all[i].noise.freedom; });
+  const auto square =
+      sums_of_neighbours(all, profiles, kShare, Eigen::Array3d(Eigen::Array3d::Zero()),
+                         [&](size_t i) { return all[i].noise.square; });
+  const auto freedom =
+      sums_of_neighbours(all, profiles, kShare, Eigen::Array3d(Eigen::Array3d::Zero()),
+                         [&](size_t i) { return all[i].noise.freedom; });
   std::vector<Variances> out(all.size());
   for (size_t i = 0; i < all.size(); ++i)
     for (int k = 0; k < 3; ++k)
-      out[i][static_cast<size_t>(k)] = static_cast<float>(
-          profiles[i].profile.shared *
-          std::max(square[i][k] / std::max(freedom[i][k], 1e-3), kLeastNoise2));
+      out[i][static_cast<size_t>(k)] =
+          static_cast<float>(profiles[i].profile.shared *
+                             std::max(square[i][k] / std::max(freedom[i][k], 1e-3), kLeastNoise2));
   return out;
 }
 
