@@ -33,5 +33,13 @@ TEST_F(AttitudeSequence, WhatNothingTellsIsDoubtful) {
   }
 }
 
+// All pictures of a body share the error of a wall that is not what it is taken for.
+TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
+  const Oracle oracle([](int) { return 1.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  decide_attitudes(background_, oracle, glimpses);
+  for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking
