@@ -17,8 +17,8 @@ std::vector<EdgeEquation> round_a_circle(double noise_px, double common_px, std:
   for (int i = 0; i < kEdges; ++i) {
     EdgeEquation& e = equations[static_cast<std::size_t>(i)];
     e.direction_rad = std::remainder(2.0 * std::numbers::pi * i / kEdges, 2.0 * std::numbers::pi);
-    e.motion.resize(2);
-    e.motion << std::cos(e.direction_rad), std::sin(e.direction_rad);
+    e.normal = {std::cos(e.direction_rad), std::sin(e.direction_rad)};
+    e.motion = e.normal;
     e.tone = 1.0;
     e.model_px = 0.01;
     e.common_px = common_px;
@@ -31,8 +31,8 @@ std::vector<EdgeEquation> round_a_circle(double noise_px, double common_px, std:
 RobustSolution solved(std::vector<EdgeEquation> equations) {
   RobustSolution solution;
   const PoseMotion::Step prior = PoseMotion::Step::Constant(2, 30.0);
-  EXPECT_TRUE(
-      solve_robustly(equations, prior, 0.1, {.directions = true, .uncertainty = true}, solution));
+  EXPECT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
+  find_uncertainty(equations, prior, solution);
   return solution;
 }
 

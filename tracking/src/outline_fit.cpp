@@ -53,6 +53,8 @@ struct Fitted {
   double blur_px = kUsualBlurPx;
   double score = 0.0;     ///< outline_score of the pose
   double evidence = 0.0;  ///< evidence_of the fit
+  /// Covariance of a step by which other attitudes explain the picture about as well; or empty.
+  Eigen::MatrixXd attitudes{};
 };
 
 // The last stage, from a pose that is right to about the blur of the picture. Too sharp or too wide
@@ -82,8 +84,10 @@ std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
   return a->evidence * a->score >= b->evidence * b->score ? a : b;
 }
 
-std::optional<Fitted> fit_from(const Scenery& scenery, const data::Pose<>& start) {
-  const auto refined = refine(scenery.blurred(kNearBlurPx), start, kNear);
+// @param near the scenery blurred by kNearBlurPx.
+std::optional<Fitted> fit_from(const Scenery& scenery, const Scenery& near,
+                               const data::Pose<>& start) {
+  const auto refined = refine(near, start, kNear);
   return refined ? fit_exactly(scenery, refined->pose, refined->outline_px, std::nullopt)
                  : std::nullopt;
 }
@@ -101,8 +105,7 @@ double steepest_alike(const data::Body& body) {
 // they are apart.
 void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
   constexpr double kAsGood = 0.97;
-  RobustSolution& solution = chosen.refined.solution;
-  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(solution.common.rows(), solution.common.cols());
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(motion.count(), motion.count());
   double count = 1.0;
   for (const Fitted& other : others) {
     if (other.evidence < kAsGood * chosen.evidence) continue;
@@ -110,8 +113,15 @@ void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fi
     square += off * off.transpose();
     count += 1.0;
   }
-  solution.common += square / count;
-  solution.covariance += square / count;
+  chosen.attitudes = square / count;
+}
+
+// How well the pose that was chosen is known.
+void find_uncertainty(const Scenery& scenery, Fitted& fitted) {
+  find_uncertainty(scenery, fitted.refined);
+  if (fitted.attitudes.size() == 0) return;
+  fitted.refined.solution.common += fitted.attitudes;
+  fitted.refined.solution.covariance += fitted.attitudes;
 }
 
 // Seen nearly face on, the attitude mirrored at the line of sight is so near that a prediction may
@@ -170,7 +180,7 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
           better(std::move(fitted), fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px));
   }
   if (!fitted || fitted->score < kSure)
-    fitted = better(std::move(fitted), fit_from(scenery, predicted));
+    fitted = better(std::move(fitted), fit_from(scenery, scenery.blurred(kNearBlurPx), predicted));
   return of_near_tilts(scenery, std::move(fitted));
 }
 
@@ -189,7 +199,7 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
             [](const auto& a, const auto& b) { return a.first > b.first; });
   std::optional<Fitted> best;
   const auto consider = [&](const data::Pose<>& pose) {
-    best = better(std::move(best), fit_from(scenery, pose));
+    best = better(std::move(best), fit_from(scenery, near, pose));
   };
   for (size_t i = 0; i < std::min(kFitted, drawn.size()); ++i) {
     consider(drawn[i].second);
@@ -349,10 +359,12 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
       best->score < kDoubtful) {
     const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);
-    auto turned = fit_from(scenery, other);
+    auto turned = fit_from(scenery, scenery.blurred(kNearBlurPx), other);
     if (turned && turned->evidence > kClearlyBetter * best->evidence) best = std::move(turned);
   }
-  if (!best || !believable(*best)) return std::nullopt;
+  if (!best) return std::nullopt;
+  find_uncertainty(scenery, *best);
+  if (!believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
   if (alike) fold(m.pose);
   if (const auto marks = read_marks(evidence.luma, body_, camera_, m.pose)) {

@@ -153,21 +153,21 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
 
 // What edges of a whole side of the body may be wrong by alike [px]: light beside them that is not
 // known by some share of it, and colours that luma mixes wrongly.
-double common_sd_px(const Scenery& scenery, const StretchProfile& look) {
-  constexpr double kUnknownPx = 0.03;         // beside an edge as strong as its mean level
-  const double step_px = 2.5 * look.blur_px;  // of a Gaussian edge: shift per share of its step
-  const ProfileEdge& e = look.edge;
+double common_sd_px(const Scenery& scenery, const ProfileEdge& e, double blur_px) {
+  constexpr double kUnknownPx = 0.03;    // beside an edge as strong as its mean level
+  const double step_px = 2.5 * blur_px;  // of a Gaussian edge: shift per share of its step
   const double tone = tone_of(e);
   constexpr double kMostMixing = 0.3, kMixingShare = 0.85;  // the rest shading takes up
   const double mixing = scenery.tints
                             ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
                                            e.mean_level + 0.5 * e.contrast)
                             : 0.0;
-  return std::hypot(unknown_share(e) * kUnknownPx / std::pow(tone, 1.5),
+  return std::hypot(unknown_share(e) * kUnknownPx / (tone * std::sqrt(tone)),
                     kMixingShare * step_px * std::min(kMostMixing, std::abs(mixing)));
 }
 
-EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, bool colour) {
+EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look, bool colour) {
+  const ProfileEdge& edge = look.edge;
   const bool bore = sample.edge == Edge::upper_bore || sample.edge == Edge::lower_bore;
   EdgeEquation e;
   e.motion = sample.motion.transpose();
@@ -181,7 +181,8 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, b
     e.lower_px = std::hypot(unknown_share(edge) * kLowerPx, std::sqrt(edge.strip_variance_px2));
   e.group = colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
   e.colour = colour;
-  e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
+  e.direction_rad = look.direction_rad;
+  e.normal = sample.normal_px;
   e.offset_px = edge.offset_px;
   // Colour planes of half the size hold fewer independent values, along the profile and across.
   const double shared = colour ? 1.7 : 1.0;
@@ -226,7 +227,7 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
     if (all[i].silhouette &&
         look_at(scenery, all[i], round.sweep(i), nullptr, search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
-      keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
+      keep(all[i], look.edge, equation_of(all[i], look, colour), out);
       out.places.push_back(i);
     }
 }
@@ -251,11 +252,11 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
-    EdgeEquation equation = equation_of(sample, looks[i].edge, colour);
+    EdgeEquation equation = equation_of(sample, looks[i], colour);
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
-    equation.common_px = common_sd_px(scenery, looks[i]);
     keep(sample, looks[i].edge, equation, out);
     out.shading.push_back(fit.shading[i]);
+    out.blurs_px.push_back(looks[i].blur_px);
     out.places.push_back(places[i]);
   }
   return fit.wider_px;
@@ -302,6 +303,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
   out.edges.clear();
   out.equations.clear();
   out.shading.clear();
+  out.blurs_px.clear();
   out.places.clear();
   for (const bool colour : {false, true}) {
     if (colour && scenery.colour.empty()) continue;
@@ -330,7 +332,7 @@ double seen_px(const Search& search, const Round& round, const Refined& refined)
       const size_t place = round.places[channel][i];
       const StretchProfile& look = round.looks[channel][i];
       ProfileEdge plain;
-      if (look.found && round.outline[place].silhouette &&
+      if (look.found && round.outline[place].silhouette && seen[place] < 1.0 &&
           fit_edge(look.profile, look.blur_px, look.plate, kSeenReachPx, plain))
         count(place, plain);
     }
@@ -339,15 +341,19 @@ double seen_px(const Search& search, const Round& round, const Refined& refined)
   return sum;
 }
 
+PoseMotion::Step prior_of(const PoseMotion& motion) {
+  PoseMotion::Step sd(motion.count());
+  for (int i = 0; i < motion.count(); ++i) sd[i] = motion.scale(i);
+  return sd;
+}
+
 }  // namespace
 
 std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
                               const Search& search) {
   Refined out;
   out.pose = start;
-  const int n = scenery.motion.count();
-  PoseMotion::Step prior(n);
-  for (int i = 0; i < n; ++i) prior[i] = scenery.motion.scale(i);
+  const PoseMotion::Step prior = prior_of(scenery.motion);
   // Edges this share of the blur apart may belong together, whatever they claim.
   constexpr double kLeastScale = 0.15, kLeastExactScale = 0.05;
   const double least_scale_px = (search.exact ? kLeastExactScale : kLeastScale) * search.blur_px;
@@ -358,9 +364,7 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   for (int i = 0; i < search.iterations; ++i) {
     const double step_px = last ? search.step_px : kSparse * search.step_px;
     if (!collect(scenery, out.pose, search, step_px, round, out)) return std::nullopt;
-    const bool uncertainty = last && search.exact;
-    if (!solve_robustly(out.equations, prior, least_scale_px,
-                        {.directions = search.exact, .uncertainty = uncertainty}, out.solution))
+    if (!solve_robustly(out.equations, prior, least_scale_px, search.exact, out.solution))
       return std::nullopt;
     out.pose = scenery.motion.moved(out.pose, out.solution.step);
     double moved2 = 0.0;
@@ -381,6 +385,12 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   const double channels = scenery.colour.empty() ? 1.0 : 2.0;
   out.covered = out.outline_px > 0.0 ? accepted_px / (channels * out.outline_px) : 0.0;
   return out;
+}
+
+void find_uncertainty(const Scenery& scenery, Refined& refined) {
+  for (size_t i = 0; i < refined.equations.size(); ++i)
+    refined.equations[i].common_px = common_sd_px(scenery, refined.edges[i], refined.blurs_px[i]);
+  find_uncertainty(refined.equations, prior_of(scenery.motion), refined.solution);
 }
 
 double outline_score(const Refined& refined) {

@@ -52,7 +52,7 @@ struct Search {
   int iterations;
   double settled_px;  ///< a smaller step is the last [px, rms along the outline]
   /// With everything that bears on accuracy: slopes beside the edges, edges between two surfaces of
-  /// the body, what edge models may be wrong by, the covariance.
+  /// the body, what edge models may be wrong by.
   bool exact;
 };
 
@@ -63,6 +63,7 @@ struct Refined {
   std::vector<ProfileEdge> edges;
   std::vector<EdgeEquation> equations;
   std::vector<ShadingEvidence> shading;  ///< exact: beside each edge
+  std::vector<double> blurs_px;          ///< exact: of each edge
   std::vector<size_t> places;            ///< along the outline of all samples
   double outline_px = 0.0;               ///< length of the predicted silhouette
   double seen_px = 0.0;                  ///< of it, with an edge exactly there
@@ -73,6 +74,9 @@ struct Refined {
 /// Iterates edges and pose; nothing if too few edges are found.
 [[nodiscard]] std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
                                             const Search& search);
+
+/// How well the pose of an exact search is known: the rest of its solution.
+void find_uncertainty(const Scenery& scenery, Refined& refined);
 
 /// Share of the silhouette, 0..1, with an edge exactly there: near 1 for the right pose, a third or
 /// less for a pose that merely has settled among edges.

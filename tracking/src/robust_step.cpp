@@ -58,8 +58,8 @@ struct Row {
     add(first + n, e.swell);
     if (e.colour) {
       add(first + n + 2, e.polarity);
-      add(first + n + 3, std::cos(e.direction_rad));
-      add(first + n + 4, std::sin(e.direction_rad));
+      add(first + n + 3, e.normal.x());
+      add(first + n + 4, e.normal.y());
     } else {
       add(first + n + 1, e.polarity);
       add(first + n + 5, e.tone);
@@ -143,35 +143,38 @@ double correlation_factor(const std::vector<EdgeEquation>& equations, double sca
   return std::max(1.0, observed / std::max(independent, 1e-30) * blocks / freedom);
 }
 
-// What whole stretches of the outline do to the answer: how far it moves when one sixth of all
-// directions is left out, over what the covariance expects. Sees errors that neighbours share,
-// whatever their cause.
-double jackknife_ratio(const std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
-                       const ArrowSystem& prior, double scale, const Eigen::MatrixXd& covariance) {
-  constexpr int kSectors = 6;
-  const auto n = static_cast<int>(covariance.rows());
-  const ArrowSystem none = [&] {
-    ArrowSystem zero = prior;
-    zero.add(prior, -1.0);
-    return zero;
-  }();
-  std::array<ArrowSystem, kSectors> parts;
-  parts.fill(none);
+constexpr size_t kSectors = 6;
+using Sectors = std::array<ArrowSystem, kSectors>;
+
+// What the equations of each sixth of all directions say.
+Sectors sectors_of(const std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
+                   const ArrowSystem& prior, double scale) {
+  ArrowSystem none = prior;
+  none.add(prior, -1.0);
+  Sectors sectors;
+  sectors.fill(none);
   for (size_t i = 0; i < equations.size(); ++i) {
     const EdgeEquation& e = equations[i];
     const double turn = e.direction_rad / (2.0 * std::numbers::pi) + 1.0;
-    const auto sector = static_cast<size_t>(turn * kSectors) % kSectors;
-    rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px, parts[sector]);
+    const size_t sector = static_cast<size_t>(turn * kSectors) % kSectors;
+    rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px, sectors[sector]);
   }
-  ArrowSystem all = prior;
-  for (const ArrowSystem& part : parts) all.add(part, 1.0);
+  return sectors;
+}
+
+// What whole stretches of the outline do to the answer: how far it moves when one sixth of all
+// directions is left out, over what the covariance expects. Sees errors that neighbours share,
+// whatever their cause.
+double jackknife_ratio(const ArrowSystem& all, const Sectors& sectors,
+                       const Eigen::MatrixXd& covariance) {
+  const Eigen::Index n = covariance.rows();
   Eigen::MatrixXd answers(n, kSectors);
   for (size_t k = 0; k < kSectors; ++k) {
     ArrowSystem rest = all;
-    rest.add(parts[k], -1.0);
+    rest.add(sectors[k], -1.0);
     if (!rest.factorise()) return std::numeric_limits<double>::infinity();
     const Vector x = rest.solved_right();
-    for (int i = 0; i < n; ++i)
+    for (Eigen::Index i = 0; i < n; ++i)
       answers(i, static_cast<Eigen::Index>(k)) = x[static_cast<size_t>(kGroups * kKnots + i)];
   }
   const Eigen::VectorXd mean = answers.rowwise().mean();
@@ -192,8 +195,8 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
     const double weight = e.weight / (e.variance_px2 * scale * scale);
     if (e.group < 2) {
       const auto side = static_cast<size_t>(2 * e.group);
-      rows[i].add_to(weight * e.common_px * std::cos(e.direction_rad), patterns[side]);
-      rows[i].add_to(weight * e.common_px * std::sin(e.direction_rad), patterns[side + 1]);
+      rows[i].add_to(weight * e.common_px * e.normal.x(), patterns[side]);
+      rows[i].add_to(weight * e.common_px * e.normal.y(), patterns[side + 1]);
     }
     if (e.lower_px > 0.0) rows[i].add_to(weight * e.lower_px, patterns[kLower]);
   }
@@ -230,7 +233,7 @@ double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
 // Tukey-weighted least squares as it goes: the last solution and the system that gave it.
 struct Solving {
   std::vector<EdgeEquation>& equations;
-  std::vector<Row>& rows;
+  const std::vector<Row>& rows;
   const ArrowSystem& prior;
   int first, count;  // the pose among the unknowns
   double least_scale_px;
@@ -265,47 +268,47 @@ struct Solving {
     return true;
   }
   static constexpr size_t at(int i) { return static_cast<size_t>(i); }
-  // Diagonal of the covariance of all unknowns, and the whole of it for the pose.
-  [[nodiscard]] Vector variances(Eigen::MatrixXd& pose) const {
-    Vector all{};
-    pose.resize(count, count);
-    for (int i = 0; i < system.size(); ++i) {
-      Vector unit{};
-      unit[at(i)] = 1.0;
-      system.solve(unit);
-      all[at(i)] = unit[at(i)];
-      if (i < first || i >= first + count) continue;
-      for (int j = 0; j < count; ++j) pose(j, i - first) = unit[at(first + j)];
-    }
-    return all;
-  }
 };
+
+// Diagonal of the covariance of all unknowns, and the whole of it for the pose.
+Vector variances(const ArrowSystem& factorised, int first, Eigen::MatrixXd& pose) {
+  const auto count = static_cast<int>(pose.rows());
+  Vector all{};
+  for (int i = 0; i < factorised.size(); ++i) {
+    Vector unit{};
+    unit[static_cast<size_t>(i)] = 1.0;
+    factorised.solve(unit);
+    all[static_cast<size_t>(i)] = unit[static_cast<size_t>(i)];
+    if (i < first || i >= first + count) continue;
+    for (int j = 0; j < count; ++j) pose(j, i - first) = unit[static_cast<size_t>(first + j)];
+  }
+  return all;
+}
+
+std::vector<Row> rows_of(const std::vector<EdgeEquation>& equations, bool directions) {
+  std::vector<Row> rows;
+  rows.reserve(equations.size());
+  for (const EdgeEquation& e : equations) rows.emplace_back(e, directions);
+  return rows;
+}
 
 }  // namespace
 
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, const RobustOptions& options, RobustSolution& out) {
-  const bool directions = options.directions;
+                    double least_scale_px, bool directions, RobustSolution& out) {
   constexpr size_t kFewest = 8;
   if (equations.size() < kFewest) return false;
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(directions);
   const ArrowSystem prior = prior_information(prior_sd, directions);
-  std::vector<Row> rows;
-  rows.reserve(equations.size());
-  for (const EdgeEquation& e : equations) rows.emplace_back(e, directions);
+  const std::vector<Row> rows = rows_of(equations, directions);
   Solving solving{equations, rows, prior, first, n, least_scale_px};
   if (!solving.run()) return false;
-  Eigen::MatrixXd inverse;
-  Vector variances{};
-  if (options.uncertainty) variances = solving.variances(inverse);
-  const double scale = solving.scale;
-  double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0, z2 = 0.0;
+  double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0;
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     e.residual_px = e.offset_px - rows[i].dot(solving.x);
     square += e.weight * e.residual_px * e.residual_px;
-    z2 += e.weight * e.residual_px * e.residual_px / e.variance_px2;
     weight += e.weight;
     arc += e.arc_px;
     if (e.weight > 0.5) accepted += e.arc_px;
@@ -314,27 +317,49 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   const auto of = [&](int i) { return solving.x[static_cast<size_t>(first + i)]; };
   out.step.resize(n);
   for (int i = 0; i < n; ++i) out.step[i] = of(i);
+  out.scale = solving.scale;
   out.swell_px = of(n);
   out.polarity_px = of(n + 1);
   out.colour_shift_px = {of(n + 3), of(n + 4)};
   out.rms_px = std::sqrt(square / weight);
   out.accepted = accepted / arc;
-  if (!options.uncertainty) return true;
+  return true;
+}
+
+void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+                      RobustSolution& solution) {
+  const auto n = static_cast<int>(prior_sd.size());
+  const int first = pose_at(true);
+  const ArrowSystem prior = prior_information(prior_sd, true);
+  const std::vector<Row> rows = rows_of(equations, true);
+  const Sectors sectors = sectors_of(equations, rows, prior, solution.scale);
+  ArrowSystem all = prior;
+  for (const ArrowSystem& sector : sectors) all.add(sector, 1.0);
+  ArrowSystem factorised = all;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  solution.covariance = solution.common = Eigen::MatrixXd::Constant(n, n, kInfinity);
+  if (!factorised.factorise()) return;
+  Eigen::MatrixXd inverse(n, n);
+  const Vector variance = variances(factorised, first, inverse);
+  double weight = 0.0, z2 = 0.0;
+  for (const EdgeEquation& e : equations) {
+    weight += e.weight;
+    z2 += e.weight * e.residual_px * e.residual_px / e.variance_px2;
+  }
   const double scale2 = std::max(z2 / weight, 1.0);
   // Of each unknown the share that the edges determine and not the prior.
   double fitted = 0.0;
-  for (int i = 0; i < solving.system.size(); ++i)
-    fitted += 1.0 - prior(i, i) * variances[static_cast<size_t>(i)];
-  out.correlation = correlation_factor(equations, scale2, fitted);
+  for (int i = 0; i < factorised.size(); ++i)
+    fitted += 1.0 - prior(i, i) * variance[static_cast<size_t>(i)];
+  solution.correlation = correlation_factor(equations, scale2, fitted);
   // Noise grows with the correlation, what the edge models may be wrong by does not.
-  const double inflation = out.correlation * scale2 / (scale * scale);
-  out.covariance = inflation * inverse;
+  const double grown = solution.correlation * scale2 / (solution.scale * solution.scale);
+  solution.covariance = grown * inverse;
   constexpr double kLeast = 0.6, kMost = 25.0;  // a small ratio may also be luck
-  const double ratio = jackknife_ratio(equations, rows, prior, scale, out.covariance);
-  if (std::isfinite(ratio)) out.inflation = std::clamp(ratio, kLeast, kMost);
-  out.common = common_covariance(equations, rows, solving.system, scale, first, n);
-  out.covariance = out.inflation * out.covariance + out.common;
-  return true;
+  const double ratio = jackknife_ratio(all, sectors, solution.covariance);
+  if (std::isfinite(ratio)) solution.inflation = std::clamp(ratio, kLeast, kMost);
+  solution.common = common_covariance(equations, rows, factorised, solution.scale, first, n);
+  solution.covariance = solution.inflation * solution.covariance + solution.common;
 }
 
 }  // namespace trochoid::tracking

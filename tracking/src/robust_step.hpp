@@ -22,6 +22,7 @@ struct EdgeEquation {
   double model_px = 0.0;
   int group = 0;               ///< 0 .. kGroups - 1
   double direction_rad = 0.0;  ///< of the normal
+  Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
   /// What it may be wrong by together with all others of its group: alike for the whole lit side of
   /// a body, opposite on the dark one, so that only the answer moves and no residual shows it [px].
   double common_px = 0.0;
@@ -39,26 +40,29 @@ struct EdgeEquation {
 
 struct RobustSolution {
   PoseMotion::Step step;
+  double scale = 1.0;  ///< of the errors, over what the edges claim; at least 1
+  double swell_px = 0.0, polarity_px = 0.0;
+  Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
+  double rms_px = 0.0;
+  double accepted = 0.0;  ///< share of the arc with weight above one half
+  // From here on by find_uncertainty.
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
   Eigen::MatrixXd common;      ///< of it, what errors common to whole sides of the outline do
   /// Variance the rest has been multiplied by: how far the answer moves without parts of the
   /// outline, over what was expected. Noisy; frames of one clip have nearly the same.
   double inflation = 1.0;
-  double swell_px = 0.0, polarity_px = 0.0;
-  Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
-  double rms_px = 0.0;
-  double accepted = 0.0;     ///< share of the arc with weight above one half
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
-};
-
-struct RobustOptions {
-  bool directions;   ///< allow for what the edge models may be wrong by in every direction
-  bool uncertainty;  ///< give covariance and correlation; needs `directions`
 };
 
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
 /// `prior_sd` per parameter. False if fewer than 8 equations.
+/// @param directions allow for what the edge models may be wrong by in every direction.
 bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
-                    double least_scale_px, const RobustOptions& options, RobustSolution& out);
+                    double least_scale_px, bool directions, RobustSolution& out);
+
+/// How well a solution found with `directions` is known; infinitely badly if its equations do not
+/// determine it. The equations are as solve_robustly left them.
+void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+                      RobustSolution& solution);
 
 }  // namespace trochoid::tracking

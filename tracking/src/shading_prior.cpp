@@ -1,6 +1,5 @@
 #include "shading_prior.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -16,13 +15,27 @@ constexpr double kLeastVariance = 0.03, kMostVariance = 1.0;
 // coordinate at a time, from x.
 Shading least_within_bounds(const ShadingMatrix& A, const Shading& b, Shading x) {
   constexpr int kSweeps = 3;
+  const Shading inverse = A.diagonal().cwiseInverse();
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int k = 0; k < kShading; ++k) {
       if (!(A(k, k) > 0.0)) continue;
-      const double rest = b[k] - A.row(k).dot(x) + A(k, k) * x[k];
-      x[k] = std::clamp(rest / A(k, k), 0.0, kMostVariance);
+      const double off = b[k] - A.col(k).dot(x);
+      x[k] = std::clamp(x[k] + off * inverse[k], 0.0, kMostVariance);
     }
   return x;
+}
+
+// Inverse of a positive definite matrix, one pivot after the other [Gauss-Jordan].
+ShadingMatrix inverse_of(ShadingMatrix m) {
+  for (int k = 0; k < kShading; ++k) {
+    const double inverse = 1.0 / m(k, k);
+    const Shading column = m.col(k), scaled = inverse * column;
+    m -= scaled * column.transpose();
+    m.col(k) = scaled;
+    m.row(k) = scaled.transpose();
+    m(k, k) = -inverse;
+  }
+  return -m;
 }
 
 // With shading s of diagonal covariance V, right sides r = N s + noise have E[r_k^2] =
@@ -49,7 +62,7 @@ ShadingEstimate estimate(const ShadingEvidence& look, const Shading& expected,
   ShadingMatrix information = look.normal;
   information.diagonal() += variance.cwiseInverse();
   ShadingEstimate out;
-  out.covariance = Eigen::LLT<ShadingMatrix>(information).solve(ShadingMatrix::Identity());
+  out.covariance = inverse_of(information);
   out.shading = expected + out.covariance * (look.right - look.normal * expected);
   out.unevenness = seen_variance.head<kShading - 1>().mean();
   return out;
