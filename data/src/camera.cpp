@@ -119,12 +119,14 @@ Eigen::Matrix<double, 2, 3> Camera::jacobian_px_per_m(const Eigen::Vector3d& poi
   if (projection == Projection::orthographic)
     return focal.asDiagonal() * camera_from_table.topRows<2>();
   const Eigen::Vector3d c = camera_from_table * point_m + camera_from_table_m;
-  const double u = c.x() / c.z(), v = c.y() / c.z();
-  Eigen::Matrix<double, 2, 3> ideal_from_camera;
-  ideal_from_camera << 1.0 / c.z(), 0.0, -u / c.z(),  //
-      0.0, 1.0 / c.z(), -v / c.z();
-  return focal.asDiagonal() * distort(distortion, u, v).derivative * ideal_from_camera *
-         camera_from_table;
+  const double inverse = 1.0 / c.z();
+  const Eigen::Vector2d ideal = inverse * c.head<2>();
+  const Eigen::Matrix<double, 2, 3> ideal_from_table =
+      inverse * (camera_from_table.topRows<2>() - ideal * camera_from_table.row(2));
+  if (!distorts()) return focal.asDiagonal() * ideal_from_table;
+  const Eigen::Matrix2d bent =
+      focal.asDiagonal() * distort(distortion, ideal.x(), ideal.y()).derivative;
+  return bent * ideal_from_table;
 }
 
 Eigen::Vector3d Camera::position_m() const {

@@ -126,7 +126,7 @@ OutlinePoint outline_point(const Camera& camera, Edge edge, const Eigen::Vector3
   const Eigen::Vector2d t = J * tangent;
   Eigen::Vector2d normal = Eigen::Vector2d(t.y(), -t.x()).normalized();
   if (normal.dot(J * outwards) < 0.0) normal = -normal;
-  return {edge, at, camera.image_from_table(at), normal, 0.0, true};
+  return {edge, at, camera.image_from_table(at), normal, 0.0, true, J};
 }
 
 // Samples [from, to] of a circle evenly along its image.
@@ -136,13 +136,14 @@ void sample_arc(const View& view, const Camera& camera, const Circle& circle, do
       2.0 * kPi / 48.0;  // the speed along an ellipse varies little over 7.5 deg
   constexpr int kMost = 64;
   const int chords = std::clamp(static_cast<int>(std::ceil((to - from) / kChord)), 1, kMost - 1);
-  const auto at = [&](double angle) -> Eigen::Vector3d {
-    return view.centre + circle.height * view.axis + circle.radius * view.radial(angle);
-  };
+  const Eigen::Vector3d middle = view.centre + circle.height * view.axis;
   std::array<double, kMost> length{};
-  Eigen::Vector2d before = camera.image_from_table(at(from));
+  Eigen::Vector3d n = view.radial(from);
+  Eigen::Vector2d before = camera.image_from_table<double>(middle + circle.radius * n);
+  const double turn = (to - from) / chords, cosine = std::cos(turn), sine = std::sin(turn);
   for (int i = 1; i <= chords; ++i) {
-    const Eigen::Vector2d here = camera.image_from_table(at(from + (to - from) * i / chords));
+    n = cosine * n + sine * view.axis.cross(n);
+    const Eigen::Vector2d here = camera.image_from_table<double>(middle + circle.radius * n);
     length[i] = length[i - 1] + (here - before).norm();
     before = here;
   }
@@ -154,8 +155,8 @@ void sample_arc(const View& view, const Camera& camera, const Circle& circle, do
     while (chord < chords && length[chord] < target) ++chord;
     const double part = (target - length[chord - 1]) / (length[chord] - length[chord - 1]);
     const double angle = from + (to - from) * (chord - 1 + part) / chords;
-    const Eigen::Vector3d n = view.radial(angle);
-    out.push_back(outline_point(camera, circle.edge, at(angle), view.axis.cross(n),
+    n = view.radial(angle);
+    out.push_back(outline_point(camera, circle.edge, middle + circle.radius * n, view.axis.cross(n),
                                 outwards(view, circle.edge, n)));
     out.back().arc_px = total / points;
     out.back().silhouette = silhouette;

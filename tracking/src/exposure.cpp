@@ -23,18 +23,42 @@ int family_of(Edge edge, bool silhouette) {
   return silhouette ? (bore ? 1 : 0) : 2 + static_cast<int>(edge);
 }
 
+// An outline at one moment of the exposure.
+struct Moved {
+  static constexpr double kStepPx = 1.5;
+  static constexpr double kApartPx = 2.0 * kStepPx;  // farther from each other than neighbours are
+  std::vector<data::OutlinePoint> points;
+  std::vector<size_t> ends;  // of the arc each point is on
+
+  Moved(const data::Body& body, const data::Camera& camera, const Pose& pose)
+      : points(data::visible_outline(body, pose, camera, kStepPx)), ends(points.size()) {
+    for (size_t i = points.size(); i-- > 0;) {
+      const bool goes_on =
+          i + 1 < points.size() && (points[i + 1].image_px - points[i].image_px).norm() < kApartPx;
+      ends[i] = goes_on ? ends[i + 1] : i + 1;
+    }
+  }
+};
+
 // Where an outline crosses the normal of a sample: from its point nearest to that line, along the
 // tangent there. Nothing if it does not cross it on this side or does so at a grazing angle.
-std::optional<double> crossing_px(const std::vector<data::OutlinePoint>& outline,
-                                  const OutlineSample& sample) {
+std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sample) {
   constexpr double kLeastCosine = 0.5, kFarthestPx = 3.0;
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   const int family = family_of(sample.edge, sample.silhouette);
   const data::OutlinePoint* nearest = nullptr;
   double least = kFarthestPx;
-  for (const auto& point : outline) {
+  for (size_t i = 0; i < outline.points.size();) {
+    const data::OutlinePoint& point = outline.points[i];
     const double aside = std::abs(along.dot(point.image_px - sample.image_px));
-    if (aside >= least || point.normal_px.dot(sample.normal_px) < kLeastCosine ||
+    if (aside >= least) {
+      // Along its arc no sooner than that many points on can it be nearer.
+      const auto far = static_cast<size_t>((aside - least) / Moved::kApartPx);
+      i = std::min(outline.ends[i], i + 1 + far);
+      continue;
+    }
+    ++i;
+    if (point.normal_px.dot(sample.normal_px) < kLeastCosine ||
         family_of(point.edge, point.silhouette) != family)
       continue;
     least = aside;
@@ -103,13 +127,12 @@ std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
                              const PoseMotion& motion, const ExposureMotion& exposure,
                              const Pose& middle, const std::vector<OutlineSample>& outline,
                              int parts) {
-  constexpr double kStepPx = 1.5;
   parts = std::clamp(parts, 1, Sweep::kMost);
   std::vector<Sweep> sweeps(outline.size());
   std::vector<bool> lost(outline.size(), false);
   for (int k = 0; k < parts; ++k) {
     const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));
-    const auto moved = data::visible_outline(body, pose, camera, kStepPx);
+    const Moved moved(body, camera, pose);
     for (size_t i = 0; i < outline.size(); ++i) {
       if (lost[i]) continue;
       const auto crossing = crossing_px(moved, outline[i]);

@@ -192,7 +192,7 @@ std::vector<OutlineSample> outline_samples(const data::Body& body, const data::P
   std::vector<OutlineSample> samples;
   samples.reserve(outline.size());
   for (const auto& point : outline) {
-    const Eigen::Matrix<double, 2, 3> J = camera.jacobian_px_per_m(point.table_m);
+    const Eigen::Matrix<double, 2, 3>& J = point.px_per_m;
     Reach reach{point, J};
     limit_reach(shape, reach);
     OutlineSample sample{point.edge,   point.silhouette, point.image_px, point.normal_px,
