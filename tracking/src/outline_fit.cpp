@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "colour_window.hpp"
+#include "in_halves.hpp"
 #include "outline_refine.hpp"
 #include "pose_start.hpp"
 #include "spin_mark.hpp"
@@ -189,22 +190,25 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
                                bool mirrors) {
   constexpr size_t kFitted = 3;
   const Scenery far = scenery.blurred(kFarBlurPx), near = scenery.blurred(kNearBlurPx);
-  std::vector<std::pair<double, data::Pose<>>> drawn;
-  for (const auto& start : starts) {
-    auto refined = refine(far, start, kFar);
-    if (refined) refined = refine(near, refined->pose, kNear);
-    if (refined) drawn.emplace_back(outline_score(*refined), refined->pose);
-  }
-  std::sort(drawn.begin(), drawn.end(),
+  std::vector<std::optional<Refined>> drawn(starts.size());
+  in_halves(starts.size(), [&](size_t i) {
+    drawn[i] = refine(far, starts[i], kFar);
+    if (drawn[i]) drawn[i] = refine(near, drawn[i]->pose, kNear);
+  });
+  std::vector<std::pair<double, data::Pose<>>> likely;
+  for (const auto& refined : drawn)
+    if (refined) likely.emplace_back(outline_score(*refined), refined->pose);
+  std::sort(likely.begin(), likely.end(),
             [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::optional<Fitted> best;
-  const auto consider = [&](const data::Pose<>& pose) {
-    best = better(std::move(best), fit_from(scenery, near, pose));
-  };
-  for (size_t i = 0; i < std::min(kFitted, drawn.size()); ++i) {
-    consider(drawn[i].second);
-    if (mirrors) consider(mirrored(scenery.camera, scenery.motion, drawn[i].second));
+  std::vector<data::Pose<>> chosen;
+  for (size_t i = 0; i < std::min(kFitted, likely.size()); ++i) {
+    chosen.push_back(likely[i].second);
+    if (mirrors) chosen.push_back(mirrored(scenery.camera, scenery.motion, likely[i].second));
   }
+  std::vector<std::optional<Fitted>> fits(chosen.size());
+  in_halves(chosen.size(), [&](size_t i) { fits[i] = fit_from(scenery, near, chosen[i]); });
+  std::optional<Fitted> best;
+  for (auto& fit : fits) best = better(std::move(best), std::move(fit));
   return best;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "in_halves.hpp"
 #include "outline_samples.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -34,16 +35,20 @@ struct Candidate {
 };
 
 // Attitudes about `step_rad` apart, from lying flat to nearly upright.
-std::vector<std::pair<double, double>> attitudes(double step_rad) {
+std::vector<data::Pose<>> attitudes(double step_rad) {
   constexpr double kUpright = 1.5;
-  std::vector<std::pair<double, double>> all{{0.0, 0.0}};
+  std::vector<data::Pose<>> all(1);
+  const auto add = [&](double theta_rad, double phi_rad) {
+    all.emplace_back();
+    all.back().theta_rad = theta_rad;
+    all.back().phi_rad = phi_rad;
+  };
   const int rings = static_cast<int>(std::lround(kUpright / step_rad));
   for (int ring = 1; ring <= rings; ++ring) {
     const double theta = kUpright * ring / rings;
     const int around =
         std::max(4, static_cast<int>(std::lround(kTurn * std::sin(theta) / step_rad)));
-    for (int i = 0; i < around; ++i)
-      all.emplace_back(theta, kTurn * (i + 0.5 * (ring % 2)) / around);
+    for (int i = 0; i < around; ++i) add(theta, kTurn * (i + 0.5 * (ring % 2)) / around);
   }
   return all;
 }
@@ -88,31 +93,62 @@ cv::Mat silhouette_scores(const Search& search, const std::vector<CellPoint>& ce
   return sum / static_cast<double>(std::max<size_t>(1, cells.size()));
 }
 
+// The places of its centre where the silhouette of an attitude lies on edges best.
+std::vector<Candidate> best_places(const Search& search, const data::Pose<>& attitude,
+                                   const Eigen::Vector2d& about_px) {
+  constexpr int kPerAttitude = 2;
+  std::vector<Candidate> found;
+  const auto middle = on_ray(search.camera, search.motion, attitude, about_px);
+  if (!middle) return found;
+  cv::Mat scores = silhouette_scores(search, silhouette_cells(search, *middle));
+  for (int k = 0; k < kPerAttitude; ++k) {
+    double best = 0.0;
+    cv::Point at;
+    cv::minMaxLoc(scores, nullptr, &best, nullptr, &at);
+    const Eigen::Vector2d centre(search.map.window().x + (at.x + 0.5) * search.map.cell_px(),
+                                 search.map.window().y + (at.y + 0.5) * search.map.cell_px());
+    if (const auto placed = on_ray(search.camera, search.motion, attitude, centre))
+      found.push_back({best, *placed, centre});
+    const cv::Rect around(at.x - 3, at.y - 3, 7, 7);
+    scores(around & cv::Rect({}, scores.size())).setTo(0.0);
+  }
+  return found;
+}
+
+std::vector<Candidate> joined(const std::vector<std::vector<Candidate>>& parts) {
+  std::vector<Candidate> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 // On the floor the silhouette of an attitude hardly depends on where it is: one template each.
 std::vector<Candidate> seek_on_floor(const Search& search, const Eigen::Vector2d& about_px) {
   constexpr double kAttitudeStep = 0.21;
-  constexpr int kPerAttitude = 2;
+  const std::vector<data::Pose<>> all =
+      search.motion.rotation() < 0 ? std::vector{data::Pose<>()} : attitudes(kAttitudeStep);
+  std::vector<std::vector<Candidate>> found(all.size());
+  in_halves(all.size(), [&](size_t i) { found[i] = best_places(search, all[i], about_px); });
+  return joined(found);
+}
+
+// The attitudes of an axis through the pivot with the centre so far along it.
+std::vector<Candidate> seek_at_distance(const Search& search, const Eigen::Vector3d& pivot_m,
+                                        double along_m, double cell_m) {
   std::vector<Candidate> found;
-  for (const auto& [theta, phi] : search.motion.rotation() < 0
-                                      ? std::vector<std::pair<double, double>>{{0.0, 0.0}}
-                                      : attitudes(kAttitudeStep)) {
-    data::Pose<> pose;
-    pose.theta_rad = theta;
-    pose.phi_rad = phi;
-    const auto middle = on_ray(search.camera, search.motion, pose, about_px);
-    if (!middle) continue;
-    cv::Mat scores = silhouette_scores(search, silhouette_cells(search, *middle));
-    for (int k = 0; k < kPerAttitude; ++k) {
-      double best = 0.0;
-      cv::Point at;
-      cv::minMaxLoc(scores, nullptr, &best, nullptr, &at);
-      const Eigen::Vector2d centre(search.map.window().x + (at.x + 0.5) * search.map.cell_px(),
-                                   search.map.window().y + (at.y + 0.5) * search.map.cell_px());
-      if (const auto placed = on_ray(search.camera, search.motion, pose, centre))
-        found.push_back({best, *placed, centre});
-      const cv::Rect around(at.x - 3, at.y - 3, 7, 7);
-      scores(around & cv::Rect({}, scores.size())).setTo(0.0);
-    }
+  const cv::Rect all({}, search.map.strength(0).size());
+  for (data::Pose<> pose : attitudes(std::clamp(1.5 * cell_m / along_m, 0.06, 0.21))) {
+    pose.centre_m = pivot_m + along_m * axis_of(pose);
+    const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
+    const cv::Point cell(
+        static_cast<int>((centre.x() - search.map.window().x) / search.map.cell_px()),
+        static_cast<int>((centre.y() - search.map.window().y) / search.map.cell_px()));
+    if (!all.contains(cell)) continue;
+    const std::vector<CellPoint> cells = silhouette_cells(search, pose);
+    double sum = 0.0;
+    for (const CellPoint& c : cells)
+      if (const cv::Point at = cell + cv::Point(c.x, c.y); all.contains(at))
+        sum += search.map.strength(c.direction).at<float>(at);
+    found.push_back({sum / static_cast<double>(std::max<size_t>(1, cells.size())), pose, centre});
   }
   return found;
 }
@@ -120,31 +156,16 @@ std::vector<Candidate> seek_on_floor(const Search& search, const Eigen::Vector2d
 // An axis through the pivot: the attitude and the distance along the axis place everything.
 std::vector<Candidate> seek_about_pivot(const Search& search, const Eigen::Vector3d& pivot_m) {
   constexpr double kFarthest = 6.0;  // radii from the pivot
-  std::vector<Candidate> found;
   const double cell_m = search.map.cell_px() * search.body.radius_m / search.radius_px;
-  const cv::Rect all({}, search.map.strength(0).size());
+  std::vector<double> distances_m;
   for (double along = 0.1 * search.body.radius_m; along < kFarthest * search.body.radius_m;
-       along += std::max(2.0 * cell_m, 0.1 * along)) {
-    const double step = std::clamp(1.5 * cell_m / along, 0.06, 0.21);
-    for (const auto& [theta, phi] : attitudes(step)) {
-      data::Pose<> pose;
-      pose.theta_rad = theta;
-      pose.phi_rad = phi;
-      pose.centre_m = pivot_m + along * data::symmetry_axis(theta, phi);
-      const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
-      const cv::Point cell(
-          static_cast<int>((centre.x() - search.map.window().x) / search.map.cell_px()),
-          static_cast<int>((centre.y() - search.map.window().y) / search.map.cell_px()));
-      if (!all.contains(cell)) continue;
-      const std::vector<CellPoint> cells = silhouette_cells(search, pose);
-      double sum = 0.0;
-      for (const CellPoint& c : cells)
-        if (const cv::Point at = cell + cv::Point(c.x, c.y); all.contains(at))
-          sum += search.map.strength(c.direction).at<float>(at);
-      found.push_back({sum / static_cast<double>(std::max<size_t>(1, cells.size())), pose, centre});
-    }
-  }
-  return found;
+       along += std::max(2.0 * cell_m, 0.1 * along))
+    distances_m.push_back(along);
+  std::vector<std::vector<Candidate>> found(distances_m.size());
+  in_halves(distances_m.size(), [&](size_t i) {
+    found[i] = seek_at_distance(search, pivot_m, distances_m[i], cell_m);
+  });
+  return joined(found);
 }
 
 bool alike(const Candidate& a, const Candidate& b, double radius_px) {
