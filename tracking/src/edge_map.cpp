@@ -50,8 +50,21 @@ void raise(float& value, float to) {
 }  // namespace
 
 int EdgeMap::direction_of(double normal_x, double normal_y) {
-  const double turn = std::atan2(normal_y, normal_x) / kPi * kDirections;
-  return ((static_cast<int>(std::lround(turn)) % kDirections) + kDirections) % kDirections;
+  static const auto directions = [] {
+    std::array<std::array<double, 2>, kDirections> units;
+    for (size_t k = 0; k < kDirections; ++k) {
+      const double angle = kPi * static_cast<double>(k) / kDirections;
+      units[k] = {std::cos(angle), std::sin(angle)};
+    }
+    return units;
+  }();
+  int nearest = 0;
+  double most = -1.0;
+  for (size_t k = 0; k < kDirections; ++k) {
+    const double along = std::abs(directions[k][0] * normal_x + directions[k][1] * normal_y);
+    if (along > most) most = along, nearest = static_cast<int>(k);
+  }
+  return nearest;
 }
 
 EdgeMap::EdgeMap(const cv::Mat& luma, const cv::Mat& plate, const cv::Rect& window, int cell_px)

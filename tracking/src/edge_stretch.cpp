@@ -438,7 +438,9 @@ void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, con
 
 StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known) {
   std::vector<Working> all(profiles.size());
-  std::vector<Columns> columns(profiles.size());
+  // A megabyte: kept, not cleared and given back with every look at a picture.
+  thread_local std::vector<Columns> columns;
+  if (columns.size() < profiles.size()) columns.resize(profiles.size());
   for (size_t i = 0; i < profiles.size(); ++i) {
     columns_of(profiles[i], columns[i]);
     all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
