@@ -2,6 +2,7 @@
 #include "trochoid/model/dormand_prince_tableau.hpp"
 #include "trochoid/model/dual.hpp"
 #include "trochoid/model/isa.hpp"
+#include "trochoid/model/widely.hpp"
 
 /// Explicit Runge-Kutta integration of order 8(5,3) with dense output of order 7 (DOP853,
 /// [HairerNorsettWanner1993] II.5 and II.6), templated on the system and its scalar. No allocation.
@@ -155,7 +156,8 @@ class DormandPrince {
       extra_stage<15>();
     }
     for (int c = 0; c < kN; ++c) {
-      if (((components & ~dense_ready_) >> c & 1u) != 0) coefficients(c);
+      if (((components & ~dense_ready_) >> c & 1u) != 0)
+        widely<S>([&]() TROCHOID_LAMBDA_INLINE { coefficients(c); });
     }
     dense_ready_ |= components;
   }
@@ -224,7 +226,7 @@ class DormandPrince {
   TROCHOID_INLINE void run_stages(double h) {
     if constexpr (Row < dop853::kStages) {
       Y y;
-      stage_state<Row>(h, y);
+      widely<S>([&]() TROCHOID_LAMBDA_INLINE { stage_state<Row>(h, y); });
       evaluate(t_ + dop853::kC[Row] * h, y, k_[Row]);
       run_stages<Row + 1>(h);
     }
@@ -232,7 +234,7 @@ class DormandPrince {
   /// Stages, new state in y_next_ and the scaled error of a step h.
   [[nodiscard]] double attempt(double h) {
     run_stages<1>(h);
-    stage_state<dop853::kStages>(h, y_next_);
+    widely<S>([&]() TROCHOID_LAMBDA_INLINE { stage_state<dop853::kStages>(h, y_next_); });
     return error_norm(h);
   }
 
@@ -326,11 +328,13 @@ class DormandPrince {
   template <int Row>
   void extra_stage() {
     Y y;
-    for (int c = 0; c < kN; ++c) {
-      S sum = dop853::kA[Row][0] * first_stage_[c];
-      add_stages<Row, 1>(sum, c);
-      y[c] = y_previous_[c] + sum * step_;
-    }
+    widely<S>([&]() TROCHOID_LAMBDA_INLINE {
+      for (int c = 0; c < kN; ++c) {
+        S sum = dop853::kA[Row][0] * first_stage_[c];
+        add_stages<Row, 1>(sum, c);
+        y[c] = y_previous_[c] + sum * step_;
+      }
+    });
     evaluate(t_previous_ + dop853::kC[Row] * step_, y, k_[Row]);
   }
   template <int Degree, int J = 1>
@@ -346,7 +350,7 @@ class DormandPrince {
     add_dense<Degree>(sum, c);
     r_[3 + Degree][c] = sum * step_;
   }
-  void coefficients(int c) {
+  TROCHOID_INLINE void coefficients(int c) {
     const S rise = y_[c] - y_previous_[c];
     const S begin = first_stage_[c] * step_, end = k_[dop853::kStages][c] * step_;
     r_[0][c] = rise;

@@ -1,5 +1,6 @@
 #pragma once
 #include "trochoid/model/dissipation.hpp"
+#include "trochoid/model/widely.hpp"
 
 /// Disc or ring of finite thickness rolling without slip (M4). Equation numbers of
 /// model/theory/rolling.md; symbols in rim_body.hpp.
@@ -78,6 +79,10 @@ struct Rolling {
   }
 
   void derivative(double, const State<S, kStates>& y, State<S, kStates>& dy) const {
+    widely<S>([&]() TROCHOID_LAMBDA_INLINE { rates(y, dy); });
+  }
+
+  TROCHOID_INLINE void rates(const State<S, kStates>& y, State<S, kStates>& dy) const {
     const NodeMotion<S> q = motion(y);
     const RimAcceleration<S> a = acceleration(q);
     const S cos_phi = cos(y[Rim::phi]), sin_phi = sin(y[Rim::phi]);

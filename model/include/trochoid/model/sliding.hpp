@@ -108,6 +108,10 @@ struct Sliding {
   }
 
   void derivative(double, const State<S, kStates>& y, State<S, kStates>& dy) const {
+    widely<S>([&]() TROCHOID_LAMBDA_INLINE { rates(y, dy); });
+  }
+
+  TROCHOID_INLINE void rates(const State<S, kStates>& y, State<S, kStates>& dy) const {
     const NodeMotion<S> q = motion(y);
     const Contact r = contact(q);
     dy[Rim::phi] = q.w2 / q.at.s;
