@@ -63,7 +63,7 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
     Problem between = for_predictor(problem, *bridge);
     apply(start, between);
     const Solution solution =
-        solve(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
+        seek(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
     if (!solution.usable) continue;
     between.set_base(solution.u);
     start = start_from(between, start.path);
@@ -143,10 +143,10 @@ Found search_path(const Problem& problem, const Quest& quest) {
     if (!rolls || easier.partial->samples == 0) continue;
     easier.base[0] = easier.partial->values;
     const int window = easier.partial->samples;
-    // An extra try: it may end in a neighbouring valley, so the search goes on as without it.
+    // An extra try: unless it explains all there is the search goes on as without it.
     const double work = *problem.work;
     for (const Start& start : with_frictions(problem, start_from(easier, "rolls_first"), window))
-      if (take(grow(problem, start, window, kSlowly)) && easier.rough) return best;
+      if (take(grow(problem, start, window, kSlowly))) return best;
     *problem.work = work;
   }
   if (!searched && !exhausted(problem, best)) take(search(problem, quest.starter));

@@ -39,7 +39,7 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
   for (int round = 0; round < 4; ++round) {
     const double change = reweight(problem, solution.u, true);
     if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
-    Solution next = solve(problem, solution.u, {.iterations = 20, .function_tolerance = 1e-7});
+    Solution next = seek(problem, solution.u, {.iterations = 20, .function_tolerance = 1e-7});
     if (!next.usable) break;
     next.converged = next.converged || solution.converged;
     solution = std::move(next);
@@ -58,7 +58,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     problem.tolerance *= 1e-2;
     const double step = 6.0 * *problem.work;  // two runs were made; this is about one's derivatives
     const int steps = static_cast<int>(std::clamp(kMostWork / step, kFewest, kMostSteps));
-    Solution finer = solve(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
+    Solution finer = seek(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
     if (!finer.usable) break;
     finer.converged = finer.converged || solution.converged;
     solution = std::move(finer);
@@ -71,7 +71,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
 
 // From where the search ended to the minimum; the values are then in problem.base as well.
 Solution polish(Problem& problem, Solution solution, const FitOptions& options, data::Fit& fit) {
-  if (hold_vanished(problem, solution.u)) solution = solve(problem, problem.start());
+  if (hold_vanished(problem, solution.u)) solution = seek(problem, problem.start());
   solution = settle_weights(problem, std::move(solution), options.tolerance);
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);
   problem.set_base(solution.u);

@@ -88,7 +88,7 @@ Found hop(const Problem& problem, Found best, int misses) {
       from = u;
     }
     if (from.size() == 0) break;
-    Found found = judged(problem, solve(problem, from, {.iterations = 20}), best.path);
+    Found found = judged(problem, seek(problem, from, {.iterations = 20}), best.path);
     // A ripple of less than 1 in chi-square moves nothing by more than its error bar.
     const double gain = best.solution.chi2 - found.solution.chi2;
     missed = found.solution.usable && gain > 1.0 ? 0 : missed + 1;

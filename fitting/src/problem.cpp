@@ -139,6 +139,11 @@ std::string Shortfalls::words() const {
     all += by_outcome[i];
     if (by_outcome[i] > by_outcome[commonest]) commonest = i;
   }
+  if (departed > all)
+    return fmt::format(
+        "the model does not move as the track does: of {} starts none explains more than a part of "
+        "it",
+        departed.load());
   if (all == 0)
     return "no start could be made from the track: is it too short, or does nothing in it move as "
            "the model does?";

@@ -31,9 +31,11 @@ struct Transform {
   [[nodiscard]] double inverse(double value) const;
 };
 
-/// Why predictions ended before the track did, counted while searching.
+/// Why predictions ended before the track did, and starts were not followed to its end, counted
+/// while searching.
 struct Shortfalls {
   std::array<std::atomic<int>, 9> by_outcome{};  ///< in the order of model::Outcome
+  std::atomic<int> departed{0};  ///< starts whose path left the track's within a part of it
   void count(model::Outcome outcome) { ++by_outcome[static_cast<std::size_t>(outcome)]; }
   /// A sentence; which reason was the commonest.
   [[nodiscard]] std::string words() const;
@@ -134,6 +136,12 @@ struct SolveOptions {
 /// Levenberg-Marquardt (Ceres, dense QR) from u.
 [[nodiscard]] Solution solve(const Problem& problem, const Eigen::VectorXd& u,
                              const SolveOptions& options = {});
+
+/// The minimiser for any model. A body on its rim has long bent valleys with steep walls, and its
+/// derivatives cost many plain predictions: there Levenberg-Marquardt with geodesic acceleration,
+/// which needs a quarter of the derivatives and stops at no wall; elsewhere solve().
+[[nodiscard]] Solution seek(const Problem& problem, const Eigen::VectorXd& u,
+                            const SolveOptions& options = {});
 
 /// Sets noise_scale (per channel, if `rescale`) and robust weights from the residuals at u.
 /// Points within 3.5 scaled sigma keep weight 1, so that clean Gaussian data are left alone.

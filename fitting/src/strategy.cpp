@@ -145,7 +145,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     Problem part = windowed(current, window);
     // The first window settles which valley it is; the next ones only follow it.
     const bool first = before == 0;
-    const Solution solution = solve(
+    const Solution solution = seek(
         part, part.start(),
         {.iterations = first ? 60 : 25, .function_tolerance = first && window < all ? 1e-4 : 1e-3});
     const double reduced = solution.chi2 / free_rows(part);
@@ -167,7 +167,10 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
       valleys->push_back(solution.chi2);
     }
     // A window that is far from explained will not lead anywhere.
-    if (window < all && reduced > 30.0 * chi2_gate(part.rows())) return {};
+    if (window < all && reduced > 30.0 * chi2_gate(part.rows())) {
+      if (problem.shortfalls) ++problem.shortfalls->departed;
+      return {};
+    }
     if (problem.partial && window > problem.partial->samples && reduced < chi2_gate(part.rows()))
       *problem.partial = {window, part.base[0]};
     if (window == all) break;
@@ -177,7 +180,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
   }
   if (problem.rough)
     return judged(problem,
-                  solve(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3}),
+                  seek(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3}),
                   start.path);
   return judged(problem, solve_to_the_end(current), start.path);
 }

@@ -1,0 +1,99 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "problem.hpp"
+#include "valley.hpp"
+
+// The minimiser and what is said of a valley's bends, on models whose valley is known.
+namespace trochoid::fitting {
+namespace {
+
+// Two parameters seen as x = across, y = steepness (along - across^2): a valley like Rosenbrock's.
+// The name of the first makes it a body on its rim.
+class Bent : public model::Predictor {
+ public:
+  explicit Bent(double steepness) : steepness_(steepness) {}
+  [[nodiscard]] const std::string& model_name() const override { return name_; }
+  [[nodiscard]] const std::vector<model::ParameterInfo>& parameters() const override {
+    return infos_;
+  }
+  [[nodiscard]] model::Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                          const model::PredictRequest& request) const override {
+    model::Prediction out;
+    const auto rows = static_cast<Eigen::Index>(2 * request.t_s.size());
+    out.values.resize(rows);
+    out.jacobian.setZero(rows, static_cast<Eigen::Index>(request.derivatives.size()));
+    derivatives_ += request.derivatives.empty() ? 0 : 1;
+    for (Eigen::Index row = 0; row < rows; row += 2) {
+      out.values[row] = values[0];
+      out.values[row + 1] = steepness_ * (values[1] - values[0] * values[0]);
+      for (std::size_t c = 0; c < request.derivatives.size(); ++c) {
+        const auto column = static_cast<Eigen::Index>(c);
+        const bool first = request.derivatives[c] == 0;
+        out.jacobian(row, column) = first ? 1.0 : 0.0;
+        out.jacobian(row + 1, column) = steepness_ * (first ? -2.0 * values[0] : 1.0);
+      }
+    }
+    return out;
+  }
+  [[nodiscard]] int derivatives() const { return derivatives_; }
+
+ private:
+  double steepness_;
+  std::string name_ = "bent";
+  std::vector<model::ParameterInfo> infos_{parameter("w1_rad_s"), parameter("w2_rad_s")};
+  mutable int derivatives_ = 0;
+
+  static model::ParameterInfo parameter(const char* name) {
+    return {name, "rad/s", model::ParameterInfo::Role::dynamics, -INFINITY, INFINITY, false, 0.0,
+            true, ""};
+  }
+};
+
+// Measured as (1, 0), a sigma more or less: the minimum is at (1, 1).
+Problem problem_of(const Bent& bent, double sigma) {
+  data::Track track;
+  for (int i = 0; i < 12; ++i) {
+    data::TrackSample sample;
+    sample.t_s = 0.1 * i;
+    sample.centre_m = Eigen::Vector2d(1.0, 0.0).array() + (i % 2 == 0 ? sigma : -sigma);
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
+    track.samples.push_back(sample);
+  }
+  return make_problem(bent, {make_arc(track, 0, 12, {}, false)}, {});
+}
+
+// Steps of plain Levenberg-Marquardt are as short as the valley is narrow.
+TEST(Seek, FollowsABentValleyToItsEnd) {
+  constexpr double kSigma = 1.0, kRows = 24.0;
+  const Bent bent(300.0);
+  const Problem problem = problem_of(bent, kSigma);
+  const Eigen::Vector2d far(-3.0, 9.0);
+  const Solution found = seek(problem, far);
+  EXPECT_NEAR(found.u[0], 1.0, 0.01 * kSigma);
+  EXPECT_NEAR(found.u[1], 1.0, 0.02 * kSigma);
+  EXPECT_NEAR(found.chi2, kRows, 0.01);
+  EXPECT_GT(solve(problem, far).chi2, kRows + 10.0);
+}
+
+TEST(Seek, StaysWhereNothingIsToBeGained) {
+  const Bent bent(300.0);
+  const Solution solution = seek(problem_of(bent, 1.0), Eigen::Vector2d(1.0, 1.0));
+  EXPECT_TRUE(solution.usable && solution.converged);
+  EXPECT_EQ(bent.derivatives(), 1);
+}
+
+TEST(Seek, HeedsWhatIsKnownBeforehand) {
+  const Bent bent(1.0);
+  Problem problem = problem_of(bent, 1.0);
+  constexpr double kKnown = 3.0, kSigma = 0.1;
+  problem.free[0].prior = data::Prior{kKnown, kSigma};
+  const Solution solution = seek(problem, Eigen::Vector2d(0.0, 0.0));
+  const Solution plain = solve(problem, Eigen::Vector2d(0.0, 0.0));
+  EXPECT_NEAR(solution.u[0], plain.u[0], 1e-3 * kSigma);
+  EXPECT_NEAR(solution.chi2, plain.chi2, 1e-4);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
