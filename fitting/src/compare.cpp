@@ -88,6 +88,36 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
   return resort ? terms : std::set<int>{};
 }
 
+// Everything but the last resort was added before it was known what that explains: terms the data
+// do not need any more are left out again, one at a time, as long as that costs no evidence.
+void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
+               std::size_t current, std::vector<Rung>& rungs) {
+  FitOptions one = options;
+  one.threads = 1;
+  while (rungs[current].fitted && rungs[current].fit.converged) {
+    const std::size_t first = rungs.size();
+    for (const int index : rungs[current].terms) {
+      if (ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
+      std::set<int> terms = rungs[current].terms;
+      terms.erase(index);
+      const bool known = std::any_of(rungs.begin(), rungs.end(),
+                                     [&](const Rung& rung) { return rung.terms == terms; });
+      if (!known) rungs.push_back(rung_with(ladder, terms));
+    }
+    in_parallel(static_cast<int>(rungs.size() - first), options.threads, [&](int i) {
+      fit_smaller_rung(tracks, rungs[current], one, rungs[first + static_cast<std::size_t>(i)]);
+    });
+    std::size_t best = current;
+    for (std::size_t i = first; i < rungs.size(); ++i)
+      if (rungs[i].fitted && rungs[i].fit.converged &&
+          rungs[i].bic < rungs[current].bic + kStrong &&
+          (best == current || rungs[i].bic < rungs[best].bic))
+        best = i;
+    if (best == current) return;
+    current = best;
+  }
+}
+
 // The plainest model and, one more term at a time, all extensions of the best so far.
 std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
                         const FitOptions& given) {
@@ -98,7 +128,8 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   options.model.clear();
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
-  rungs.reserve(2 + (kMostTerms + 1) * ladder.terms.size());
+  const std::size_t terms = ladder.terms.size();
+  rungs.reserve(2 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options, rungs[0]);
   std::size_t current = 0;
@@ -120,7 +151,10 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   // Where nothing leads anywhere, the last resort alone does not either.
   if (rungs[current].fit.converged) {
     const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
-    if (last != current && explains(last)) return rungs;
+    if (last != current && explains(last)) {
+      step_down(ladder, tracks, options, last, rungs);
+      return rungs;
+    }
   }
   // What helped a model that explains nothing tells nothing.
   const std::set<int> helped =
@@ -128,6 +162,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
     fit_rung(tracks, nullptr, nullptr, options, rungs.back());
+    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
   }
   return rungs;
 }

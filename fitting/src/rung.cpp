@@ -172,6 +172,16 @@ void keep_better(data::Fit fit, Rung& rung) {
   if (!usable(rung.fit) || (usable(fit) && fit.chi2 < rung.fit.chi2)) rung.fit = std::move(fit);
 }
 
+// Scores and reason, once the fit is made.
+void conclude(Rung& rung) {
+  if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
+  if (!rung.fitted && rung.reason.empty()) rung.reason = rung.fit.reason;
+  rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
+  if (!rung.fitted) return;
+  rung.aicc = rung.fit.aicc;
+  rung.bic = rung.fit.bic;
+}
+
 }  // namespace
 
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
@@ -204,12 +214,29 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
     rung.reason = error.what();
   }
-  if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
-  if (!rung.fitted && rung.reason.empty()) rung.reason = rung.fit.reason;
-  rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
-  if (!rung.fitted) return;
-  rung.aicc = rung.fit.aicc;
-  rung.bic = rung.fit.bic;
+  conclude(rung);
+}
+
+void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
+                      const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  own.start = values_of(above.fit);
+  if (!own.start.empty()) own.strategy = "single";
+  try {
+    if (above.softness_fitted && !own.start.empty()) {
+      fit_softly(tracks, own, rung, &above);
+    } else {
+      rung.scene.model.slip_regularisation_m_s = above.scene.model.slip_regularisation_m_s;
+      rung.fit = fit(tracks, rung.scene, own);
+    }
+    rung.fitted = usable(rung.fit);
+    if (rung.fitted && rung.fit.converged)
+      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
+  } catch (const NumericalError& error) {
+    rung.fitted = usable(rung.fit);
+    rung.reason = error.what();
+  }
+  conclude(rung);
 }
 
 }  // namespace trochoid::fitting

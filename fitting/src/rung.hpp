@@ -24,7 +24,8 @@ struct Rung {
   data::Scene scene;
   data::Fit fit;
   bool fitted = false;
-  std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
+  bool softness_fitted = false;  ///< how friction sets in was fitted too, and stands in the scene
+  std::string reason;            ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
   double aicc = std::numeric_limits<double>::infinity();
@@ -42,5 +43,9 @@ struct Rung {
 /// @param below  the fitted rung this one extends by one term; null for the plainest.
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung);
+
+/// Fits a rung that lacks a term of `above`, from the solution of that.
+void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
+                      const FitOptions& options, Rung& rung);
 
 }  // namespace trochoid::fitting

@@ -101,20 +101,24 @@ bool softness_is_open(const Rung& rung) {
   return rung.scene.model.name == "sliding" && !rung.scene.model.slip_regularisation_m_s;
 }
 
-void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung,
+                const Rung* above) {
   constexpr double kFactor = 0.5;
   constexpr int kSharper = 4, kSofter = 2;
-  auto first = fit_with(tracks, options, rung, kGentle_m_s, nullptr);
+  const double gentle_m_s =
+      above != nullptr ? *above->scene.model.slip_regularisation_m_s : kGentle_m_s;
+  auto first =
+      fit_with(tracks, options, rung, gentle_m_s, above != nullptr ? &above->fit : nullptr);
   if (!first) {
     rung.fit = fit(tracks, rung.scene, options);
     return;
   }
   if (!first->converged) {  // a path that is not the body's has no softness
     rung.fit = std::move(*first);
-    rung.scene.model.slip_regularisation_m_s = kGentle_m_s;
+    rung.scene.model.slip_regularisation_m_s = gentle_m_s;
     return;
   }
-  std::vector<Trial> trials{{std::log(kGentle_m_s), std::move(*first)}};
+  std::vector<Trial> trials{{std::log(gentle_m_s), std::move(*first)}};
   follow(tracks, options, rung, kFactor, kSharper, trials);
   std::size_t best = best_of(trials);
   if (best + 1 == trials.size() && trials.size() <= 2) {  // the gentlest so far
@@ -155,6 +159,7 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
       eps_m_s, known));
   rung.fit = std::move(chosen);
   rung.scene.model.slip_regularisation_m_s = eps_m_s;
+  rung.softness_fitted = true;
 }
 
 }  // namespace trochoid::fitting

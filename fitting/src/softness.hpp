@@ -13,6 +13,8 @@ namespace trochoid::fitting {
 /// it is searched first, and its eps followed down to the sharpest law the track wants. Coulomb's
 /// law is kept where eps does not show by strong evidence; else eps counts as a parameter, stands
 /// in the rung's scene, and its uncertainty widens the error bars.
-void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
+/// @param above  a rung with one more term whose eps was fitted: starts from its solution and eps.
+void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung,
+                const Rung* above = nullptr);
 
 }  // namespace trochoid::fitting
