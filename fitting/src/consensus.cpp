@@ -85,11 +85,12 @@ struct Chain {
   std::vector<int> samples;
 };
 
-Chain best_chain(const Path& path, int count, double jerk2_s) {
-  std::vector<Motion> motions;
-  for (int at = 0; at < count; ++at) {
+// Among samples [from, to).
+Chain best_chain(const Path& path, int from, int to, double jerk2_s) {
+  std::vector<Motion> motions(static_cast<std::size_t>(to));  // those before `from` stay unused
+  for (int at = from; at < to; ++at) {
     Motion best = begun(path, at);
-    for (int before = std::max(0, at - 1 - kMostSkipped); before < at; ++before) {
+    for (int before = std::max(from, at - 1 - kMostSkipped); before < at; ++before) {
       const double tau = path.t_s[at] - path.t_s[before];
       const double gain = motions[before].gain + gain_of(path, motions[before], tau, at, jerk2_s);
       if (gain > best.gain) best.gain = gain, best.before = before;
@@ -101,9 +102,9 @@ Chain best_chain(const Path& path, int count, double jerk2_s) {
       motion.length = motions[best.before].length + 1;
       best = motion;
     }
-    motions.push_back(best);
+    motions[at] = best;
   }
-  const auto end = std::max_element(motions.begin(), motions.end(),
+  const auto end = std::max_element(motions.begin() + from, motions.end(),
                                     [](const auto& a, const auto& b) { return a.gain < b.gain; });
   Chain chain{end->gain, {}};
   for (int at = static_cast<int>(end - motions.begin()); at >= 0; at = motions[at].before)
@@ -122,6 +123,19 @@ std::vector<double> second_differences(const Path& path) {
     sizes.push_back((path.xy_m.row(i) - path.xy_m.row(i - 1) - share * way).norm());
   }
   return sizes;
+}
+
+// How much of a path chains explain with a jerk: stretches from all over it, since a body may lie
+// at rest when the record begins, or be at rest when it ends.
+double gain_with(const Path& path, int count, double jerk2_s) {
+  constexpr int kStretches = 4, kLength = 250;
+  if (count <= kStretches * kLength) return best_chain(path, 0, count, jerk2_s).gain;
+  double gain = 0.0;
+  for (int i = 0; i < kStretches; ++i) {
+    const int from = (count - kLength) * i / (kStretches - 1);
+    gain += best_chain(path, from, from + kLength, jerk2_s).gain;
+  }
+  return gain;
 }
 
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
@@ -168,15 +182,14 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
   const double step_s = median(steps_s);
   path.speed_m_s = 3.0 * data::quantile(speeds, 0.7);
   path.acceleration_m_s2 = path.speed_m_s / (4.0 * step_s);
-  constexpr int kEnough = 1000;  // samples that tell how strong the jerk is
   constexpr std::array kOverNoise{0.01, 0.05, 0.2, 1.0, 5.0};  // what it adds from step to step
   double jerk2_s = 0.0, highest = -std::numeric_limits<double>::infinity();
   for (const double over : kOverNoise) {
     const double trial = 20.0 * std::pow(over * noise_m, 2) / std::pow(step_s, 5);
-    const Chain chain = best_chain(path, std::min(n, kEnough), trial);
-    if (chain.gain > highest) highest = chain.gain, jerk2_s = trial;
+    const double gain = gain_with(path, n, trial);
+    if (gain > highest) highest = gain, jerk2_s = trial;
   }
-  return with_what_lies_beyond(best_chain(path, n, jerk2_s).samples, n);
+  return with_what_lies_beyond(best_chain(path, 0, n, jerk2_s).samples, n);
 }
 
 }  // namespace trochoid::fitting
