@@ -51,6 +51,13 @@ Camera::Projection projection_of(const JsonReader& json) {
   json.fail("\"projection\" must be perspective or orthographic");
 }
 
+Transfer transfer_of(const JsonReader& json) {
+  const std::string name = json.text_or("transfer", "sRGB");
+  if (name == "sRGB") return Transfer::srgb;
+  if (name == "linear") return Transfer::linear;
+  json.fail("\"transfer\" must be sRGB or linear");
+}
+
 }  // namespace
 
 Camera read_camera(const std::filesystem::path& path) {
@@ -78,6 +85,7 @@ Camera read_camera(const std::filesystem::path& path) {
       json.fail(fmt::format("\"shutter_fraction_of_frame\" = {} must lie in 0..1",
                             *camera.exposure_fraction));
   }
+  camera.transfer = transfer_of(json);
   return camera;
 }
 
@@ -87,6 +95,7 @@ void write_camera(const Camera& camera, const std::filesystem::path& path) {
   json["height"] = camera.height_px;
   if (camera.frame_rate_hz) json["fps"] = *camera.frame_rate_hz;
   if (camera.exposure_fraction) json["shutter_fraction_of_frame"] = *camera.exposure_fraction;
+  if (camera.transfer == Transfer::linear) json["transfer"] = "linear";
   json["pixel_convention"] = "centre of the top-left pixel is (0,0); x right, y down";
   if (camera.projection == Camera::Projection::orthographic) json["projection"] = "orthographic";
   json["fx"] = camera.fx;

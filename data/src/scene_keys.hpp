@@ -35,6 +35,7 @@ constexpr Range kObjects{1.0, 64.0, true, "a whole number in 1..64"};
 template <std::size_t N>
 using Words = std::array<std::string_view, N>;
 constexpr Words<3> kBodyKinds{"disc", "ring", "top"};
+constexpr Words<2> kTransfers{"sRGB", "linear"};
 constexpr Words<4> kSupportKinds{"floor", "flat", "pivot", "none"};
 constexpr Words<9> kModels{"free",    "top",  "top-euler", "smooth", "rolling",
                            "sliding", "puck", "pivot",     "auto"};
@@ -80,6 +81,7 @@ void camera_keys(Visit&& visit) {
   visit("rows", &CameraSettings::rows, kPositive);
   visit("frame_rate_hz", &CameraSettings::frame_rate_hz, kPositive);
   visit("exposure_s", &CameraSettings::exposure_s, kNonNegative);
+  visit("transfer", &CameraSettings::transfer, kTransfers);
 }
 
 template <class Visit>

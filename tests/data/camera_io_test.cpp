@@ -7,7 +7,7 @@ namespace {
 const std::string kCamera = R"({
  "width": 800, "height": 600, "fps": 120, "shutter_fraction_of_frame": 0.25,
  "fx": 1180.0, "fy": 1181.0, "cx": 406.3, "cy": 293.1,
- "dist_k1_k2_p1_p2_k3": [-0.24, 0.07, 0.0, 0.0, 0.0],
+ "dist_k1_k2_p1_p2_k3": [-0.24, 0.07, 0.0, 0.0, 0.0], "transfer": "linear",
  "R_world_to_cam": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
  "t_world_to_cam_m": [0.0, 0.0, 0.62]
 })";
@@ -25,8 +25,10 @@ TEST(CameraFile, KeepsEverythingThroughAFile) {
   EXPECT_EQ(camera.distortion[0], -0.24);
   EXPECT_EQ(camera.frame_rate_hz, 120.0);
   EXPECT_EQ(camera.exposure_fraction, 0.25);
+  EXPECT_EQ(camera.transfer, Transfer::linear);
   write_camera(camera, folder / "d.json");
   const Camera again = read_camera(folder / "d.json");
+  EXPECT_EQ(again.transfer, Transfer::linear);
   EXPECT_EQ(again.camera_from_table, camera.camera_from_table);
   EXPECT_EQ(again.camera_from_table_m, camera.camera_from_table_m);
   write_camera(again, folder / "e.json");
@@ -67,6 +69,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"Mirrored", with("[0, -1, 0]", "[0, 1, 0]"), "no rotation"},
         Refusal{"Stretched", with("[1, 0, 0]", "[2, 0, 0]"), "no rotation"},
         Refusal{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
+        Refusal{"UnknownCurve", with("\"linear\"", "\"log\""),
+                "\"transfer\" must be sRGB or linear"},
         Refusal{"LongShutter", with("0.25", "2.5"), "0..1"},
         Refusal{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
     [](const auto& instance) { return instance.param.name; });

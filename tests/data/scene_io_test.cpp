@@ -121,6 +121,7 @@ readout_s = 0.5
 rows = 720.0
 frame_rate_hz = 60.0
 exposure_s = 0.25
+transfer = "linear"
 
 [tracking]
 objects = 3

@@ -151,6 +151,16 @@ TEST(EdgeStretch, TellsThatEdgesAreWiderThanTheModel) {
   EXPECT_LT(wider_px, 0.25);
 }
 
+// Half of the light is level 188 under the curve of video cameras (IEC 61966-2-1), 127.5 without.
+TEST(LightWindow, IsInLinearLightWhateverCurveTheCameraApplies) {
+  const cv::Mat half(4, 4, CV_8U, cv::Scalar(188));
+  const LightWindow coded(half, {0, 0, 4, 4}, data::Transfer::srgb);
+  const LightWindow linear(half, {0, 0, 4, 4}, data::Transfer::linear);
+  constexpr float kLevelStep = 1.0F;  // 188 is half the light to the rounding of levels
+  EXPECT_NEAR(coded.pixel({1, 1}), 127.5F, kLevelStep);
+  EXPECT_EQ(linear.pixel({1, 1}), 188.0F);
+}
+
 // Pixels in the rows and columns that a round outline crosses lie at their distance from the
 // circle, and near the outline each is read once.
 TEST(Crossings, ReadEveryPixelBesideTheOutlineOnceAtItsDistance) {

@@ -319,10 +319,13 @@ cv::Mat PictureRenderer::levels(const cv::Mat& light, double brightness) const {
   cv::Mat out = light.clone();
   if (style_.blur_px > 0.0)
     cv::GaussianBlur(light, out, {}, style_.blur_px, style_.blur_px, cv::BORDER_REPLICATE);
+  const bool linear = camera_.transfer == data::Transfer::linear;
   for (int y = 0; y < out.rows; ++y) {
     auto* row = out.ptr<float>(y);
-    for (int i = 0; i < 3 * out.cols; ++i)
-      row[i] = 255.0F * to_srgb(std::clamp(row[i] * static_cast<float>(brightness), 0.0F, 1.0F));
+    for (int i = 0; i < 3 * out.cols; ++i) {
+      const float seen = std::clamp(row[i] * static_cast<float>(brightness), 0.0F, 1.0F);
+      row[i] = 255.0F * (linear ? seen : to_srgb(seen));
+    }
   }
   return out;
 }

@@ -40,9 +40,9 @@ class PictureRenderer {
 
   /// Linear light (CV_32FC3, blue green red, 0..1), sharp but for the pixels, averaged over poses.
   [[nodiscard]] cv::Mat light(const std::vector<data::Pose<>>& during_exposure) const;
-  /// Blurred and through the sRGB transfer, 0..255, before noise and rounding (CV_32FC3).
+  /// Blurred and through the camera's transfer, 0..255, before noise and rounding (CV_32FC3).
   [[nodiscard]] cv::Mat levels(const cv::Mat& light, double brightness = 1.0) const;
-  /// What a camera makes of it: blur, brightness, sRGB transfer, noise of frame `index`, 8 bit.
+  /// What a camera makes of it: blur, brightness, transfer, noise of frame `index`, 8 bit.
   [[nodiscard]] cv::Mat picture(const cv::Mat& light, std::int64_t index,
                                 double brightness = 1.0) const;
   [[nodiscard]] const RenderStyle& style() const { return style_; }

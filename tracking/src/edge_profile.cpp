@@ -27,10 +27,14 @@ const std::array<float, 256>& light_of_luma() {
 
 }  // namespace
 
-LightWindow::LightWindow(const cv::Mat& luma, const cv::Rect& window)
+LightWindow::LightWindow(const cv::Mat& luma, const cv::Rect& window, data::Transfer transfer)
     : window_(window & cv::Rect(0, 0, luma.cols, luma.rows)) {
   if (window_.width < 2 || window_.height < 2) {
     window_ = {};
+    return;
+  }
+  if (transfer == data::Transfer::linear) {
+    luma(window_).convertTo(light_, CV_32FC1);
     return;
   }
   const auto& table = light_of_luma();

@@ -16,7 +16,7 @@ class LightWindow {
  public:
   LightWindow() = default;
   /// Copies `window` (clipped to the picture) of an 8-bit luma picture.
-  LightWindow(const cv::Mat& luma, const cv::Rect& window);
+  LightWindow(const cv::Mat& luma, const cv::Rect& window, data::Transfer transfer);
   /// Any values that mix linearly across an edge, pixel (0, 0) of them at `origin`.
   LightWindow(cv::Mat values, const cv::Point& origin)
       : light_(std::move(values)), window_(origin, light_.size()) {}

@@ -341,8 +341,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       body_,
       camera_,
       motion,
-      LightWindow(evidence.luma, window),
-      evidence.background.empty() ? LightWindow() : LightWindow(evidence.background, window),
+      LightWindow(evidence.luma, window, camera_.transfer),
+      evidence.background.empty() ? LightWindow()
+                                  : LightWindow(evidence.background, window, camera_.transfer),
       colour_window(evidence.chroma, window, body_, camera_, starts.front()),
       most_looks_,
       evidence.predicted && evidence.previous

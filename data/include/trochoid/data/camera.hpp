@@ -11,6 +11,10 @@ struct Ray {
   Eigen::Vector3d direction;
 };
 
+/// How a camera makes levels of light. Video cameras and telephones apply a curve close to sRGB's;
+/// machine-vision cameras with their gamma correction off do not.
+enum class Transfer { srgb, linear };
+
 /// Pinhole camera with OpenCV's radial-tangential distortion (k1, k2, p1, p2, k3), or, when only a
 /// scale is known, an orthographic camera looking straight down. Pixel centres are integers, x
 /// right, y down; the table frame has z up and the floor at z = 0, right-handed seen from above.
@@ -30,6 +34,7 @@ struct Camera {
   Eigen::Vector3d camera_from_table_m = Eigen::Vector3d::Zero();
   std::optional<double> frame_rate_hz;      ///< what the file says of the recording, if anything
   std::optional<double> exposure_fraction;  ///< shutter time as a fraction of the frame interval
+  Transfer transfer = Transfer::srgb;
 
   /// Orthographic camera straight above: table origin at the centre of the image.
   /// @param scale_px_per_m pixels per metre on the floor, > 0.
