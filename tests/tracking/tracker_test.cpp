@@ -154,6 +154,29 @@ void draw_mover(cv::Mat& picture, int i) {
   draw_disc(picture, 30.0 + 1.5 * i, 30.0 + 0.8 * i, 14.0, 14.0, 0.0, 60.0);
 }
 
+// Drawn in levels, as a camera without gamma correction sees it: read as sRGB the edges of a dark
+// disc on a bright floor are a quarter of a pixel outside.
+TEST(TrackVideo, EdgesOnOneSideOfWhereTheyAreExpectedAreNotedUntilTheCameraIsCalledLinear) {
+  const ScratchFolder folder("linear");
+  write_clip(folder / "clip.mkv", drawn_floor(200, 120, 200.0), 60, 1.0,
+             [](cv::Mat& picture, int i) {
+               draw_disc(picture, 40.0 + 1.5 * i, 60.0, 24.0, 24.0, 0.0, 50.0);
+             });
+  data::Scene scene;
+  scene.body.emplace();
+  scene.body->radius_m = 0.012;
+  scene.body->thickness_m = 1e-4;
+  scene.support.kind = data::SupportKind::flat;
+  scene.camera.scale_px_per_m = 2000.0;
+  const auto notes_for = [&](data::Transfer transfer) {
+    scene.camera.transfer = transfer;
+    return track_video(folder / "clip.mkv", scene, std::nullopt).file.notes;
+  };
+  EXPECT_THAT(notes_for(data::Transfer::srgb),
+              testing::ElementsAre(testing::HasSubstr("towards the brighter side")));
+  EXPECT_THAT(notes_for(data::Transfer::linear), testing::IsEmpty());
+}
+
 TEST(TrackVideo, ARollingShutterGivesEverySampleTheTimeOfItsRow) {
   const ScratchFolder folder("rows");
   constexpr int kHeight = 120;

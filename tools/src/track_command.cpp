@@ -77,6 +77,7 @@ void tell(const Options& options, const tracking::TrackResult& result,
                     options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost,
                     s.doubtful, interpolated ? fmt::format(" {} interpolated,", *interpolated) : "",
                     s.damaged, s.camera_words));
+    for (const std::string& line : result.file.notes) note(line);
     return;
   }
   nlohmann::ordered_json summary{{"track", options.output.string()},
@@ -86,7 +87,8 @@ void tell(const Options& options, const tracking::TrackResult& result,
                                  {"lost", s.lost},
                                  {"doubtful", s.doubtful},
                                  {"damaged", s.damaged},
-                                 {"metres", s.camera_words}};
+                                 {"metres", s.camera_words},
+                                 {"notes", result.file.notes}};
   if (interpolated) {
     summary["smooth"] = options.smooth.string();
     summary["interpolated"] = *interpolated;

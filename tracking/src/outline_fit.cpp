@@ -258,6 +258,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   set_sigmas(spread_of(scenery, r.pose, r.solution.covariance), m);
   m.common = spread_of(scenery, r.pose, r.solution.common);
   m.inflation = r.solution.inflation;
+  m.polarity_px = r.solution.polarity_px;
   m.rms_px = r.solution.rms_px;
   m.blur_px = fitted.blur_px;
   m.accepted = fitted.score;

@@ -16,6 +16,7 @@
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -315,6 +316,23 @@ class Tracking {
     return rule;
   }
 
+  /// A transfer curve other than the camera's puts all edges to one side, and so do other causes.
+  [[nodiscard]] std::vector<std::string> doubts_about_edges() const {
+    constexpr double kNoticeable_px = 0.15;
+    std::vector<double> polarities_px;
+    for (const BodyPath& path : paths_)
+      for (const auto& [index, at] : path.frames)
+        if (at.seen.pose) polarities_px.push_back(at.seen.pose->polarity_px);
+    if (polarities_px.empty()) return {};
+    const double usual_px = data::median(std::move(polarities_px));
+    if (std::abs(usual_px) < kNoticeable_px) return {};
+    const bool linear = camera_->transfer == data::Transfer::linear;
+    return {fmt::format(
+        "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another "
+        "radius or a camera with transfer = \"{}\" does that",
+        std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear")};
+  }
+
   TrackResult result() {
     TrackResult result;
     result.file.source = video_.filename().string();
@@ -339,6 +357,7 @@ class Tracking {
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
+    result.file.notes = doubts_about_edges();
     result.file.camera = words;
     result.summary.camera_words = words;
     if (options_.edges) write_edges(*options_.edges);
