@@ -89,7 +89,7 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
 }
 
 // Everything but the last resort was added before it was known what that explains: terms the data
-// do not need any more are left out again, one at a time, as long as that costs no evidence.
+// do not need any more are left out again, one at a time, as long as that costs no strong evidence.
 void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
                std::size_t current, std::vector<Rung>& rungs) {
   FitOptions one = options;

@@ -220,10 +220,12 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
                       const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  own.start = values_of(above.fit);
-  if (!own.start.empty()) own.strategy = "single";
+  if (auto values = values_of(above.fit); !values.empty()) {
+    own.start = std::move(values);
+    own.strategy = "single";
+  }
   try {
-    if (above.softness_fitted && !own.start.empty()) {
+    if (above.softness_fitted) {
       fit_softly(tracks, own, rung, &above);
     } else {
       rung.scene.model.slip_regularisation_m_s = above.scene.model.slip_regularisation_m_s;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
 
 #include "problem.hpp"
@@ -26,11 +27,11 @@ bool all_rows(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd&
   };
   for (Eigen::Index i = 0; i < u.size(); ++i) {
     const FreeParameter& known = problem.free[i];
-    if (known.held) continue;
+    // A held parameter still pays for its distance from what was known of it.
     if (known.prior)
       add(i, (known.transform.value(u[i]) - known.prior->value) / known.prior->sigma,
-          known.transform.slope(u[i]) / known.prior->sigma);
-    if (known.leash)
+          known.held ? 0.0 : known.transform.slope(u[i]) / known.prior->sigma);
+    if (known.leash && !known.held)
       add(i, (u[i] - known.leash->value) / known.leash->sigma, 1.0 / known.leash->sigma);
   }
   return true;
@@ -45,31 +46,43 @@ class Seeker {
     Solution solution;
     solution.u = u_;
     solution.chi2 = std::numeric_limits<double>::infinity();
-    if (!look()) return solution;
+    if (!look()) {
+      solution.message = "no prediction at the start";
+      return solution;
+    }
     solution.usable = true;
     // What is less moves nothing by a hundredth of its error bar.
     constexpr double kEnough = 1e-7;
     const double enough = std::max(options_.function_tolerance, kEnough);
     const double before = chi2_;
+    std::deque<double> lately;
     for (int idle = 0; solution.iterations < options_.iterations;) {
       const double last = chi2_;
+      lately.push_back(last);
+      if (lately.size() > kLately) lately.pop_front();
       const bool moved = advance();
       ++solution.iterations;
       idle = last - chi2_ < enough * chi2_ ? idle + 1 : 0;
       // A strongly damped step that gains little may be the first of many.
       constexpr double kFree = 1e-3;
-      solution.converged = !moved || idle > (damping_ < kFree ? 0 : 1);
-      if (solution.converged || solution.iterations == options_.iterations || !look()) break;
+      solution.converged = moved ? idle > (damping_ < kFree ? 0 : 1) : !walled_in_;
+      if (!moved || solution.converged || solution.iterations == options_.iterations || !look())
+        break;
     }
+    // Creeping along a flat valley when the steps ran out.
+    if (solution.iterations == options_.iterations && lately.size() == kLately)
+      solution.converged = solution.converged || lately.front() - chi2_ < 1.0;
     solution.u = u_;
     solution.chi2 = chi2_;
-    solution.message = fmt::format("damping {:.2g}", damping_);
+    if (!solution.converged)
+      solution.message =
+          fmt::format("the minimum was not reached in {} steps", solution.iterations);
     if (problem_.log)
-      problem_.log(
-          fmt::format("{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} steps, {}, "
-                      "work {:.3g}",
-                      problem_.rows(), problem_.free.size(), before, chi2_, solution.iterations,
-                      solution.message, problem_.work ? *problem_.work : 0.0));
+      problem_.log(fmt::format(
+          "{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} steps, {}, "
+          "work {:.3g}",
+          problem_.rows(), problem_.free.size(), before, chi2_, solution.iterations,
+          fmt::format("damping {:.2g}", damping_), problem_.work ? *problem_.work : 0.0));
     return solution;
   }
 
@@ -113,19 +126,27 @@ class Seeker {
     constexpr double kNothing = 1e-12, kSome = 0.25;
     Way straight;
     int waited = 0;
+    walled_in_ = true;
     for (int attempt = 0; attempt < kAttempts && waited <= kPatience; ++attempt) {
       factorise();
       const Eigen::VectorXd step = answer(rows_);
       const double promised = chi2_ - (rows_ + jacobian_ * step).squaredNorm();
-      if (!(promised > kNothing * chi2_)) break;
+      if (!(promised > kNothing * chi2_)) {
+        walled_in_ = false;
+        break;
+      }
       const Eigen::VectorXd bend = bend_of(step);
       if (bend.size() > 0) {
         const Way way = tried(step + 0.5 * bend, promised);
         if (way.chi2 < std::min(chi2_, straight.chi2)) return take(way);
+        walled_in_ = walled_in_ && !std::isfinite(way.chi2);
         damp(std::isfinite(way.chi2) ? 5.0 : 30.0);
+      } else if (straight.step.size() == 0) {
+        Way way = tried(step, promised);
+        walled_in_ = walled_in_ && !std::isfinite(way.chi2);
+        damp(std::isfinite(way.chi2) ? 4.0 : 30.0);
+        if (way.kept > kSome) straight = std::move(way);
       } else {
-        if (straight.step.size() == 0)
-          if (Way way = tried(step, promised); way.kept > kSome) straight = std::move(way);
         damp(4.0);
       }
       waited += straight.step.size() > 0 ? 1 : 0;
@@ -167,8 +188,10 @@ class Seeker {
     return small ? bend : Eigen::VectorXd{};
   }
 
+  static constexpr std::size_t kLately = 10;  // steps
   const Problem& problem_;
   const SolveOptions& options_;
+  bool walled_in_ = false;  ///< no step of the last advance could be predicted at all
   double damping_, chi2_ = 0.0;
   Eigen::VectorXd u_, rows_, scale2_, unit_;
   Eigen::MatrixXd jacobian_, normal_;

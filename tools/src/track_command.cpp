@@ -53,7 +53,6 @@ void write_timing(const fs::path& track, double seconds, const tracking::TrackSu
 
 /// Frame by frame what deserves a look: gaps, and samples to be doubted.
 void detail_tracks(const data::TrackFile& file) {
-  for (const std::string& line : file.notes) detail(line);
   for (const data::Track& track : file.tracks) {
     if (track.samples.empty()) continue;
     std::vector<std::int64_t> doubtful;

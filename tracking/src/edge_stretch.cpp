@@ -310,7 +310,7 @@ float shaded(float level, float slope, float bend, float s) {
   return level + s * (slope + s * bend);
 }
 
-// Squared residuals on either side about the best step with this shading, whose levels it keeps.
+// Squared residuals beside and on the edge about the best step with this shading, whose levels it keeps.
 void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   Eigen::Matrix3d m;
   Eigen::Vector3d r;
@@ -366,7 +366,7 @@ std::vector<Variances> noise_of_neighbours(const std::vector<Working>& all,
   return out;
 }
 
-// The offset with slopes given, samples weighed by the noise of their side.
+// The offset with slopes given, samples weighed by their noise.
 void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, const Working& w) {
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float beside = p.strip_px > 0.0 ? v[4] : 0.0f;  // of the edge the strip's level counts

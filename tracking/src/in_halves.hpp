@@ -11,6 +11,7 @@ void in_halves(std::size_t count, const Work& work) {
   const auto every_other = [&](std::size_t first) {
     for (std::size_t i = first; i < count; i += 2) work(i);
   };
+  if (count < 2) return every_other(0);
   auto other = std::async(std::launch::async, every_other, 1);
   every_other(0);
   other.get();

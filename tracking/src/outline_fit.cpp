@@ -339,19 +339,18 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   cv::Rect window = window_of(body_, camera_, starts.front(), margin_px);
   for (const auto& start : starts) window |= window_of(body_, camera_, start, margin_px);
   const Scenery scenery{
-      body_,
-      camera_,
-      motion,
-      LightWindow(evidence.luma, window, camera_.transfer),
+      body_, camera_, motion, LightWindow(evidence.luma, window, camera_.transfer),
       evidence.background.empty() ? LightWindow()
                                   : LightWindow(evidence.background, window, camera_.transfer),
-      colour_window(evidence.chroma, window, body_, camera_, starts.front()),
-      most_looks_,
+      colour_window(evidence.chroma, window, body_, camera_, starts.front()), most_looks_,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))
           : PoseMotion::Step(),
-      tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
+      // Levels that are light mix linearly, whatever their colours.
+      camera_.transfer == data::Transfer::linear
+          ? std::nullopt
+          : tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
       evidence.predicted && evidence.previous && evidence.exposure_fraction > 0.0
           ? std::optional(
                 ExposureMotion(*evidence.previous, starts.front(), evidence.exposure_fraction))

@@ -25,7 +25,7 @@ Shading least_within_bounds(const ShadingMatrix& A, const Shading& b, Shading x)
   return x;
 }
 
-// Inverse of a positive definite matrix, one pivot after the other [Gauss-Jordan].
+// Inverse of a positive definite matrix, one pivot after the other (Gauss-Jordan).
 ShadingMatrix inverse_of(ShadingMatrix m) {
   for (int k = 0; k < kShading; ++k) {
     const double inverse = 1.0 / m(k, k);

@@ -23,7 +23,7 @@ struct OutlinePoint {
   Eigen::Vector2d normal_px;  ///< unit normal in the image, pointing from the body to the background
   double arc_px;              ///< length of outline this point stands for
   bool silhouette;            ///< on the border between body and background (not face against wall)
-  Eigen::Matrix<double, 2, 3> px_per_m;  ///< how its image moves with the point
+  Eigen::Matrix<double, 2, 3> px_per_m;  ///< d(image_px) / d(table_m)
 };
 
 /// Visible outline of a posed cylinder, sampled about every `step_px` pixels along the image curve:

@@ -8,7 +8,8 @@ inline namespace TROCHOID_ISA {
 
 #if defined(__x86_64__)
 // What `work` calls has to be TROCHOID_INLINE: only code inlined here is compiled for the wider
-// set. Nobody else can share these functions, since every `work` is a type of its own.
+// set. Every `work` is a type of its own; files that share one, from a template in a header, need the
+// same flags for floating point.
 template <class Work>
 __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"))) void in_avx512(
     const Work& work) {

@@ -46,7 +46,9 @@ struct PoseMeasurement {
   /// Variance by which the scatter has been multiplied because parts of the outline contradict each
   /// other; noisy, frames of one clip have nearly the same: PoseMeasurement::inflate.
   double inflation = 1.0;
-  double polarity_px = 0.0;  ///< edges towards their brighter side, beyond the transfer curve
+  /// How far edges lie towards their brighter side (> 0) of where the transfer curve puts them; what
+  /// edges do not tell, a prior takes for 0.
+  double polarity_px = 0.0;
   /// Replaces `inflation` by a better one.
   void inflate(double better);
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
