@@ -310,7 +310,8 @@ float shaded(float level, float slope, float bend, float s) {
   return level + s * (slope + s * bend);
 }
 
-// Squared residuals beside and on the edge about the best step with this shading, whose levels it keeps.
+// Squared residuals beside and on the edge about the best step with this shading, whose levels it
+// keeps.
 void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   Eigen::Matrix3d m;
   Eigen::Vector3d r;

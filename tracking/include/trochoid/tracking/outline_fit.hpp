@@ -46,8 +46,8 @@ struct PoseMeasurement {
   /// Variance by which the scatter has been multiplied because parts of the outline contradict each
   /// other; noisy, frames of one clip have nearly the same: PoseMeasurement::inflate.
   double inflation = 1.0;
-  /// How far edges lie towards their brighter side (> 0) of where the transfer curve puts them; what
-  /// edges do not tell, a prior takes for 0.
+  /// How far edges lie towards their brighter side (> 0) of where the transfer curve puts them;
+  /// what edges do not tell, a prior takes for 0.
   double polarity_px = 0.0;
   /// Replaces `inflation` by a better one.
   void inflate(double better);
