@@ -29,6 +29,7 @@ struct Path {
   const Eigen::MatrixX2d& xy_m;
   std::span<const double> sigma_m;
   double speed_m_s = 0.0, acceleration_m_s2 = 0.0;  // beyond those of any sample that counts
+  double noise_m = 0.0, step_s = 0.0;               // typical ones
 };
 
 // First sample of a chain: nothing is known of how it moves.
@@ -125,31 +126,46 @@ std::vector<double> second_differences(const Path& path) {
   return sizes;
 }
 
-// How much of a path chains explain with a jerk: stretches from all over it, since a body may lie
-// at rest when the record begins, or be at rest when it ends.
-double gain_with(const Path& path, int count, double jerk2_s) {
+// How much of the samples [from, to) chains explain with a jerk: stretches from all over them,
+// since a body may lie at rest when the record begins, or be at rest when it ends.
+double gain_with(const Path& path, int from, int to, double jerk2_s) {
   constexpr int kStretches = 4, kLength = 250;
-  if (count <= kStretches * kLength) return best_chain(path, 0, count, jerk2_s).gain;
+  if (to - from <= kStretches * kLength) return best_chain(path, from, to, jerk2_s).gain;
   double gain = 0.0;
   for (int i = 0; i < kStretches; ++i) {
-    const int from = (count - kLength) * i / (kStretches - 1);
-    gain += best_chain(path, from, from + kLength, jerk2_s).gain;
+    const int first = from + (to - from - kLength) * i / (kStretches - 1);
+    gain += best_chain(path, first, first + kLength, jerk2_s).gain;
   }
   return gain;
 }
 
+// The chain through the samples [from, to), with the jerk that explains most of them.
+Chain best_chain(const Path& path, int from, int to) {
+  constexpr std::array kOverNoise{0.01, 0.05, 0.2, 1.0, 5.0, 20.0};  // it adds from step to step
+  double jerk2_s = 0.0, highest = -std::numeric_limits<double>::infinity();
+  for (const double over : kOverNoise) {
+    const double trial = 20.0 * std::pow(over * path.noise_m, 2) / std::pow(path.step_s, 5);
+    const double gain = gain_with(path, from, to, trial);
+    if (gain > highest) highest = gain, jerk2_s = trial;
+  }
+  return best_chain(path, from, to, jerk2_s);
+}
+
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
-// rest that is struck, one that begins to wobble. What lies beyond its ends is not doubted.
-std::vector<int> with_what_lies_beyond(const std::vector<int>& chain, int count) {
-  constexpr int kMostWrong = 20;
-  const int last = chain.back();
-  const int first = chain.front() > kMostWrong ? 0 : chain.front();
-  const int end = count - 1 - last > kMostWrong ? count : last + 1;
-  std::vector<int> out;
-  for (int at = first; at < chain.front(); ++at) out.push_back(at);
-  out.insert(out.end(), chain.begin(), chain.end());
-  for (int at = last + 1; at < end; ++at) out.push_back(at);
-  return out;
+// rest that is struck, one that begins to wobble. What lies beyond its ends is looked at by itself.
+void keep_consistent(const Path& path, int from, int to, std::vector<int>& kept) {
+  constexpr int kMostWrong = 20, kFewest = 12;
+  const std::vector<int> chain =
+      to - from < kFewest ? std::vector<int>{} : best_chain(path, from, to).samples;
+  // What hardly hangs together anywhere is not doubted.
+  if (static_cast<int>(chain.size()) < kFewest ||
+      2 * static_cast<int>(chain.size()) < chain.back() - chain.front()) {
+    for (int at = from; at < to; ++at) kept.push_back(at);
+    return;
+  }
+  if (chain.front() - from > kMostWrong) keep_consistent(path, from, chain.front(), kept);
+  kept.insert(kept.end(), chain.begin(), chain.end());
+  if (to - 1 - chain.back() > kMostWrong) keep_consistent(path, chain.back() + 1, to, kept);
 }
 
 }  // namespace
@@ -179,17 +195,13 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
     steps_s.push_back(t_s[i] - t_s[i - 1]);
     speeds.push_back((xy_m.row(i) - xy_m.row(i - 1)).norm() / steps_s.back());
   }
-  const double step_s = median(steps_s);
+  path.noise_m = noise_m;
+  path.step_s = median(steps_s);
   path.speed_m_s = 3.0 * data::quantile(speeds, 0.7);
-  path.acceleration_m_s2 = path.speed_m_s / (4.0 * step_s);
-  constexpr std::array kOverNoise{0.01, 0.05, 0.2, 1.0, 5.0};  // what it adds from step to step
-  double jerk2_s = 0.0, highest = -std::numeric_limits<double>::infinity();
-  for (const double over : kOverNoise) {
-    const double trial = 20.0 * std::pow(over * noise_m, 2) / std::pow(step_s, 5);
-    const double gain = gain_with(path, n, trial);
-    if (gain > highest) highest = gain, jerk2_s = trial;
-  }
-  return with_what_lies_beyond(best_chain(path, 0, n, jerk2_s).samples, n);
+  path.acceleration_m_s2 = path.speed_m_s / (4.0 * path.step_s);
+  std::vector<int> kept;
+  keep_consistent(path, 0, n, kept);
+  return kept;
 }
 
 }  // namespace trochoid::fitting

@@ -16,7 +16,8 @@ namespace trochoid::fitting {
 /// @param xy_m     n x 2.
 /// @param sigma_m  stated noise of each coordinate per sample, > 0; its scale may be too small.
 /// @returns indices in ascending order; all where there are fewer than 12 samples or the path bends
-/// evenly. What lies beyond a chain that ends long before the path does is kept as well.
+/// evenly. What lies beyond a chain that ends long before the path does is another kind of motion
+/// and has a chain of its own.
 [[nodiscard]] std::vector<int> consistent_path(std::span<const double> t_s,
                                                const Eigen::MatrixX2d& xy_m,
                                                std::span<const double> sigma_m);

@@ -170,41 +170,53 @@ double local_rate(const ArcData& arc, const std::vector<const Reading*>& reading
   return median(std::move(rates));
 }
 
-// How far an angle lies off the chord between the readings m before and after it, and what a curved
-// path adds to that per unit of its second derivative.
+// How far an angle lies off the chord through two other readings, and what a curved path adds to
+// that per unit of its second derivative.
 struct OffChord {
   double off_rad, sag_s2;
 };
 
-OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readings, int at, int m,
-                   double rate) {
-  const Reading &before = *readings[at - m], &after = *readings[at + m];
-  const double whole_s = arc.t_s[after.sample] - arc.t_s[before.sample];
-  const double part_s = arc.t_s[readings[at]->sample] - arc.t_s[before.sample];
-  const double here = readings[at]->value.x() - before.value.x();
-  const double way = after.value.x() - before.value.x();
+OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readings, int at,
+                   int first, int second, double rate) {
+  const Reading &one = *readings[first], &other = *readings[second];
+  const double whole_s = arc.t_s[other.sample] - arc.t_s[one.sample];
+  const double part_s = arc.t_s[readings[at]->sample] - arc.t_s[one.sample];
+  const double here = readings[at]->value.x() - one.value.x();
+  const double way = other.value.x() - one.value.x();
   return {wrapped(here - rate * part_s - part_s / whole_s * wrapped(way - rate * whole_s)),
           0.5 * part_s * (whole_s - part_s)};
+}
+
+// Chords between the neighbours on either side; near the ends, where there are not two of them,
+// chords on one side as well.
+std::vector<OffChord> chords_about(const ArcData& arc, const std::vector<const Reading*>& readings,
+                                   int at) {
+  constexpr int kFarthest = 6, kFewest = 2;
+  const int n = static_cast<int>(readings.size());
+  const double rate = local_rate(arc, readings, at);
+  const int between = std::min({kFarthest, at, n - 1 - at});
+  std::vector<OffChord> chords;
+  for (int m = 1; m <= between; ++m)
+    chords.push_back(off_chord(arc, readings, at, at - m, at + m, rate));
+  const int inwards = 2 * at < n ? 1 : -1;
+  for (int m = 1; between < kFewest && 2 * m <= kFarthest; ++m)
+    chords.push_back(off_chord(arc, readings, at, at + inwards * m, at + 2 * inwards * m, rate));
+  return chords;
 }
 
 // Distance of each angle of a channel from the parabola through two pairs of its neighbours, the
 // lower third over such pairs: where every fifth reading is wrong, more than half of them are.
 std::vector<double> neighbour_distance(const ArcData& arc,
                                        const std::vector<const Reading*>& readings) {
-  constexpr int kFarthest = 6;
-  const int n = static_cast<int>(readings.size());
-  std::vector<double> distance(n, 0.0);
-  for (int i = 0; i < n; ++i) {
-    const double rate = local_rate(arc, readings, i);
-    std::vector<OffChord> chords;
-    for (int m = 1; m <= std::min({kFarthest, i, n - 1 - i}); ++m)
-      chords.push_back(off_chord(arc, readings, i, m, rate));
+  std::vector<double> distance(readings.size(), 0.0);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const std::vector<OffChord> chords = chords_about(arc, readings, static_cast<int>(i));
     std::vector<double> off;
     for (const OffChord& near : chords)
       for (const OffChord& far : chords)
-        if (far.sag_s2 > 2.0 * near.sag_s2)
-          off.push_back(std::abs(far.sag_s2 * near.off_rad - near.sag_s2 * far.off_rad) /
-                        (far.sag_s2 - near.sag_s2));
+        if (std::abs(far.sag_s2) > 2.0 * std::abs(near.sag_s2))
+          off.push_back(std::abs((far.sag_s2 * near.off_rad - near.sag_s2 * far.off_rad) /
+                                 (far.sag_s2 - near.sag_s2)));
     if (off.empty()) continue;
     const auto third = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 3);
     std::nth_element(off.begin(), third, off.end());

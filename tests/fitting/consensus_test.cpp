@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <set>
+
+#include "observations.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -79,6 +82,43 @@ TEST(Consensus, ARestThatEndsIsNotTakenForAllThereIs) {
     const auto moving =
         std::count_if(kept.begin(), kept.end(), [first = rest](int i) { return i >= first; });
     EXPECT_GT(moving, (samples - rest) * 9 / 10) << rest << " samples at rest";
+  }
+}
+
+// No chain leads from one side of a cut to the other, but both have wrong places.
+TEST(Consensus, DoubtsWrongPlacesOnBothSidesOfACut) {
+  constexpr int kCut = 200, kSamples = 500;
+  Walk path = walk(kSamples, 4);
+  path.xy_m.bottomRows(kSamples - kCut).col(0).array() += 100.0;
+  for (const int wrong : {60, 130, 300, 420})
+    path.xy_m.row(wrong) += Eigen::RowVector2d(0.02, 0.01);
+  const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+  for (const int wrong : {60, 130, 300, 420})
+    EXPECT_FALSE(std::count(kept.begin(), kept.end(), wrong)) << wrong;
+  EXPECT_GE(kept.size(), kSamples - 12U);
+}
+
+// An azimuth half a turn off, also where there are neighbours on one side only.
+TEST(Consensus, DoubtsAnglesAtTheEndsOfARecordToo) {
+  constexpr int kSamples = 60;
+  const Walk path = walk(kSamples, 5);
+  for (const int wrong : {0, 1, 30, kSamples - 2, kSamples - 1}) {
+    data::Track track;
+    for (int i = 0; i < kSamples; ++i) {
+      data::TrackSample sample;
+      sample.t_s = path.t_s[i];
+      sample.centre_m = path.xy_m.row(i).transpose();
+      sample.covariance_m2 = Eigen::Matrix2d::Identity() * path.sigma_m[i] * path.sigma_m[i];
+      const double noise_rad = 0.02 * (i % 3 - 1) + 0.01 * (i % 7 - 3);
+      sample.theta = data::MeasuredAngle{0.8 + noise_rad, 0.02};
+      sample.phi =
+          data::MeasuredAngle{0.4 * i + noise_rad + (i == wrong ? std::numbers::pi : 0.0), 0.02};
+      track.samples.push_back(sample);
+    }
+    const std::vector<int> kept =
+        consistent_samples(make_arc(track, 0, kSamples, {true, true, true, false}, true));
+    EXPECT_FALSE(std::count(kept.begin(), kept.end(), wrong)) << wrong;
+    EXPECT_GE(kept.size(), kSamples - 4U) << wrong;
   }
 }
 
