@@ -115,7 +115,8 @@ Found search_path(const Problem& problem, const Quest& quest) {
   Found best;
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   const auto take = [&](Found found) {
-    found = look_about(problem, std::move(found));
+    const Problem kept = without_samples(problem, found.strays_s);
+    found = look_about(kept, std::move(found));
     if (better(found, best)) best = std::move(found);
     return surely_found(problem, best);
   };

@@ -93,6 +93,7 @@ Found hop(const Problem& problem, Found best, int misses) {
     const double gain = best.solution.chi2 - found.solution.chi2;
     missed = found.solution.usable && gain > 1.0 ? 0 : missed + 1;
     if (!better(found, best)) continue;
+    found.strays_s = best.strays_s;
     best = std::move(found);
     fresh = true;
     L = reach(problem, best.solution.u, best.reduced_chi2);

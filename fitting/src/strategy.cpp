@@ -34,6 +34,16 @@ Problem windowed(const Problem& problem, int samples) {
   return part;
 }
 
+Problem without_samples(const Problem& problem, const std::vector<double>& t_s) {
+  Problem part = problem;
+  const std::vector<double>& all_s = problem.arcs[0].t_s;
+  std::vector<int> kept;
+  for (int i = 0; i < static_cast<int>(all_s.size()); ++i)
+    if (std::find(t_s.begin(), t_s.end(), all_s[i]) == t_s.end()) kept.push_back(i);
+  part.arcs[0] = problem.arcs[0].keep(kept);
+  return part;
+}
+
 Found judged(const Problem& problem, Solution solution, const std::string& path) {
   Found found;
   found.solution = std::move(solution);
@@ -131,23 +141,67 @@ double chi2_gate(int rows) {
   return 1.1 + 4.0 * std::sqrt(2.0 / std::max(1, rows));
 }
 
+namespace {
+
+// The sample of a window that alone leaves a good part of what is unexplained, -1 if there is none:
+// a wrong one among the others. The last ones of a window may only be ahead of the model.
+int stray_sample(const Problem& part, const Eigen::VectorXd& u) {
+  constexpr double kAlone = 0.3, kFar2 = 50.0;
+  constexpr int kLast = 2;
+  const ArcData& arc = part.arcs[0];
+  Eigen::VectorXd residuals;
+  if (!evaluate(part, 0, u, residuals, nullptr)) return -1;
+  std::vector<double> squares(arc.t_s.size(), 0.0);
+  for (const Reading& reading : arc.readings)
+    squares[reading.sample] +=
+        residuals.segment(reading.row, reading.channel == Channel::position ? 2 : 1).squaredNorm();
+  const auto worst = std::max_element(squares.begin(), squares.end());
+  const bool alone = *worst > std::max(kFar2, kAlone * residuals.squaredNorm());
+  return alone && squares.end() - worst > kLast ? static_cast<int>(worst - squares.begin()) : -1;
+}
+
+// Leaves out of `current` the samples that stray from what its first `window` ones say otherwise,
+// and takes the solution of the window without them. Returns that.
+Solution without_strays(Problem& current, int& window, Solution solution,
+                        const SolveOptions& options, std::vector<double>& strays_s) {
+  constexpr int kMost = 8;
+  const int most = std::min(kMost, window / 8);
+  for (int left_out = 0; left_out < most && solution.usable; ++left_out) {
+    const Problem part = windowed(current, window);
+    if (solution.chi2 < chi2_gate(part.rows()) * free_rows(part)) break;
+    const int stray = stray_sample(part, solution.u);
+    if (stray < 0) break;
+    strays_s.push_back(part.arcs[0].t_s[stray]);
+    current = without_samples(current, {strays_s.back()});
+    --window;
+    solution = seek(windowed(current, window), solution.u, options);
+  }
+  return solution;
+}
+
+}  // namespace
+
 Found grow(const Problem& problem, const Start& start, int first_window, double growth,
            std::vector<double>* valleys) {
   constexpr double kSameValley = 1e-3;  // of chi-square
-  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
   constexpr double kLost = 4.0;  // of chi-square per row: a turn was lost on the way
   constexpr int kMostRetreats = 4, kLeastStep = 4;
   int before = 0, retreats = 0;  // the window explained last
+  std::vector<double> strays_s;
   double explained = chi2_gate(all);
   for (int window = std::min(first_window, all);;) {
     Problem part = windowed(current, window);
     // The first window settles which valley it is; the next ones only follow it.
     const bool first = before == 0;
-    const Solution solution = seek(
-        part, part.start(),
-        {.iterations = first ? 60 : 25, .function_tolerance = first && window < all ? 1e-4 : 1e-3});
+    const SolveOptions options{.iterations = first ? 60 : 25,
+                               .function_tolerance = first && window < all ? 1e-4 : 1e-3};
+    const Solution solution =
+        without_strays(current, window, seek(part, part.start(), options), options, strays_s);
+    part = windowed(current, window);
+    all = static_cast<int>(current.arcs[0].t_s.size());
     const double reduced = solution.chi2 / free_rows(part);
     const bool lost = !solution.usable || reduced > kLost * explained;
     if (!first && lost && retreats < kMostRetreats && window - before > kLeastStep) {
@@ -178,11 +232,12 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     before = window;
     window = std::min(static_cast<int>(growth * window) + 8, all);
   }
-  if (problem.rough)
-    return judged(problem,
-                  seek(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3}),
-                  start.path);
-  return judged(problem, solve_to_the_end(current), start.path);
+  Solution solution =
+      problem.rough ? seek(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3})
+                    : solve_to_the_end(current);
+  Found found = judged(current, std::move(solution), start.path);
+  found.strays_s = std::move(strays_s);
+  return found;
 }
 
 }  // namespace trochoid::fitting

@@ -13,10 +13,11 @@ using Starter = std::function<std::vector<Start>(const ArcData& window)>;
 /// Where a search ended.
 struct Found {
   Solution solution;
-  std::string path = "none";  ///< which start won
-  double reduced_chi2 = 0.0;  ///< on the full arc, before robust weights
-  double unexplained = 1.0;   ///< chi-square over that of knowing nothing (null_chi2)
-  bool passed = false;        ///< the chi-square gate
+  std::string path = "none";          ///< which start won
+  double reduced_chi2 = 0.0;          ///< on the full arc, before robust weights
+  double unexplained = 1.0;           ///< chi-square over that of knowing nothing (null_chi2)
+  bool passed = false;                ///< the chi-square gate
+  std::vector<double> strays_s = {};  ///< samples that are wrong by all others, left out
 };
 
 /// The same arcs and values for another predictor; parameters are matched by name.
@@ -32,12 +33,16 @@ void apply(const Start& start, Problem& problem);
 /// Chi-square of knowing nothing: positions about their mean, turning angles anywhere in a turn.
 [[nodiscard]] double null_chi2(const ArcData& arc);
 
+/// A single-arc problem without the samples at these times.
+[[nodiscard]] Problem without_samples(const Problem& problem, const std::vector<double>& t_s);
+
 /// A single-arc problem on its first `samples` samples, thinned to a few hundred; losses, which a
 /// short window hardly shows, are kept near their given values.
 [[nodiscard]] Problem windowed(const Problem& problem, int samples);
 
 /// Levenberg-Marquardt on a thinned window, then on windows half as long again each, then on
-/// all samples.
+/// all samples. A sample that alone leaves a good part of a window unexplained is left out: one
+/// wrong azimuth among dozens of angles outweighs them all.
 /// @param first_window samples of the first window.
 /// @param growth       of a window over the one before.
 /// @param valleys      chi-squares at which other starts ended on the first window, this one's is
