@@ -1,12 +1,35 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "smoothing.hpp"
 #include "strategy.hpp"
 
 namespace trochoid::fitting {
 namespace {
 
 constexpr int kShortestWindow = 24, kFewestSamples = 16;
+
+// Samples of the first window for a body on its rim. Angles say enough of it within a turn and a
+// half of the node line; a start carries no further where a slow camera takes few pictures a turn.
+int shortest_window(const ArcData& arc, int otherwise) {
+  constexpr double kTurn = 2.0 * std::numbers::pi, kTurns = 1.5;
+  constexpr int kLeast = 12;
+  std::vector<double> rates_rad_s;
+  const Reading* before = nullptr;
+  for (const Reading& reading : arc.readings) {
+    if (reading.channel != Channel::phi) continue;
+    if (before != nullptr)
+      rates_rad_s.push_back(std::abs(std::remainder(reading.value.x() - before->value.x(), kTurn)) /
+                            (arc.t_s[reading.sample] - arc.t_s[before->sample]));
+    before = &reading;
+  }
+  const double turned = median(std::move(rates_rad_s)) * arc.duration_s();
+  if (!(turned > 0.0)) return otherwise;
+  const double samples = kTurns * kTurn / turned * static_cast<double>(arc.t_s.size());
+  return static_cast<int>(std::clamp<double>(samples, kLeast, otherwise));
+}
 
 double chi2_at(const Problem& problem) {
   Eigen::VectorXd residuals;
@@ -16,13 +39,15 @@ double chi2_at(const Problem& problem) {
 }
 
 // Starts of one window in the order of their chi-square there; those without a prediction drop out,
-// and so do those that are no better than knowing nothing although the angles were seen: the window
-// is too long for a start from its first samples.
-std::vector<Start> screened(const Problem& window, const Starter& starter) {
+// and so do those that are no better than knowing nothing although they come from angles: the
+// window is too long for a start from its first samples.
+enum class StartsFrom { all, positions };
+std::vector<Start> screened(const Problem& window, const Starter& starter,
+                            StartsFrom from = StartsFrom::all) {
   constexpr double kTellsSomething = 0.3;
   const bool seen = window.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
-  const double most =
-      seen ? kTellsSomething * null_chi2(window.arcs[0]) : std::numeric_limits<double>::max();
+  const double most = seen && from == StartsFrom::all ? kTellsSomething * null_chi2(window.arcs[0])
+                                                      : std::numeric_limits<double>::max();
   std::vector<std::pair<double, Start>> scored;
   for (Start& start : starter(window.arcs[0])) {
     Problem trial = window;
@@ -41,9 +66,10 @@ std::vector<Start> screened(const Problem& window, const Starter& starter) {
 // state at its first sample (bodies on their rim), it has to be grown from a short one.
 std::vector<int> window_sizes(const Problem& problem) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const bool rolls = problem.predictor->index_of("w1_rad_s") >= 0;
+  const int shortest = rolls ? shortest_window(problem.arcs[0], kShortestWindow) : kShortestWindow;
   std::vector<int> sizes;
-  for (int window = all; window >= std::min(kShortestWindow, all); window /= 2)
-    sizes.push_back(window);
+  for (int window = all; window >= std::min(shortest, all); window /= 2) sizes.push_back(window);
   if (problem.predictor->index_of("w1_rad_s") >= 0) std::reverse(sizes.begin(), sizes.end());
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   // Unseen, a state at the first sample hardly ever leads straight to the last one.
@@ -98,13 +124,13 @@ Start start_at(const Problem& problem, const Eigen::VectorXd& u, const std::stri
 
 // Many starts, each taken downhill on the window with the losses held; best first, and of those
 // that end in the same valley one.
-std::vector<Start> settled(const Problem& window, const Starter& starter) {
+std::vector<Start> settled(const Problem& window, const Starter& starter, StartsFrom from) {
   constexpr std::size_t kSettled = 40;
   constexpr double kSameValley = 1e-2;  // of chi-square
   Problem plain = window;
   for (FreeParameter& parameter : plain.free) parameter.held |= is_loss(plain, parameter);
   std::vector<std::pair<double, Start>> ends;
-  const std::vector<Start> starts = screened(window, starter);
+  const std::vector<Start> starts = screened(window, starter, from);
   for (std::size_t i = 0; i < std::min(kSettled, starts.size()) && !exhausted(window, {}); ++i) {
     Problem trial = plain;
     apply(starts[i], trial);
@@ -124,15 +150,17 @@ std::vector<Start> settled(const Problem& window, const Starter& starter) {
 
 // Ends when the best valley has been reached so often that no better one is to be expected: it is
 // not the model's fault alone then if it does not pass.
-Found search_widely(const Problem& problem, const Starter& starter, Found best) {
+Found search_widely(const Problem& problem, const Starter& starter, Found best,
+                    StartsFrom from = StartsFrom::all) {
   constexpr std::size_t kGrown = 6;
   constexpr int kOftenEnough = 3;
   constexpr double kSameValley = 1e-3;  // of chi-square
   int reached = 0;
   constexpr double kSlowly = 1.2;
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  for (int window = std::min(kFewestSamples, all); window <= all; window *= 2) {
-    const std::vector<Start> starts = settled(windowed(problem, window), starter);
+  const int shortest = shortest_window(problem.arcs[0], kFewestSamples);
+  for (int window = std::min(shortest, all); window <= all; window *= 2) {
+    const std::vector<Start> starts = settled(windowed(problem, window), starter, from);
     for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
       Found found = grow(problem, starts[i], window, kSlowly);
       if (!found.solution.usable) {
@@ -172,7 +200,7 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   const Starter blind = [&](const ArcData& window) {
     return starter(window.without(Channel::phi));
   };
-  return search_widely(problem, blind, std::move(best));
+  return search_widely(problem, blind, std::move(best), StartsFrom::positions);
 }
 
 Found from_best_start(const Problem& problem, const Starter& starter) {

@@ -63,11 +63,14 @@ Motion motion_of(const ArcData& arc) {
           median(std::move(turning)), *upper};
 }
 
-// State that rolls without slip with the given attitude, rates and the measured velocity.
-Start state(const Motion& motion, const RimShape& shape, double theta, double phi, double w1,
-            double w2, const char* path) {
+// Spin of a body that rolls without slip with the measured velocity.
+double spin_by_velocity(const Motion& motion, const RimShape& shape, double phi, double w2) {
   const Eigen::Vector2d n(std::cos(phi), std::sin(phi));
-  const double w3 = (shape.h * w2 - motion.velocity_m_s.dot(n)) / shape.R;
+  return (shape.h * w2 - motion.velocity_m_s.dot(n)) / shape.R;
+}
+
+Start state(const Motion& motion, double theta, double phi, double w1, double w2, double w3,
+            const char* path) {
   return {path,
           {{"theta_rad", theta},
            {"phi_rad", phi},
@@ -91,6 +94,14 @@ std::vector<double> steady_rates(const RimShape& q, double theta, double vn) {
   if (discriminant < 0.0 || std::abs(two) < 1e-300) return {};
   const double root = std::sqrt(discriminant);
   return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
+}
+
+// Spin of steady rolling at this tilt and precession rate W:
+// A W^2 s c - C W s w3 + W (R s + h c) (h W s - R w3) + g (h s - R c) = 0 (per mass).
+double steady_spin(const RimShape& q, double theta, double W) {
+  const double s = std::sin(theta), c = std::cos(theta), z = q.R * s + q.h * c;
+  const double pull = W * W * s * (q.A * c + z * q.h) + q.g * (q.h * s - q.R * c);
+  return pull / (W * (q.C * s + q.R * z));
 }
 
 // Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
@@ -134,15 +145,20 @@ std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const 
   const int fewest = static_cast<int>(std::min(theta.t_s.size(), phi.t_s.size()));
   if (fewest < 8) return {};
   std::vector<Start> starts;
+  // A camera that is slow for the motion sees the angles well but no velocity: steady rolling is
+  // the other guess of the spin.
   const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
                        double share) {
-    const double clamped = std::clamp(tilt.first, 0.03, kPi - 0.03);
-    starts.push_back(state(motion, shape, clamped, turn.first, share * tilt.second,
-                           turn.second * std::sin(clamped), "windows"));
+    const double leaning = std::clamp(tilt.first, 0.03, kPi - 0.03), azimuth = turn.first;
+    const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
+    std::vector<double> spins{spin_by_velocity(motion, shape, azimuth, w2)};
+    if (turn.second != 0.0) spins.push_back(steady_spin(shape, leaning, turn.second));
+    for (const double w3 : spins)
+      starts.push_back(state(motion, leaning, azimuth, w1, w2, w3, "windows"));
   };
   for (const double share : {1.0, 0.5})  // the rate at an edge of the window is its noisiest number
     add(at(theta, arc.start_s), at(phi, arc.start_s), share);
-  for (const int count : {8, 16, 32})
+  for (const int count : {4, 8, 16, 32})
     if (count <= fewest)
       add(robust_line(theta, count, arc.start_s), robust_turning(phi, count, arc.start_s), 1.0);
   return starts;
@@ -160,9 +176,11 @@ std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
       std::vector<double> rates{0.8 * motion.turning_rad_s, motion.turning_rad_s,
                                 1.25 * motion.turning_rad_s};
       for (const double rate : steady_rates(shape, theta, vn)) rates.push_back(rate);
-      for (const double rate : rates)
-        starts.push_back(state(motion, shape, theta, heading - delta, -vt / z,
-                               rate * std::sin(theta), "multistart"));
+      for (const double rate : rates) {
+        const double phi = heading - delta, w2 = rate * std::sin(theta);
+        starts.push_back(state(motion, theta, phi, -vt / z, w2,
+                               spin_by_velocity(motion, shape, phi, w2), "multistart"));
+      }
     }
   return starts;
 }
