@@ -82,6 +82,8 @@ TEST(Pieces, WhyNoStartLedAnywhereIsTheCommonestReason) {
   EXPECT_THAT(some.words(), testing::HasSubstr("3 of them"));
   EXPECT_THAT(some.words(),
               testing::HasSubstr(std::string(model::sentence(model::Outcome::out_of_domain))));
+  some.departed = 5;
+  EXPECT_THAT(some.words(), testing::HasSubstr("of 5 starts none explains more than a part"));
 }
 
 data::Scene slanting_disc() {

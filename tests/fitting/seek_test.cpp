@@ -64,7 +64,8 @@ Problem problem_of(const Bent& bent, double sigma) {
   return make_problem(bent, {make_arc(track, 0, 12, {}, false)}, {});
 }
 
-// Steps of plain Levenberg-Marquardt are as short as the valley is narrow.
+// Straight steps are as short as the valley is narrow: the steps a minimiser has by default would
+// not take them to its end, which is where the residuals are the noise alone.
 TEST(Seek, FollowsABentValleyToItsEnd) {
   constexpr double kSigma = 1.0, kRows = 24.0;
   const Bent bent(300.0);
@@ -74,7 +75,7 @@ TEST(Seek, FollowsABentValleyToItsEnd) {
   EXPECT_NEAR(found.u[0], 1.0, 0.01 * kSigma);
   EXPECT_NEAR(found.u[1], 1.0, 0.02 * kSigma);
   EXPECT_NEAR(found.chi2, kRows, 0.01);
-  EXPECT_GT(solve(problem, far).chi2, kRows + 10.0);
+  EXPECT_LE(bent.derivatives(), SolveOptions{}.iterations);
 }
 
 TEST(Seek, StaysWhereNothingIsToBeGained) {

@@ -1,0 +1,88 @@
+#include "rung.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "trochoid/model/predictor.hpp"
+
+// What a rung of the ladder takes over from the one above it.
+namespace trochoid::fitting {
+namespace {
+
+data::Scene top_with_drag() {
+  data::Scene scene;
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m = Eigen::Vector3d::Zero();
+  scene.model.name = "top";
+  scene.model.drag_transverse_N_m_s = scene.model.drag_spin_N_m_s = 1e-6;
+  return scene;
+}
+
+data::Scene top() {
+  data::Scene scene = top_with_drag();
+  scene.model.drag_transverse_N_m_s.reset();
+  scene.model.drag_spin_N_m_s.reset();
+  return scene;
+}
+
+// A top that loses nothing.
+data::Track track_of_a_top() {
+  constexpr double kSigma_m = 3e-4;
+  const std::map<std::string, double> truth{
+      {"a_1_s2", 3.0}, {"b_1_s", 5.0}, {"l_m", 0.1}, {"theta_rad", 0.8}, {"dphi_rad_s", 0.3}};
+  const auto predictor = model::make_predictor(top());
+  Eigen::VectorXd values(predictor->parameters().size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const model::ParameterInfo& info = predictor->parameters()[static_cast<std::size_t>(i)];
+    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
+  }
+  std::vector<double> t_s;
+  for (int i = 0; i < 150; ++i) t_s.push_back(0.03 * i);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  const Eigen::VectorXd path = predictor->predict(values, request).values;
+  std::mt19937_64 generator(2);
+  std::normal_distribution<double> normal(0.0, kSigma_m);
+  data::Track track;
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    data::TrackSample sample;
+    sample.t_s = t_s[i];
+    sample.centre_m = path.segment<2>(2 * static_cast<Eigen::Index>(i)) +
+                      Eigen::Vector2d(normal(generator), normal(generator));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+TEST(Rung, ThatLacksATermGoesOnFromTheSolutionOfTheOneAbove) {
+  const data::Track track = track_of_a_top();
+  Rung above, below, alone;
+  above.scene = top_with_drag();
+  below.scene = alone.scene = top();
+  fit_rung(std::span(&track, 1), nullptr, nullptr, {}, above);
+  ASSERT_TRUE(above.fitted) << above.reason;
+  fit_smaller_rung(std::span(&track, 1), above, {}, below);
+  ASSERT_TRUE(below.fitted) << below.reason;
+  EXPECT_EQ(below.fit.start_path, "given") << "else it was searched for anew";
+  EXPECT_EQ(below.parameters, above.parameters - 2);
+  // What it lacks did not act: the same path, and less to pay for.
+  EXPECT_LT(below.bic, above.bic);
+  fit_rung(std::span(&track, 1), nullptr, nullptr, {}, alone);
+  EXPECT_NEAR(below.fit.chi2, alone.fit.chi2, 0.01) << "the minimum is the same one";
+  EXPECT_LT(below.held_back_rms_sigma, 2.0);
+}
+
+TEST(Rung, OfSeveralArcsIsSearchedForAnew) {
+  data::Fit two;
+  two.parameters.push_back({"friction", 0.2, 0.01, "", data::ParameterStatus::free, true, ""});
+  two.arcs.resize(2);
+  EXPECT_TRUE(values_of(two).empty());
+  two.arcs.resize(1);
+  EXPECT_EQ(values_of(two).at("friction"), 0.2);
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
