@@ -28,13 +28,16 @@ struct Moved {
   static constexpr double kStepPx = 1.5;
   static constexpr double kApartPx = 2.0 * kStepPx;  // farther from each other than neighbours are
   std::vector<data::OutlinePoint> points;
-  std::vector<size_t> ends;  // of the arc each point is on
+  std::vector<int> families;
+  std::vector<size_t> ends;  // of the arc of one family each point is on
 
   Moved(const data::Body& body, const data::Camera& camera, const Pose& pose)
       : points(data::visible_outline(body, pose, camera, kStepPx)), ends(points.size()) {
+    for (const data::OutlinePoint& point : points)
+      families.push_back(family_of(point.edge, point.silhouette));
     for (size_t i = points.size(); i-- > 0;) {
-      const bool goes_on =
-          i + 1 < points.size() && (points[i + 1].image_px - points[i].image_px).norm() < kApartPx;
+      const bool goes_on = i + 1 < points.size() && families[i + 1] == families[i] &&
+                           (points[i + 1].image_px - points[i].image_px).norm() < kApartPx;
       ends[i] = goes_on ? ends[i + 1] : i + 1;
     }
   }
@@ -49,6 +52,10 @@ std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sam
   const data::OutlinePoint* nearest = nullptr;
   double least = kFarthestPx;
   for (size_t i = 0; i < outline.points.size();) {
+    if (outline.families[i] != family) {
+      i = outline.ends[i];
+      continue;
+    }
     const data::OutlinePoint& point = outline.points[i];
     const double aside = std::abs(along.dot(point.image_px - sample.image_px));
     if (aside >= least) {
@@ -58,9 +65,7 @@ std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sam
       continue;
     }
     ++i;
-    if (point.normal_px.dot(sample.normal_px) < kLeastCosine ||
-        family_of(point.edge, point.silhouette) != family)
-      continue;
+    if (point.normal_px.dot(sample.normal_px) < kLeastCosine) continue;
     least = aside;
     nearest = &point;
   }
