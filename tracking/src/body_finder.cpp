@@ -88,7 +88,8 @@ class CylinderFinder final : public BodyFinder {
         alike_(body.faces_look_alike() && support.kind != data::SupportKind::pivot),
         pivoted_(support.kind == data::SupportKind::pivot),
         motion_(body, support, camera),
-        fitter_(body, support, camera, effort) {}
+        fitter_(body, support, camera, effort),
+        looks_again_(effort != Effort::quick) {}
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     const OutlineEvidence evidence{
@@ -106,7 +107,9 @@ class CylinderFinder final : public BodyFinder {
         .background_chroma = look.background.chroma,
         .blur_px = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->blur_px)
                                                            : std::nullopt,
-        .shading = look.shading};
+        .shading = look.shading,
+        .visit =
+            looks_again_ ? look.shading != nullptr ? Visit::again : Visit::first : Visit::only};
     auto measured = fitter_.measure(evidence);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,
@@ -191,6 +194,7 @@ class CylinderFinder final : public BodyFinder {
   bool alike_, pivoted_;
   PoseMotion motion_;
   OutlineFitter fitter_;
+  bool looks_again_;
 };
 
 }  // namespace

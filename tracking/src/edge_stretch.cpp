@@ -437,7 +437,8 @@ void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, con
 
 }  // namespace
 
-StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known) {
+StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known,
+                         bool weighed) {
   std::vector<Working> all(profiles.size());
   // A megabyte: kept, not cleared and given back with every look at a picture.
   thread_local std::vector<Columns> columns;
@@ -449,16 +450,18 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
     accumulate(profiles[i], columns[i], {1.0f, 1.0f, 1.0f}, all[i]);
     reduce(profiles[i], all[i]);
   }
-  find_shadings(profiles, noise_of_looks(profiles, all), known, all);
+  StretchFit out = find_shadings(profiles, noise_of_looks(profiles, all), known, all);
   for (size_t i = 0; i < profiles.size(); ++i)
     if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
   const std::vector<Variances> noise = noise_of_neighbours(all, profiles);
-  for (size_t i = 0; i < profiles.size(); ++i) {
-    if (!all[i].usable) continue;
-    accumulate(profiles[i], columns[i], noise[i], all[i]);
-    reduce(profiles[i], all[i]);
+  if (weighed) {
+    for (size_t i = 0; i < profiles.size(); ++i) {
+      if (!all[i].usable) continue;
+      accumulate(profiles[i], columns[i], noise[i], all[i]);
+      reduce(profiles[i], all[i]);
+    }
+    out = find_shadings(profiles, std::vector<double>(all.size(), 1.0), known, all);
   }
-  StretchFit out = find_shadings(profiles, std::vector<double>(all.size(), 1.0), known, all);
   for (size_t i = 0; i < profiles.size(); ++i) {
     profiles[i].found = false;
     if (all[i].usable) fit_offset(profiles[i], columns[i], noise[i], all[i]);

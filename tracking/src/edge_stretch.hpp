@@ -39,6 +39,9 @@ struct StretchFit {
 /// neighbours: the relief of a coin and the floor are not equally noisy, and a single profile has
 /// too few degrees of freedom to know its own.
 /// @param known what other frames show of the light beside these curves.
-StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known = {});
+/// @param weighed by how noisy samples inside, outside and on the edge are, in a second pass over
+/// what a first one leaves; without, all of a profile count the same.
+StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known = {},
+                         bool weighed = true);
 
 }  // namespace trochoid::tracking

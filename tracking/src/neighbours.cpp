@@ -205,14 +205,50 @@ Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
   return earlier;
 }
 
-/// The light beside the outline in the frames around frame i.
-ShadingMemory shading_around(const std::vector<Glimpse>& glimpses, std::size_t i) {
+/// As far beyond `to` as that is from `from`.
+Pose beyond(const Pose& from, const Pose& to) {
+  Pose pose = to;
+  pose.phi_rad += std::remainder(to.phi_rad - from.phi_rad, kTurn);
+  pose.theta_rad += to.theta_rad - from.theta_rad;
+  pose.centre_m += to.centre_m - from.centre_m;
+  return pose;
+}
+
+/// Where the body of frame i would have been one frame before it; nothing if it is not seen on
+/// either side.
+std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::size_t i,
+                                     bool alike) {
+  const Pose& pose = glimpses[i].pose();
+  const auto at = [&](std::size_t k) -> std::optional<Pose> {
+    if (k >= glimpses.size() || !glimpses[k].posed()) return std::nullopt;
+    return alike ? nearer_face(glimpses[k].pose(), pose, 0.0) : glimpses[k].pose();
+  };
+  const std::optional<Pose> before = at(i - 1), after = at(i + 1);
+  if (!before && !after) return std::nullopt;
+  return one_frame_before(before ? *before : beyond(*after, pose), pose,
+                          after ? *after : beyond(*before, pose));
+}
+
+/// What the frames around frame i show of the picture: the light beside the outline, and how sharp
+/// it is.
+struct Surroundings {
+  ShadingMemory shading;
+  double blur_px;
+};
+
+Surroundings around(const std::vector<Glimpse>& glimpses, std::size_t i) {
   constexpr std::size_t kReach = 6;
-  ShadingMemory sum;
-  for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1); ++k)
-    if (k != i && glimpses[k].posed() && glimpses[k].seen->pose->shading)
-      sum.add(*glimpses[k].seen->pose->shading);
-  return sum;
+  Surroundings out;
+  std::vector<double> blurs_px;
+  for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
+       ++k) {
+    if (!glimpses[k].posed()) continue;
+    const PoseMeasurement& pose = *glimpses[k].seen->pose;
+    blurs_px.push_back(pose.blur_px);
+    if (k != i && pose.shading) out.shading.add(*pose.shading);
+  }
+  out.blur_px = data::median(std::move(blurs_px));
+  return out;
 }
 
 /// Measures a frame again where its neighbours contradict it. Nothing if what was seen stands.
@@ -321,23 +357,21 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
 
 void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,
                    std::vector<Glimpse>& glimpses) {
-  constexpr double kAsGood = 0.95, kNear = 0.25;
+  constexpr double kAsGood = 0.8, kNear = 0.25;
   const bool alike = finder.faces_look_alike();
   const std::vector<Glimpse> was = glimpses;
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
-    if (i == 0 || i < settled || i + 1 >= was.size() || !was[i].posed() || !was[i - 1].posed() ||
-        !was[i + 1].posed())
-      return;
+    if (i < settled || !was[i].posed() || was[i].seen->attitude_doubtful) return;
+    const std::optional<Pose> before = one_frame_before(was, i, alike);
+    if (!before) return;
     const Sighting& seen = *was[i].seen;
-    if (seen.attitude_doubtful) return;
-    const Pose pose = seen.pose->pose;
-    Pose before = was[i - 1].seen->pose->pose, after = was[i + 1].seen->pose->pose;
-    if (alike) before = nearer_face(before, pose, 0.0), after = nearer_face(after, pose, 0.0);
-    const ShadingMemory shading = shading_around(was, i);
-    auto again = measure(*was[i].frame, seen, one_frame_before(before, pose, after), &shading);
+    const Surroundings surroundings = around(was, i);
+    Sighting guess = seen;
+    guess.pose->blur_px = surroundings.blur_px;
+    auto again = measure(*was[i].frame, std::move(guess), before, &surroundings.shading);
     if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
     const double off =
-        std::max(between_axes(axis_of(again->pose->pose), axis_of(pose), alike),
+        std::max(between_axes(axis_of(again->pose->pose), axis_of(seen.pose->pose), alike),
                  (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
     if (off > kNear) return;
     again->turned_rad = seen.turned_rad;

@@ -21,20 +21,24 @@ namespace {
 // Coarse to fine, the first two on blurred pictures: a wide edge is seen from far and through
 // noise, a sharp one is precise.
 constexpr double kFarBlurPx = 2.5, kNearBlurPx = 1.0;
-constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 4, 0.1, false};
-constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 4, 0.05, false};
+constexpr Search kFar{2.7, 8.0, 7.0, 3.0, 3.0, 4, 0.1, false};
+constexpr Search kNear{1.3, 4.5, 3.5, 2.5, 2.5, 4, 0.05, false};
 // From a prediction that is off by more than the blur: where the last sharp look then starts.
-constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 2, 0.5, false};
-// Longer outlines are sampled more sparsely: neighbours share their errors anyhow.
-Search exact(double most_looks, double blur_px, double outline_px) {
+constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 5.0, 2, 0.5, false};
+// Longer outlines are sampled more sparsely: neighbours share their errors anyhow. Rounds that only
+// lead to where the last one looks, and frames that will be looked at again, do with every second
+// point.
+Search exact(const Scenery& scenery, double blur_px, double outline_px) {
   constexpr double kLeastStep_px = 1.0;  // neighbours nearer than this show the same pixels
-  return {blur_px,
-          2.0 + 2.5 * blur_px,
-          0.5 + 2.0 * blur_px,
-          std::max(kLeastStep_px, outline_px / most_looks),
-          5,
-          0.06,
-          true};
+  const double step_px = std::max(kLeastStep_px, outline_px / scenery.most_looks);
+  return {.blur_px = blur_px,
+          .extent_px = 2.0 + 2.5 * blur_px,
+          .reach_px = 0.5 + 2.0 * blur_px,
+          .first_step_px = scenery.visit == Visit::again ? step_px : 2.0 * step_px,
+          .step_px = scenery.visit == Visit::first ? 2.0 * step_px : step_px,
+          .iterations = 5,
+          .settled_px = 0.06,
+          .exact = true};
 }
 
 cv::Rect window_of(const data::Body& body, const data::Camera& camera, const data::Pose<>& pose,
@@ -67,7 +71,7 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
   double blur_px = known_blur_px.value_or(kUsualBlurPx);
   data::Pose<> pose = start;
   for (int round = 0; round < 6; ++round) {
-    auto refined = refine(scenery, pose, exact(scenery.most_looks, blur_px, outline_px));
+    auto refined = refine(scenery, pose, exact(scenery, blur_px, outline_px));
     if (!refined) return std::nullopt;
     out.refined = std::move(*refined);
     out.blur_px = std::clamp(blur_px + out.refined.wider_px, kSharpestPx, kWidestPx);
@@ -343,6 +347,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       evidence.background.empty() ? LightWindow()
                                   : LightWindow(evidence.background, window, camera_.transfer),
       colour_window(evidence.chroma, window, body_, camera_, starts.front()), most_looks_,
+      evidence.visit,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))

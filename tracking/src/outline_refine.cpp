@@ -233,8 +233,9 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
 }
 
 // All edges, also those between two surfaces of the body; returns what the blur should grow by.
-double collect_exactly(const Scenery& scenery, const Search& search, bool colour, Round& round,
-                       Refined& out) {
+// Where the body will be looked at again, and in rounds before the last, samples are not weighed.
+double collect_exactly(const Scenery& scenery, const Search& search, bool colour, bool last,
+                       Round& round, Refined& out) {
   const std::vector<OutlineSample>& all = round.outline;
   std::vector<StretchProfile>& looks = round.looks[colour ? 1 : 0];
   std::vector<size_t>& places = round.places[colour ? 1 : 0];
@@ -247,7 +248,8 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
       places.push_back(i);
   looks.resize(places.size());
   static const ShadingMemory kNothing;
-  StretchFit fit = fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing);
+  StretchFit fit = fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing,
+                                 last && scenery.visit != Visit::first);
   const std::vector<Surroundings> around = surroundings_of(looks);
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
@@ -289,8 +291,9 @@ void cross_outline(double step_px, Round& round) {
   round.sweeps = std::move(sweeps);
 }
 
-bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, double step_px,
+bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, bool last,
              Round& round, Refined& out) {
+  const double step_px = last ? search.step_px : search.first_step_px;
   constexpr double kSmoothPx = 2.0;  // closer samples are as well interpolated
   round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion,
                                   search.exact ? kSmoothPx : step_px);
@@ -311,7 +314,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
       collect_roughly(scenery, round, search, colour, out);
       continue;
     }
-    const double wider = collect_exactly(scenery, search, colour, round, out);
+    const double wider = collect_exactly(scenery, search, colour, last, round, out);
     if (!colour) out.wider_px = wider;
   }
   return !round.outline.empty();
@@ -358,12 +361,9 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   constexpr double kLeastScale = 0.15, kLeastExactScale = 0.05;
   const double least_scale_px = (search.exact ? kLeastExactScale : kLeastScale) * search.blur_px;
   Round round;
-  // The first exact rounds only lead to where the last one looks: every second point does.
-  constexpr double kSparse = 2.0;
-  bool last = !search.exact;
+  bool last = search.first_step_px <= search.step_px;
   for (int i = 0; i < search.iterations; ++i) {
-    const double step_px = last ? search.step_px : kSparse * search.step_px;
-    if (!collect(scenery, out.pose, search, step_px, round, out)) return std::nullopt;
+    if (!collect(scenery, out.pose, search, last, round, out)) return std::nullopt;
     if (!solve_robustly(out.equations, prior, least_scale_px, search.exact, out.solution))
       return std::nullopt;
     out.pose = scenery.motion.moved(out.pose, out.solution.step);
@@ -374,7 +374,9 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
     const bool settled = moved2 < settled2;
     // Linear sums about a predicted edge bear a small step at most.
     constexpr double kLinear = 2.5;
-    if (last && (settled || (search.exact && moved2 < kLinear * kLinear * settled2))) break;
+    if (last && (settled || (search.exact && scenery.visit != Visit::again &&
+                             moved2 < kLinear * kLinear * settled2)))
+      break;
     last = last || settled || i + 2 >= search.iterations;
   }
   out.seen_px = seen_px(search, round, out);

@@ -22,6 +22,7 @@ struct Scenery {
   LightWindow picture, plate;
   LightWindow colour;  ///< colour_window, or empty
   double most_looks;
+  Visit visit = Visit::only;
   PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
   std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
@@ -36,6 +37,7 @@ struct Scenery {
             plate.blurred(sigma_px),
             colour.blurred(sigma_px),
             most_looks,
+            visit,
             smear,
             tints,
             exposure,
@@ -45,10 +47,11 @@ struct Scenery {
 
 /// How rounds of refinement look for edges.
 struct Search {
-  double blur_px;    ///< of the model edge; wider reaches further
-  double extent_px;  ///< of the profiles to either side
-  double reach_px;   ///< largest offset believed
-  double step_px;    ///< between outline points
+  double blur_px;        ///< of the model edge; wider reaches further
+  double extent_px;      ///< of the profiles to either side
+  double reach_px;       ///< largest offset believed
+  double first_step_px;  ///< between outline points, while the pose settles
+  double step_px;        ///< of the last round
   int iterations;
   double settled_px;  ///< a smaller step is the last [px, rms along the outline]
   /// With everything that bears on accuracy: slopes beside the edges, edges between two surfaces of

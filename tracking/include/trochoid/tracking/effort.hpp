@@ -20,4 +20,7 @@ enum class Effort { quick, normal, exact };
   return 450.0;
 }
 
+/// A picture is looked at once, or in passing first and again when the frames around it are known.
+enum class Visit { only, first, again };
+
 }  // namespace trochoid::tracking

@@ -77,6 +77,7 @@ struct OutlineEvidence {
   /// PoseMeasurement::blur_px of the frame before; without, it is found by looking repeatedly.
   std::optional<double> blur_px{};
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
+  Visit visit = Visit::only;
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
