@@ -9,27 +9,72 @@
 namespace trochoid::fitting {
 namespace {
 
-// Innovations of the Kalman filter that follows the autoregressive part, each over its standard
-// deviation. @returns the logarithm of the determinant of the correlation matrix.
+// The Kalman filter that follows the autoregressive part of so many kinds of noise side by side.
+// What it knows of the next sample settles after a few; from then on nothing is divided.
+template <int kKinds>
+class Follower {
+ public:
+  using Array = Eigen::Array<double, kKinds, 1>;
+  Follower(const Array& share, const Array& rho)
+      : share_(share), rho_(rho), root_(share.sqrt()), predicted_(Array::Ones()) {
+    look_ahead();
+  }
+  [[nodiscard]] const Array& root() const { return root_; }
+  [[nodiscard]] const Array& rho() const { return rho_; }
+  [[nodiscard]] const Array& gain() const { return gain_; }
+  [[nodiscard]] const Array& variance() const { return variance_; }  ///< of the innovation
+  [[nodiscard]] const Array& inverse() const { return inverse_; }    ///< of that
+  [[nodiscard]] Array log_determinant() const { return logs_ + product_.log(); }
+
+  void advance() {
+    // Factors of no less than 1e-8 each.
+    constexpr int kFactors = 32;
+    product_ *= variance_;
+    if (++factors_ == kFactors) {
+      logs_ += product_.log();
+      product_.setOnes();
+      factors_ = 0;
+    }
+    if (settled_) return;
+    constexpr double kSettled = 1e-15;
+    const Array rho2 = rho_.square();
+    const Array next = rho2 * predicted_ * (1.0 - gain_ * root_) + 1.0 - rho2;
+    settled_ = ((next - predicted_).abs() < kSettled).all();
+    predicted_ = next;
+    look_ahead();
+  }
+
+ private:
+  void look_ahead() {
+    variance_ = share_ * predicted_ + (1.0 - share_);
+    inverse_ = variance_.inverse();
+    gain_ = root_ * predicted_ * inverse_;
+  }
+  Array share_, rho_, root_, predicted_, variance_, inverse_, gain_;
+  Array product_ = Array::Ones(), logs_ = Array::Zero();
+  int factors_ = 0;
+  bool settled_ = false;
+};
+
+// Innovations of that filter, each over its standard deviation. @returns the logarithm of the
+// determinant of the correlation matrix.
 double filter(const NoiseKind& kind, const Eigen::MatrixXd& x, Eigen::MatrixXd& out) {
-  const double root = std::sqrt(kind.share), white = 1.0 - kind.share;
-  const double rho2 = kind.rho * kind.rho;
+  using One = Follower<1>::Array;
+  Follower<1> follower(One(kind.share), One(kind.rho));
+  const double root = follower.root()[0];
   // Column by column in memory, row by row in time: worked on transposed.
   Eigen::MatrixXd rows = x.transpose();
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(x.cols());
-  double predicted = 1.0, log_determinant = 0.0;
   for (Eigen::Index t = 0; t < rows.cols(); ++t) {
-    const double variance = kind.share * predicted + white;
-    const double gain = root * predicted / variance;
+    const double gain = follower.gain()[0];
     auto row = rows.col(t);
     row -= root * mean;
     mean = kind.rho * (mean + gain * row);
-    row /= std::sqrt(variance);
-    log_determinant += std::log(variance);
-    predicted = rho2 * (predicted - gain * root * predicted) + 1.0 - rho2;
+    row *= std::sqrt(follower.inverse()[0]);
+    follower.advance();
   }
   out = rows.transpose();
-  return log_determinant;
+  return follower.log_determinant()[0];
 }
 
 // What one group adds to twice the negative logarithm of the likelihood.
@@ -38,15 +83,15 @@ struct Likelihood {
 };
 
 // Restricted: what the parameters take is left out of account.
-void add(const NoiseGroup& group, const NoiseKind& kind, bool restricted, Likelihood& sum) {
-  const Eigen::Index taken = restricted ? group.front().taken.cols() : 0;
+void add(const NoiseGroup& group, const NoiseKind& kind, Likelihood& sum) {
+  const Eigen::Index taken = group.front().taken.cols();
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(taken, taken);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(taken);
   Eigen::MatrixXd whitened;
   for (const NoiseSeries& one : group) {
     Eigen::MatrixXd both(one.residual.size(), taken + 1);
     both.col(0) = one.residual;
-    both.rightCols(taken) = one.taken.leftCols(taken);
+    both.rightCols(taken) = one.taken;
     sum.log_determinant += filter(kind, both, whitened);
     const auto w = whitened.rightCols(taken);
     normal.noalias() += w.transpose() * w;
@@ -61,12 +106,52 @@ void add(const NoiseGroup& group, const NoiseKind& kind, bool restricted, Likeli
   sum.left -= static_cast<double>(taken);
 }
 
-// Twice the negative logarithm of the likelihood with the best variance, which the kind is given.
-double surprise(const std::vector<NoiseGroup>& groups, bool restricted, NoiseKind& kind) {
+// Twice the negative logarithm of the likelihood with the best variance.
+double surprise(const Likelihood& sum, double& variance) {
+  variance = std::max(sum.squares / sum.left, 1e-300);
+  return sum.log_determinant + sum.left * std::log(variance);
+}
+
+// Of the residuals as they are, for all kinds; these are given the best variance.
+std::vector<double> plain_surprises(const std::vector<NoiseGroup>& groups,
+                                    std::vector<NoiseKind>& kinds) {
+  constexpr int kTogether = 8;
+  using Lanes = Follower<kTogether>::Array;
+  std::vector<double> surprises(kinds.size());
+  for (std::size_t first = 0; first < kinds.size(); first += kTogether) {
+    Lanes share = Lanes::Zero(), rho = Lanes::Zero();
+    const int count = static_cast<int>(std::min<std::size_t>(kTogether, kinds.size() - first));
+    for (int k = 0; k < count; ++k) {
+      share[k] = kinds[first + static_cast<std::size_t>(k)].share;
+      rho[k] = kinds[first + static_cast<std::size_t>(k)].rho;
+    }
+    Lanes squares = Lanes::Zero(), log_determinant = Lanes::Zero();
+    double left = 0.0;
+    for (const NoiseGroup& group : groups)
+      for (const NoiseSeries& one : group) {
+        Follower<kTogether> follower(share, rho);
+        Lanes mean = Lanes::Zero();
+        for (const double residual : one.residual) {
+          const Lanes innovation = residual - follower.root() * mean;
+          mean = follower.rho() * (mean + follower.gain() * innovation);
+          squares += innovation.square() * follower.inverse();
+          follower.advance();
+        }
+        log_determinant += follower.log_determinant();
+        left += static_cast<double>(one.residual.size());
+      }
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      surprises[i] = surprise({log_determinant[k], squares[k], left}, kinds[i].variance);
+    }
+  }
+  return surprises;
+}
+
+double restricted_surprise(const std::vector<NoiseGroup>& groups, NoiseKind& kind) {
   Likelihood sum;
-  for (const NoiseGroup& group : groups) add(group, kind, restricted, sum);
-  kind.variance = std::max(sum.squares / sum.left, 1e-300);
-  return sum.log_determinant + sum.left * std::log(kind.variance);
+  for (const NoiseGroup& group : groups) add(group, kind, sum);
+  return surprise(sum, kind.variance);
 }
 
 // White noise, and a grid over the shares and the correlation times, these evenly in their
@@ -104,15 +189,14 @@ NoiseEvidence noise_evidence(const std::vector<NoiseGroup>& groups) {
   if (longest < kFewest || rows < 2 * taken)
     return {{NoiseKind{}}, static_cast<double>(rows) * std::log(power / static_cast<double>(rows))};
   std::vector<NoiseKind> kinds = candidates(longest);
-  std::vector<double> surprises(kinds.size());
-  for (std::size_t i = 0; i < kinds.size(); ++i) surprises[i] = surprise(groups, false, kinds[i]);
+  std::vector<double> surprises = plain_surprises(groups, kinds);
   const double plain = *std::min_element(surprises.begin(), surprises.end());
   // The parameters' part of the likelihood is worth some logarithms each: where the plain one is
   // far beyond those, the plain one says enough.
   const double far = 30.0 + 8.0 * static_cast<double>(taken);
   for (std::size_t i = 0; i < kinds.size(); ++i)
     surprises[i] = surprises[i] > plain + far ? std::numeric_limits<double>::infinity()
-                                              : surprise(groups, true, kinds[i]);
+                                              : restricted_surprise(groups, kinds[i]);
   const double least = *std::min_element(surprises.begin(), surprises.end());
   for (std::size_t i = 0; i < kinds.size(); ++i)
     kinds[i].belief *= std::exp(-0.5 * (surprises[i] - least));
