@@ -13,22 +13,57 @@ namespace {
 constexpr int kMaxColumns = 4;
 using Coefficients = Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, kMaxColumns>;
 
-// Cubic through one window about the time of sample `at`: rows are c0..c3 of sum c_k (t - t_at)^k.
-Coefficients window_cubic(std::span<const double> t_s, const Eigen::MatrixXd& samples, int first,
-                          int count, int at) {
-  const double scale = std::max(t_s[first + count - 1] - t_s[first], 1e-300);
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Coefficients right = Coefficients::Zero(4, samples.cols());
-  for (int i = first; i < first + count; ++i) {
-    const double u = (t_s[i] - t_s[at]) / scale;
-    const Eigen::Vector4d basis(1.0, u, u * u, u * u * u);
-    normal.noalias() += basis * basis.transpose();
-    right.noalias() += basis * samples.row(i);
+// Basis 1, u, u^2, u^3 of u = (t - t_at)/scale at the samples of a window, one column each.
+Eigen::Matrix4Xd basis_of(std::span<const double> t_s, int first, int count, int at, double scale) {
+  Eigen::Matrix4Xd basis(4, count);
+  for (int i = 0; i < count; ++i) {
+    const double u = (t_s[first + i] - t_s[at]) / scale;
+    basis.col(i) << 1.0, u, u * u, u * u * u;
   }
-  Coefficients c = normal.ldlt().solve(right);
-  for (int k = 1; k < 4; ++k) c.bottomRows(4 - k) /= scale;
-  return c;
+  return basis;
 }
+
+// Cubics through windows of samples. Windows of evenly spaced samples about their middle are all
+// alike: their coefficients are one set of weights on the samples.
+class WindowCubics {
+ public:
+  WindowCubics(std::span<const double> t_s, const Eigen::MatrixXd& samples, int half_width)
+      : t_s_(t_s), samples_(samples), half_width_(half_width), even_since_(t_s.size(), 0) {
+    constexpr double kJitter = 1e-6;  // of a step
+    for (std::size_t i = 2; i < t_s.size(); ++i) {
+      const double step_s = t_s[i] - t_s[i - 1], before_s = t_s[i - 1] - t_s[i - 2];
+      const bool even = std::abs(step_s - before_s) < kJitter * before_s;
+      even_since_[i] = even ? even_since_[i - 1] : static_cast<int>(i) - 1;
+    }
+  }
+
+  // About the time of sample `at`: rows are c0..c3 of sum c_k (t - t_at)^k.
+  [[nodiscard]] Coefficients operator()(int first, int count, int at) {
+    const double scale = std::max(t_s_[first + count - 1] - t_s_[first], 1e-300);
+    const bool usual = count == 2 * half_width_ + 1 && at == first + half_width_;
+    Coefficients c(4, samples_.cols());
+    if (usual && even_since_[first + count - 1] <= first) {
+      if (weights_.cols() == 0) {
+        const Eigen::Matrix4Xd basis = basis_of(t_s_, first, count, at, scale);
+        weights_ = Eigen::Matrix4d(basis * basis.transpose()).ldlt().solve(basis);
+      }
+      c.noalias() = weights_ * samples_.middleRows(first, count);
+    } else {
+      const Eigen::Matrix4Xd basis = basis_of(t_s_, first, count, at, scale);
+      c.noalias() = basis * samples_.middleRows(first, count);
+      c = Eigen::Matrix4d(basis * basis.transpose()).ldlt().solve(c).eval();
+    }
+    for (int k = 1; k < 4; ++k) c.bottomRows(4 - k) /= scale;
+    return c;
+  }
+
+ private:
+  std::span<const double> t_s_;
+  const Eigen::MatrixXd& samples_;
+  int half_width_;
+  std::vector<int> even_since_;  ///< per sample, the first of the evenly spaced ones it ends
+  Eigen::Matrix4Xd weights_;
+};
 
 int window_start(int at, int half_width, int count, int n) {
   return std::clamp(at - half_width, 0, n - count);
@@ -48,9 +83,10 @@ double centre_leverage(int w) {
 std::vector<double> centre_residuals(std::span<const double> t_s, const Eigen::MatrixXd& samples,
                                      int half_width, int stride) {
   const int n = static_cast<int>(t_s.size());
+  WindowCubics cubic(t_s, samples, half_width);
   std::vector<double> residuals;
   for (int at = half_width; at < n - half_width; at += stride) {
-    const Coefficients c = window_cubic(t_s, samples, at - half_width, 2 * half_width + 1, at);
+    const Coefficients c = cubic(at - half_width, 2 * half_width + 1, at);
     for (Eigen::Index k = 0; k < samples.cols(); ++k) residuals.push_back(samples(at, k) - c(0, k));
   }
   return residuals;
@@ -71,9 +107,9 @@ SmoothCurve smooth(std::span<const double> t_s, const Eigen::MatrixXd& samples, 
   const int n = static_cast<int>(t_s.size());
   const int count = std::min(2 * half_width + 1, n);
   SmoothCurve out{samples, samples, samples, half_width};
+  WindowCubics cubic(t_s, samples, half_width);
   for (int at = 0; at < n; ++at) {
-    const Coefficients c =
-        window_cubic(t_s, samples, window_start(at, half_width, count, n), count, at);
+    const Coefficients c = cubic(window_start(at, half_width, count, n), count, at);
     out.value.row(at) = c.row(0);
     out.first.row(at) = c.row(1);
     out.second.row(at) = 2.0 * c.row(2);
