@@ -98,6 +98,15 @@ class Moved {
   double frame_time_s_;
 };
 
+// How the fitted values follow a change of the residuals, to first order.
+Eigen::VectorXd follow(const Linearised& all, const Eigen::VectorXd& change) {
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(all.residuals.size());  // priors do not move
+  right.head(change.size()) = change;
+  const Eigen::VectorXd size = all.jacobian.colwise().norm().cwiseMax(1e-300);
+  const Eigen::MatrixXd scaled = all.jacobian * size.cwiseInverse().asDiagonal();
+  return -scaled.completeOrthogonalDecomposition().solve(right).cwiseQuotient(size);
+}
+
 }  // namespace
 
 std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
@@ -114,14 +123,38 @@ std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
     const Eigen::VectorXd by_given = Moved(problem, u, scene, given, prior->second, frame_time_s)
                                          .derivative(all->residuals.head(rows));
     if (by_given.size() == 0) continue;
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(all->residuals.size());  // priors do not move
-    right.head(rows) = by_given;
-    const Eigen::VectorXd size = all->jacobian.colwise().norm().cwiseMax(1e-300);
-    const Eigen::MatrixXd scaled = all->jacobian * size.cwiseInverse().asDiagonal();
-    doubts.push_back(
-        {given.name, -scaled.completeOrthogonalDecomposition().solve(right).cwiseQuotient(size)});
+    doubts.push_back({given.name, follow(*all, by_given)});
   }
   return doubts;
+}
+
+Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene) {
+  const model::Predictor& predictor = *problem.predictor;
+  const int spin = predictor.index_of("w3_rad_s"), radius = predictor.index_of("contact_radius_m");
+  if (predictor.model_name() != "puck" || scene.fit.fixed.contains("w3_rad_s")) return {};
+  Problem turning = problem;
+  bool any = false;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const Eigen::VectorXd values = problem.values(arc, u);
+    const auto fitted = [&](const FreeParameter& p) { return p.index == spin && p.arc == arc; };
+    if (std::any_of(problem.free.begin(), problem.free.end(), fitted) || values[spin] != 0.0)
+      continue;
+    const double speed_m_s =
+        std::hypot(values[predictor.index_of("vx_m_s")], values[predictor.index_of("vy_m_s")]);
+    turning.base[arc][spin] = speed_m_s / values[radius];
+    any = true;
+  }
+  Eigen::VectorXd there;
+  if (!any || !all_residuals(turning, u, there)) return {};
+  const Linearised all = linearise(problem, u);
+  const Eigen::VectorXd change = there - all.residuals.head(there.size());
+  const Eigen::VectorXd shift = follow(all, change);
+  // What the path has of it that no other value could have made: how much of such a spin there is,
+  // and how well that is known, one time as much being as likely as not beforehand.
+  const Eigen::VectorXd own = change + all.jacobian.topRows(there.size()) * shift;
+  const double seen = own.squaredNorm();
+  const double share = std::max(0.0, -own.dot(all.residuals.head(there.size()))) / (1.0 + seen);
+  return {"w3_rad_s", std::sqrt(1.0 / (1.0 + seen) + share * share) * shift};
 }
 
 std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {
