@@ -94,6 +94,46 @@ TEST(Exposure, ASmearedDiscIsMeasuredInTheMiddleOfItsWay) {
   EXPECT_NEAR(seen->centre_px.y(), middle_px.y(), 0.1);
 }
 
+// The light comes from the left: the rounded rim of a grey disc, a third of a pixel wide, is an
+// eighth brighter there and as much darker on the right. Nothing in the picture tells that from a
+// disc farther right, so the error has to be allowed for.
+TEST(OutlineFitter, ARoundedRimLitFromOneSideIsAllowedFor) {
+  constexpr double kRadius_px = 30.0, kSliver_px = 0.33, kBrighter = 0.125, kSpread_px = 0.7;
+  constexpr double kFace = 150.0, kFloor = 190.0;  // levels
+  const data::Body body = flat_disc();
+  const auto camera = data::Camera::from_scale(200, 160, 1000.0);
+  const auto light_of = [](double level) { return std::pow((level / 255.0 + 0.055) / 1.055, 2.4); };
+  const auto level_of = [](double light) {
+    return 255.0 * (1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
+  };
+  const Eigen::Vector2d middle_px(100.3, 80.2);
+  cv::Mat picture(160, 200, CV_64F);
+  for (int y = 0; y < picture.rows; ++y)
+    for (int x = 0; x < picture.cols; ++x) {
+      const Eigen::Vector2d off = Eigen::Vector2d(x, y) - middle_px;
+      const auto inside = [&](double radius_px) {
+        return 0.5 * std::erfc((off.norm() - radius_px) / (kSpread_px * std::sqrt(2.0)));
+      };
+      const double disc = inside(kRadius_px), face = inside(kRadius_px - kSliver_px);
+      const double rim = 1.0 - kBrighter * off.x() / std::max(off.norm(), 1.0);
+      picture.at<double>(y, x) = level_of((1.0 - disc) * light_of(kFloor) +
+                                          (face + (disc - face) * rim) * light_of(kFace));
+    }
+  std::mt19937 random(13);
+  data::Pose<> pose;
+  pose.centre_m = camera.table_from_image(middle_px, 0.001);
+  const OutlineFitter fitter(body, {data::SupportKind::flat, {}}, camera);
+  const auto seen = fitter.measure({.luma = developed(picture, 0.5, random),
+                                    .background = {},
+                                    .detection = {},
+                                    .predicted = pose});
+  ASSERT_TRUE(seen);
+  constexpr double kLikely = 2.5;  // standard deviations
+  const double error_px = seen->centre_px.x() - middle_px.x();
+  EXPECT_GT(error_px, 0.03);
+  EXPECT_LT(error_px, kLikely * std::sqrt(seen->covariance_px2(0, 0)));
+}
+
 // Grey beside grey mixes in the luma as light does; blue beside white does not: half blue (62, 95,
 // 171), half white (193) is (147, 155, 182) by the sRGB curve, of luma 156, where the luma of the
 // two, 94 and 193, lets one expect 154.
