@@ -152,8 +152,9 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
 }
 
 // What the sliver of a slightly rounded rim, too narrow to be seen apart, moves an edge by [px]: it
-// is brighter than the body where it faces the light and darker where it turns away, by some share
-// of the body's light, and an edge of little contrast moves the most.
+// mirrors the room and not what the face mirrors, on the side towards the light something else than
+// on the far one (a rim without gloss does next to nothing). Taken as a share of the body's light;
+// an edge of little contrast moves the most.
 double sliver_px(const ProfileEdge& e) {
   constexpr double kSharePx = 0.04;  // a sliver of a third of a pixel, brighter by an eighth
   constexpr double kMostPx = 0.5;
