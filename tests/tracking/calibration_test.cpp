@@ -114,6 +114,16 @@ TEST(Calibration, PlacesTheFloorByFourPoints) {
   EXPECT_THROW((void)set_floor(camera, points, 0.0), InputError);
 }
 
+TEST(Calibration, RefusesFloorPointsOnOneLine) {
+  data::Camera camera = lens();
+  FloorPoints points;
+  for (const double along_m : {0.0, 0.03, 0.07, 0.1}) {
+    points.table_m.emplace_back(0.6 * along_m, 0.8 * along_m + 1e-6);
+    points.image_px.emplace_back(200.0 + 600.0 * along_m, 150.0 + 800.0 * along_m);
+  }
+  EXPECT_THROW((void)set_floor(camera, points, 0.0), InputError);
+}
+
 TEST(Calibration, PlacesTheFloorByACircle) {
   const data::Camera truth = looking(0.6, 0.35, -0.1);
   constexpr double kRadius_m = 0.04, kHeight_m = 0.008;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -202,14 +204,15 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
     throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
   std::vector<cv::Point3d> table;
   std::vector<cv::Point2d> image;
-  Eigen::MatrixXd spread(2, static_cast<Eigen::Index>(n));
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (std::size_t i = 0; i < n; ++i) {
     table.emplace_back(points.table_m[i].x(), points.table_m[i].y(), 0.0);
     image.emplace_back(points.image_px[i].x(), points.image_px[i].y());
-    spread.col(static_cast<Eigen::Index>(i)) = points.table_m[i] - points.table_m[0];
+    const Eigen::Vector2d off = points.table_m[i] - points.table_m[0];
+    scatter += off * off.transpose();
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> singular(spread);
-  if (singular.singularValues()[1] < 1e-3 * singular.singularValues()[0])
+  // Across their line the points spread over less than a thousandth of what they do along it.
+  if (scatter.determinant() < 1e-6 * scatter.trace() * scatter.trace())
     throw InputError("the points of the floor lie on one line");
   cv::Mat rotation, translation, attitude;
   const std::vector<double> distortion(camera.distortion.begin(), camera.distortion.end());
