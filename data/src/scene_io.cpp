@@ -226,9 +226,9 @@ std::string toml_value(const std::map<std::string, T>& values, const Range& rang
 }
 
 // Last, so that it finds the spellings above. Only values that are set are written.
-template <class T>
-std::string toml_value(const std::optional<T>& value, const Range& range) {
-  return toml_value(*value, range);
+template <class T, class Constraint>
+std::string toml_value(const std::optional<T>& value, const Constraint& constraint) {
+  return toml_value(*value, constraint);
 }
 
 template <class T>

@@ -53,6 +53,11 @@ class TableReader {
   void read(const char* key, Enum& value, const Words<N>& words) {
     if (const toml::node* node = find(key)) value = static_cast<Enum>(choice(key, *node, words));
   }
+  template <class Enum, std::size_t N>
+  requires std::is_enum_v<Enum>
+  void read(const char* key, std::optional<Enum>& value, const Words<N>& words) {
+    if (const toml::node* node = find(key)) value = static_cast<Enum>(choice(key, *node, words));
+  }
 
  private:
   template <std::size_t N>

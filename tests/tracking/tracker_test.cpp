@@ -167,13 +167,16 @@ TEST(TrackVideo, EdgesOnOneSideOfWhereTheyAreExpectedAreNotedUntilTheCameraIsCal
   scene.body->radius_m = 0.012;
   scene.body->thickness_m = 1e-4;
   scene.support.kind = data::SupportKind::flat;
-  scene.camera.scale_px_per_m = 2000.0;
-  const auto notes_for = [&](data::Transfer transfer) {
+  // What the scene says counts, not what the camera's file says.
+  data::Camera camera = data::Camera::from_scale(200, 120, 2000.0);
+  camera.transfer = data::Transfer::linear;
+  const auto notes_for = [&](std::optional<data::Transfer> transfer) {
     scene.camera.transfer = transfer;
-    return track_video(folder / "clip.mkv", scene, std::nullopt).file.notes;
+    return track_video(folder / "clip.mkv", scene, camera).file.notes;
   };
   EXPECT_THAT(notes_for(data::Transfer::srgb),
               testing::ElementsAre(testing::HasSubstr("towards the brighter side")));
+  EXPECT_THAT(notes_for(std::nullopt), testing::IsEmpty());
   EXPECT_THAT(notes_for(data::Transfer::linear), testing::IsEmpty());
 }
 

@@ -282,7 +282,7 @@ void run(const Options& options) {
   const RenderStyle style = style_of(options);
   camera.frame_rate_hz = rate_hz;
   camera.exposure_fraction = style.exposure_fraction;
-  if (scene.camera.transfer == data::Transfer::linear) camera.transfer = data::Transfer::linear;
+  if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
   const PictureRenderer renderer(*scene.body, camera, style);
   const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
   const Targets targets = targets_of(options.output, options.lossless);

@@ -59,8 +59,7 @@ class Tracking {
         objects_(std::max(options.objects, scene.tracking.objects)),
         recording_(video, source_options(scene, options), options.held_bytes),
         camera_(resolve_camera(scene, camera, recording_.info())) {
-    if (camera_ && scene.camera.transfer == data::Transfer::linear)
-      camera_->transfer = data::Transfer::linear;
+    if (camera_ && scene.camera.transfer) camera_->transfer = *scene.camera.transfer;
     if (objects_ < 1) throw InputError("the number of objects must be at least 1");
     choose_finder();
   }

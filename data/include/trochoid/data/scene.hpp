@@ -28,7 +28,7 @@ struct CameraSettings {
   std::optional<double> rows;      ///< image height [px], for fitting the readout without a file
   std::optional<double> frame_rate_hz;  ///< overrides the container's time stamps
   std::optional<double> exposure_s;
-  Transfer transfer = Transfer::srgb;  ///< linear also where only the camera's file says so
+  std::optional<Transfer> transfer;  ///< instead of what the camera's file says
 };
 
 /// Hints to the tracker; all optional.
