@@ -69,10 +69,24 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
   return error;
 }
 
+// Under the final weights a loss may have crept to zero, where the slope of its logarithm vanishes
+// too: asks once more whether it is missed.
+Solution recall_vanished(Problem& problem, Solution solution) {
+  if (problem.arcs.size() > 1 || !has_vanished(problem, solution.u)) return solution;
+  constexpr double kWorth = 1.0;  // of chi-square
+  Problem again = problem;
+  again.set_base(solution.u);
+  Solution recalled = solve_to_the_end(again);
+  if (!recalled.usable || recalled.chi2 > solution.chi2 - kWorth) return solution;
+  problem = std::move(again);
+  return recalled;
+}
+
 // From where the search ended to the minimum; the values are then in problem.base as well.
 Solution polish(Problem& problem, Solution solution, const FitOptions& options, data::Fit& fit) {
   if (hold_vanished(problem, solution.u)) solution = seek(problem, problem.start());
   solution = settle_weights(problem, std::move(solution), options.tolerance);
+  solution = recall_vanished(problem, std::move(solution));
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);
   problem.set_base(solution.u);
   name_attitudes(problem);

@@ -93,7 +93,26 @@ Probe most_missed(Problem probed, const std::vector<int>& vanished) {
   return best;
 }
 
+// Free parameters that are losses and next to nothing.
+std::vector<int> vanished_losses(const Problem& problem) {
+  constexpr double kNothing = 1e-2;  // of the given value
+  std::vector<int> vanished;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& parameter = problem.free[i];
+    if (parameter.transform.is_over_decades() && is_loss(problem, parameter) &&
+        problem.base[0][parameter.index] < kNothing * parameter.given)
+      vanished.push_back(i);
+  }
+  return vanished;
+}
+
 }  // namespace
+
+bool has_vanished(const Problem& problem, const Eigen::VectorXd& u) {
+  Problem at = problem;
+  at.set_base(u);
+  return !vanished_losses(at).empty();
+}
 
 Solution solve_to_the_end(Problem& problem) {
   constexpr double kWorth = 2.0;  // of chi-square
@@ -101,13 +120,7 @@ Solution solve_to_the_end(Problem& problem) {
   const int rounds = static_cast<int>(problem.free.size());
   for (int round = 0; round < rounds && best.usable; ++round) {
     problem.set_base(best.u);
-    std::vector<int> vanished;
-    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
-      const FreeParameter& parameter = problem.free[i];
-      if (parameter.transform.is_over_decades() && is_loss(problem, parameter) &&
-          problem.base[0][parameter.index] < 1e-2 * parameter.given)
-        vanished.push_back(i);
-    }
+    const std::vector<int> vanished = vanished_losses(problem);
     const Probe probe = vanished.empty() ? Probe{} : most_missed(problem, vanished);
     if (probe.gain < kWorth) break;
     Problem trial = problem;

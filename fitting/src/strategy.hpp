@@ -77,6 +77,10 @@ void start_spin(Problem& problem, int arc);
 /// likewise a friction at its limit. Writes u into `base`. Returns whether anything new is held.
 bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 
+/// Whether a loss of a single-arc problem is next to nothing at u: below a hundredth of its given
+/// value.
+[[nodiscard]] bool has_vanished(const Problem& problem, const Eigen::VectorXd& u);
+
 /// Levenberg-Marquardt from problem.base to the minimum of a single-arc problem. Losses that vanish
 /// on the way are held, and let go again where a score test finds them missed.
 [[nodiscard]] Solution solve_to_the_end(Problem& problem);
