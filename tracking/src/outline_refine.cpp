@@ -244,7 +244,7 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
 }
 
 // All edges, also those between two surfaces of the body; returns what the blur should grow by.
-// Where the body will be looked at again, and in rounds before the last, samples are not weighed.
+// Rounds before the last do without the weights of samples.
 double collect_exactly(const Scenery& scenery, const Search& search, bool colour, bool last,
                        Round& round, Refined& out) {
   const std::vector<OutlineSample>& all = round.outline;
@@ -259,8 +259,8 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
       places.push_back(i);
   looks.resize(places.size());
   static const ShadingMemory kNothing;
-  StretchFit fit = fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing,
-                                 last && scenery.visit != Visit::first);
+  StretchFit fit =
+      fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing, last);
   const std::vector<Surroundings> around = surroundings_of(looks);
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
