@@ -140,26 +140,36 @@ std::pair<double, double> robust_turning(const AngleSeries& series, int count, d
   return {azimuth, turning};
 }
 
+// Usual number of readings of an angle in one of its turns.
+double readings_a_turn(const AngleSeries& series) {
+  std::vector<double> steps;
+  for (Eigen::Index i = 1; i < series.value.rows(); ++i)
+    steps.push_back(std::abs(series.value(i, 0) - series.value(i - 1, 0)));
+  return 2.0 * kPi / std::max(median(std::move(steps)), 1e-9);
+}
+
 std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const Motion& motion) {
   const AngleSeries theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
   const int fewest = static_cast<int>(std::min(theta.t_s.size(), phi.t_s.size()));
   if (fewest < 8) return {};
   std::vector<Start> starts;
   // A camera that is slow for the motion sees the angles well but no velocity: steady rolling is
-  // the other guess of the spin.
+  // the other guess of the spin. Where it is not, bodies that slide would be led astray by it.
+  constexpr double kFew = 20.0;
+  const bool slow = readings_a_turn(phi) < kFew;
   const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
                        double share) {
     const double leaning = std::clamp(tilt.first, 0.03, kPi - 0.03), azimuth = turn.first;
     const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
     std::vector<double> spins{spin_by_velocity(motion, shape, azimuth, w2)};
-    if (turn.second != 0.0) spins.push_back(steady_spin(shape, leaning, turn.second));
+    if (slow && turn.second != 0.0) spins.push_back(steady_spin(shape, leaning, turn.second));
     for (const double w3 : spins)
       starts.push_back(state(motion, leaning, azimuth, w1, w2, w3, "windows"));
   };
   for (const double share : {1.0, 0.5})  // the rate at an edge of the window is its noisiest number
     add(at(theta, arc.start_s), at(phi, arc.start_s), share);
   for (const int count : {4, 8, 16, 32})
-    if (count <= fewest)
+    if (count <= fewest && (slow || count > 4))
       add(robust_line(theta, count, arc.start_s), robust_turning(phi, count, arc.start_s), 1.0);
   return starts;
 }
