@@ -155,8 +155,7 @@ Chain best_chain(const Path& path, int from, int to) {
 // rest that is struck, one that begins to wobble. What lies beyond its ends is looked at by itself.
 void keep_consistent(const Path& path, int from, int to, std::vector<int>& kept) {
   constexpr int kMostWrong = 20, kFewest = 12;
-  const std::vector<int> chain =
-      to - from < kFewest ? std::vector<int>{} : best_chain(path, from, to).samples;
+  const std::vector<int> chain = best_chain(path, from, to).samples;
   // What hardly hangs together anywhere is not doubted.
   if (static_cast<int>(chain.size()) < kFewest ||
       2 * static_cast<int>(chain.size()) < chain.back() - chain.front()) {

@@ -17,7 +17,7 @@ namespace trochoid::fitting {
 /// @param sigma_m  stated noise of each coordinate per sample, > 0; its scale may be too small.
 /// @returns indices in ascending order; all where there are fewer than 12 samples or the path bends
 /// evenly. What lies beyond a chain that ends long before the path does is another kind of motion
-/// and has a chain of its own.
+/// and has a chain of its own; where that is short or less than half dense, all of it is kept.
 [[nodiscard]] std::vector<int> consistent_path(std::span<const double> t_s,
                                                const Eigen::MatrixX2d& xy_m,
                                                std::span<const double> sigma_m);

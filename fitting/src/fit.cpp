@@ -78,6 +78,7 @@ Solution recall_vanished(Problem& problem, Solution solution) {
   again.set_base(solution.u);
   Solution recalled = solve_to_the_end(again);
   if (!recalled.usable || recalled.chi2 > solution.chi2 - kWorth) return solution;
+  recalled.converged = recalled.converged || solution.converged;
   problem = std::move(again);
   return recalled;
 }

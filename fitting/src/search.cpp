@@ -38,10 +38,11 @@ double chi2_at(const Problem& problem) {
   return residuals.squaredNorm();
 }
 
+enum class StartsFrom { all, positions };
+
 // Starts of one window in the order of their chi-square there; those without a prediction drop out,
 // and so do those that are no better than knowing nothing although they come from angles: the
 // window is too long for a start from its first samples.
-enum class StartsFrom { all, positions };
 std::vector<Start> screened(const Problem& window, const Starter& starter,
                             StartsFrom from = StartsFrom::all) {
   constexpr double kTellsSomething = 0.3;
@@ -70,10 +71,10 @@ std::vector<int> window_sizes(const Problem& problem) {
   const int shortest = rolls ? shortest_window(problem.arcs[0], kShortestWindow) : kShortestWindow;
   std::vector<int> sizes;
   for (int window = all; window >= std::min(shortest, all); window /= 2) sizes.push_back(window);
-  if (problem.predictor->index_of("w1_rad_s") >= 0) std::reverse(sizes.begin(), sizes.end());
+  if (rolls) std::reverse(sizes.begin(), sizes.end());
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   // Unseen, a state at the first sample hardly ever leads straight to the last one.
-  if (problem.predictor->index_of("w1_rad_s") >= 0 && !seen && sizes.size() > 1) sizes.pop_back();
+  if (rolls && !seen && sizes.size() > 1) sizes.pop_back();
   return sizes;
 }
 

@@ -42,9 +42,9 @@ struct RimShape {
 
 /// Starts for a body that rolls (or slides) on its rim, state at the window's first sample.
 /// With tilt and precession in the track: w1 = dtheta, w2 = dphi sin(theta); no slip, v_n = h w2 -
-/// R w3, gives the spin, or steady rolling does. From positions alone: a grid over the tilt, the
-/// direction of motion against the node line and the precession rate (the path's turning rate, and
-/// the two roots of steady rolling).
+/// R w3, gives the spin, and so does steady rolling where a turn has few readings. From positions
+/// alone: a grid over the tilt, the direction of motion against the node line and the precession
+/// rate (the path's turning rate, and the two roots of steady rolling).
 [[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.

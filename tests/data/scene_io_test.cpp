@@ -57,6 +57,14 @@ bounds = { theta_rad = [0.1, inf] }
 free_pivot = true
 )";
 
+// It overrules the camera's file, so that it matters even where it is the usual one.
+TEST(SceneFile, KeepsATransferCurveThatIsTheUsualOne) {
+  const Scene said = parse_scene("[camera]\ntransfer = \"sRGB\"\n", "scene.toml");
+  EXPECT_EQ(said.camera.transfer, Transfer::srgb);
+  EXPECT_EQ(parse_scene(to_toml(said), "scene.toml").camera.transfer, Transfer::srgb);
+  EXPECT_FALSE(parse_scene("[camera]\n", "scene.toml").camera.transfer);
+}
+
 TEST(SceneFile, GivesEveryValueItHolds) {
   const Scene scene = parse_scene(kFullScene, "ring.toml");
   ASSERT_TRUE(scene.body);

@@ -118,7 +118,7 @@ TEST(Calibration, RefusesFloorPointsOnOneLine) {
   data::Camera camera = lens();
   FloorPoints points;
   for (const double along_m : {0.0, 0.03, 0.07, 0.1}) {
-    points.table_m.emplace_back(0.6 * along_m, 0.8 * along_m + 1e-6);
+    points.table_m.emplace_back(0.6 * along_m, 0.8 * along_m);
     points.image_px.emplace_back(200.0 + 600.0 * along_m, 150.0 + 800.0 * along_m);
   }
   EXPECT_THROW((void)set_floor(camera, points, 0.0), InputError);

@@ -212,7 +212,7 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
     scatter += off * off.transpose();
   }
   // Across their line the points spread over less than a thousandth of what they do along it.
-  if (scatter.determinant() < 1e-6 * scatter.trace() * scatter.trace())
+  if (scatter.determinant() <= 1e-6 * scatter.trace() * scatter.trace())
     throw InputError("the points of the floor lie on one line");
   cv::Mat rotation, translation, attitude;
   const std::vector<double> distortion(camera.distortion.begin(), camera.distortion.end());

@@ -39,8 +39,8 @@ struct StretchFit {
 /// neighbours: the relief of a coin and the floor are not equally noisy, and a single profile has
 /// too few degrees of freedom to know its own.
 /// @param known what other frames show of the light beside these curves.
-/// @param weighed by how noisy samples inside, outside and on the edge are, in a second pass over
-/// what a first one leaves; without, all of a profile count the same.
+/// @param weighed light and blur too, by how noisy samples inside, outside and on the edge are, in
+/// a second pass over what a first one leaves; without, only the offsets.
 StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known = {},
                          bool weighed = true);
 

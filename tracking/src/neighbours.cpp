@@ -357,7 +357,8 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
 
 void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,
                    std::vector<Glimpse>& glimpses) {
-  constexpr double kAsGood = 0.8, kNear = 0.25;
+  constexpr double kAsGood = 0.8;  // the first look had half the places and scatters
+  constexpr double kNear = 0.25;
   const bool alike = finder.faces_look_alike();
   const std::vector<Glimpse> was = glimpses;
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {

@@ -133,8 +133,7 @@ double unknown_share(const ProfileEdge& edge) {
 }
 
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
-// light goes on under the blur, a sliver of shadow, rounded rims, levels beyond the range of the
-// picture.
+// light goes on under the blur, a sliver of shadow, levels beyond the range of the picture.
 double model_sd_px(const StretchProfile& look, const Surroundings& around, bool silhouette) {
   constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
@@ -244,7 +243,7 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
 }
 
 // All edges, also those between two surfaces of the body; returns what the blur should grow by.
-// Rounds before the last do without the weights of samples.
+// Light and blur of rounds before the last are not weighed by the noise of samples.
 double collect_exactly(const Scenery& scenery, const Search& search, bool colour, bool last,
                        Round& round, Refined& out) {
   const std::vector<OutlineSample>& all = round.outline;
@@ -383,7 +382,7 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
     const double settled2 =
         search.settled_px * search.settled_px * static_cast<double>(out.equations.size());
     const bool settled = moved2 < settled2;
-    // Linear sums about a predicted edge bear a small step at most.
+    // Linear sums about a predicted edge bear a small step at most, a last look hardly any.
     constexpr double kLinear = 2.5;
     if (last && (settled || (search.exact && scenery.visit != Visit::again &&
                              moved2 < kLinear * kLinear * settled2)))

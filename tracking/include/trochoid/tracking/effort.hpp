@@ -20,7 +20,8 @@ enum class Effort { quick, normal, exact };
   return 450.0;
 }
 
-/// A picture is looked at once, or in passing first and again when the frames around it are known.
+/// A picture is looked at once, or in passing first, at every second place, and again when the
+/// frames around it are known (not where its attitude stays doubtful).
 enum class Visit { only, first, again };
 
 }  // namespace trochoid::tracking
