@@ -8,6 +8,7 @@
 #include <random>
 
 #include "trochoid/model/predictor.hpp"
+#include "values_with.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -19,12 +20,7 @@ using Values = std::map<std::string, double>;
 data::Track track_of(const data::Scene& scene, const Values& given, double duration_s, int samples,
                      double sigma, std::uint64_t seed) {
   const auto predictor = model::make_predictor(scene);
-  Eigen::VectorXd values(predictor->parameters().size());
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto& info = predictor->parameters()[i];
-    const auto own = given.find(info.name);
-    values[i] = own != given.end() ? own->second : info.value;
-  }
+  const Eigen::VectorXd values = fitting::values_with(*predictor, given);
   std::vector<double> t_s;
   for (int i = 0; i < samples; ++i) t_s.push_back(duration_s * i / (samples - 1));
   model::PredictRequest request;

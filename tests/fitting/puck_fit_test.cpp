@@ -8,6 +8,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
+#include "values_with.hpp"
 
 // A flat puck that is thrown, hits something and comes to rest. Without spin Coulomb's law is a
 // constant deceleration, so the truth here needs no integrator.
@@ -181,13 +182,9 @@ TEST(PuckFit, DoesNotMeasureAContactRadiusThatNothingShows) {
 TEST(PuckFit, AllowsForASpinThatNothingShows) {
   data::Scene scene = puck_scene();
   const auto predictor = model::make_predictor(scene);
-  Eigen::VectorXd values(predictor->parameters().size());
   const std::map<std::string, double> truth{
       {"friction", kFriction}, {"vx_m_s", 0.8}, {"w3_rad_s", 1.5 * 0.8 / scene.body->radius_m}};
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const model::ParameterInfo& info = predictor->parameters()[static_cast<std::size_t>(i)];
-    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
-  }
+  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
   std::vector<double> t_s;
   for (int i = 0; i < 24; ++i) t_s.push_back(i * kStep_s);
   model::PredictRequest request;

@@ -13,6 +13,7 @@
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
+#include "values_with.hpp"
 
 // Bodies on their rim, from reference trajectories of an independent integrator with noise added.
 namespace trochoid::fitting {
@@ -304,11 +305,7 @@ TEST(FastRimFit, StartsFromFewPicturesATurn) {
                                             {"w2_rad_s", -34.7},
                                             {"w3_rad_s", -12.2}};
   const auto predictor = model::make_predictor(scene);
-  Eigen::VectorXd values(predictor->parameters().size());
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto& info = predictor->parameters()[i];
-    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
-  }
+  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
   constexpr int kSamples = 160;
   constexpr double kSigma_m = 1e-4, kAngle_rad = 0.02;
   std::vector<double> t_s;
@@ -354,11 +351,7 @@ TEST(BuriedRimFit, FindsTheBestMotionNotTheFirstThatPasses) {
       {"theta_rad", 0.15}, {"phi_rad", 0.3}, {"w1_rad_s", 0.0}, {"w2_rad_s", 7.5},
       {"w3_rad_s", 0.1},   {"x_m", 0.01},    {"y_m", -0.02}};
   const auto predictor = model::make_predictor(scene);
-  Eigen::VectorXd values(predictor->parameters().size());
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto& info = predictor->parameters()[i];
-    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
-  }
+  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
   constexpr int kSamples = 200;
   constexpr double kSigma_m = 5e-4;
   std::vector<double> t_s;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "trochoid/model/predictor.hpp"
+#include "values_with.hpp"
 
 // What a rung of the ladder takes over from the one above it.
 namespace trochoid::fitting {
@@ -33,11 +34,7 @@ data::Track track_of_a_top() {
   const std::map<std::string, double> truth{
       {"a_1_s2", 3.0}, {"b_1_s", 5.0}, {"l_m", 0.1}, {"theta_rad", 0.8}, {"dphi_rad_s", 0.3}};
   const auto predictor = model::make_predictor(top());
-  Eigen::VectorXd values(predictor->parameters().size());
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const model::ParameterInfo& info = predictor->parameters()[static_cast<std::size_t>(i)];
-    values[i] = truth.contains(info.name) ? truth.at(info.name) : info.value;
-  }
+  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
   std::vector<double> t_s;
   for (int i = 0; i < 150; ++i) t_s.push_back(0.03 * i);
   model::PredictRequest request;
