@@ -14,10 +14,10 @@ using Starter = std::function<std::vector<Start>(const ArcData& window)>;
 struct Found {
   Solution solution;
   std::string path = "none";          ///< which start won
-  double reduced_chi2 = 0.0;          ///< on the full arc, before robust weights
+  double reduced_chi2 = 0.0;          ///< on the full arc but strays, before robust weights
   double unexplained = 1.0;           ///< chi-square over that of knowing nothing (null_chi2)
   bool passed = false;                ///< the chi-square gate
-  std::vector<double> strays_s = {};  ///< samples that are wrong by all others, left out
+  std::vector<double> strays_s = {};  ///< times of samples wrong by all others, left out
 };
 
 /// The same arcs and values for another predictor; parameters are matched by name.
