@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <map>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "arrow_system.hpp"
@@ -276,6 +277,54 @@ TEST(OutlineFitter, ErrorsOfAFlatDiscAreSmallAndAsLargeAsStated) {
   // Never too small a sigma; a floor for what edge models may be wrong by makes it cautious here.
   EXPECT_LT(normalised / kDraws, 1.5);
   EXPECT_GT(normalised / kDraws, 0.03);
+}
+
+// A disc and its shadow under a lamp to the left that is seen from the floor as wide as it is high:
+// nine lamps side by side, each with a shadow of its own. Drawn finely, then blurred.
+cv::Mat disc_with_shadow(const Eigen::Vector2d& centre_px, double radius_px, double umbra_px,
+                         double penumbra_px) {
+  constexpr int kFine = 4, kLamps = 9;
+  constexpr double kFloor = 150.0, kDisc = 60.0, kInShadow = 60.0, kBlurPx = 0.7;
+  cv::Mat fine(140 * kFine, 160 * kFine, CV_64F);
+  for (int y = 0; y < fine.rows; ++y)
+    for (int x = 0; x < fine.cols; ++x) {
+      const Eigen::Vector2d from =
+          Eigen::Vector2d(x + 0.5, y + 0.5) / kFine - Eigen::Vector2d(0.5, 0.5) - centre_px;
+      int hidden = 0;
+      for (int lamp = 0; lamp < kLamps; ++lamp) {
+        const double aside_px = umbra_px + penumbra_px * lamp / (kLamps - 1.0);
+        hidden += (from - Eigen::Vector2d(aside_px, 0.0)).norm() < radius_px ? 1 : 0;
+      }
+      fine.at<double>(y, x) =
+          from.norm() < radius_px ? kDisc : kFloor + (kInShadow - kFloor) * hidden / kLamps;
+    }
+  cv::GaussianBlur(fine, fine, {}, kFine * kBlurPx);
+  cv::Mat picture;
+  cv::resize(fine, picture, {}, 1.0 / kFine, 1.0 / kFine, cv::INTER_AREA);
+  return picture;
+}
+
+// Between the disc and its penumbra lies a strip of full shadow, here as dark as the disc and too
+// narrow to be seen apart: their common edge is not that of the disc.
+TEST(OutlineFitter, AContactShadowAsDarkAsTheDiscHardlyPullsIt) {
+  const FlatDisc disc;
+  std::mt19937 random(9);
+  const Eigen::Vector2d centre(80.2, 70.4);
+  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(150));
+  data::Pose<> predicted;
+  predicted.centre_m = disc.camera.table_from_image(centre, 0.001);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::flat, {}}, disc.camera);
+  constexpr double kUmbraPx = 0.4;
+  for (const double penumbra_px : {2.0, 4.0}) {
+    const cv::Mat shown = disc_with_shadow(centre, 30.0, kUmbraPx, penumbra_px);
+    const cv::Mat luma = developed(shown, 2.0, random);
+    const auto seen = fitter.measure(
+        {.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
+    ASSERT_TRUE(seen);
+    // As far as half the strip: taken for the disc's, the edge would move it by the whole.
+    EXPECT_LT((seen->centre_px - centre).norm(), 0.5 * kUmbraPx)
+        << penumbra_px << " px of penumbra";
+  }
 }
 
 TEST(OutlineFitter, TellsTheBlurForTheNextFrame) {

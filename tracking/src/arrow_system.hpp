@@ -10,7 +10,7 @@ namespace trochoid::tracking {
 /// ones last. The Cholesky factor then keeps the zeros in front of each row.
 class ArrowSystem {
  public:
-  static constexpr int kMost = 43;
+  static constexpr int kMost = 44;
   ArrowSystem() = default;
   /// All zero. @param rings, knots numbers of rings and of unknowns in each.
   ArrowSystem(int rings, int knots, int common) : size_(rings * knots + common) {

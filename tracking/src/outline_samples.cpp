@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <numbers>
 
 namespace trochoid::tracking {
 namespace {
@@ -83,6 +84,7 @@ class Piece {
     const auto between = [u](const auto& a, const auto& b) { return a + u * (b - a); };
     s.image_px = at(u);
     s.normal_px = (from_.normal_px + u * (to_.normal_px - from_.normal_px)).normalized();
+    s.height_px = between(from_.height_px, to_.height_px);
     s.inside_px = between(from_.inside_px, to_.inside_px);
     s.outside_px = between(from_.outside_px, to_.outside_px);
     s.motion += u * (to_.motion - from_.motion);
@@ -195,8 +197,10 @@ std::vector<OutlineSample> outline_samples(const data::Body& body, const data::P
     const Eigen::Matrix<double, 2, 3>& J = point.px_per_m;
     Reach reach{point, J};
     limit_reach(shape, reach);
-    OutlineSample sample{point.edge,   point.silhouette, point.image_px, point.normal_px,
-                         point.arc_px, reach.inside,     reach.outside,  {}};
+    const double px_per_m = J.leftCols<2>().norm() / std::numbers::sqrt2;
+    OutlineSample sample{point.edge,      point.silhouette, point.image_px,
+                         point.normal_px, point.arc_px,     px_per_m * point.table_m.z(),
+                         reach.inside,    reach.outside,    {}};
     const Eigen::RowVector3d normal = point.normal_px.transpose() * J;
     const Eigen::Vector3d arm = point.table_m - pose.centre_m;
     sample.motion.resize(motion.count());

@@ -14,6 +14,7 @@ struct OutlineSample {
   bool silhouette;
   Eigen::Vector2d image_px, normal_px;
   double arc_px;
+  double height_px;              ///< above the floor, at the scale of the picture there
   double inside_px, outside_px;  ///< along the normal to the next edge of the body itself
   /// How far the outline moves along its normal per unit of each parameter.
   Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, PoseMotion::kMost> motion;

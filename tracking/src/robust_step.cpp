@@ -16,7 +16,7 @@ namespace {
 
 // Unknowns: per group the error of the edge model as a function of direction, given at kKnots
 // directions and blended between them; then the pose and the nuisances common to the outline.
-constexpr int kCommon = 6, kKnots = 8;
+constexpr int kCommon = 7, kKnots = 8;
 static_assert(PoseMotion::kMost + kCommon + kGroups * kKnots <= ArrowSystem::kMost);
 constexpr int kRow = PoseMotion::kMost + kCommon + 2;
 using Vector = ArrowSystem::Vector;
@@ -35,6 +35,9 @@ constexpr double kToneSdPx = 0.05;
 // The colour planes: towards the brighter side, and as a whole beyond half a pixel of the other
 // common place of the samples.
 constexpr double kColourPolaritySdPx = 0.3, kColourShiftSdPx = 0.08;
+
+// The shadow beside the body, over the usual one.
+constexpr double kShadowSd = 0.5;
 
 // The few unknowns an equation depends on, in the order of their indices but for the knots.
 struct Row {
@@ -63,6 +66,7 @@ struct Row {
     } else {
       add(first + n + 1, e.polarity);
       add(first + n + 5, e.tone);
+      add(first + n + 6, e.shadow_px);
     }
   }
   void add(int i, double v) {
@@ -112,6 +116,7 @@ ArrowSystem prior_information(const PoseMotion::Step& prior_sd, bool directions)
   expect(n + 3, kColourShiftSdPx);
   expect(n + 4, kColourShiftSdPx);
   expect(n + 5, kToneSdPx);
+  expect(n + 6, kShadowSd);
   return system;
 }
 

@@ -18,6 +18,9 @@ struct EdgeEquation {
   double swell = 1.0, polarity = 1.0;
   /// Contrast over mean level: how far the edge moves if the transfer curve is not the one assumed.
   double tone = 0.0;
+  /// Taken off the offset for the shadow beside the body; by what share too much or too little of
+  /// it, is a nuisance common to the outline [px].
+  double shadow_px = 0.0;
   /// What the edge model may be wrong by [px], alike for neighbours in direction within a group.
   double model_px = 0.0;
   int group = 0;               ///< 0 .. kGroups - 1
