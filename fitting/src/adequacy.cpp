@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "smoothing.hpp"
+#include "strategy.hpp"
 
 namespace trochoid::fitting {
 
@@ -66,6 +67,12 @@ double typical_sigma(const Problem& problem, Channel channel) {
   return median(std::move(sigmas));
 }
 
+// Stated sigmas without pixels are somebody's word for independent errors.
+bool is_tracked(const Problem& problem) {
+  return std::all_of(problem.arcs.begin(), problem.arcs.end(),
+                     [](const ArcData& a) { return a.filmed || a.sigma_unknown; });
+}
+
 // Of the worst channel. A path that is followed is doubtful at most: trackers know little of their
 // common errors. The noise is the larger one of the track's own sigmas and the scatter of
 // its samples about a smooth curve.
@@ -78,11 +85,8 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
     for (const Reading& reading : arc.readings)
       rows += reading.channel == Channel::position ? 2 : 0;
   const double path = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
-  // Stated sigmas without pixels are somebody's word for independent errors.
-  const bool tracked = std::all_of(problem.arcs.begin(), problem.arcs.end(),
-                                   [](const ArcData& a) { return a.filmed || a.sigma_unknown; });
   const bool path_followed =
-      tracked && sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
+      is_tracked(problem) && sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
   Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
@@ -225,7 +229,7 @@ void accept(const Solution& solution, const Uncertainty& error, const Misfit& wo
 }  // namespace
 
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
-           data::Fit& fit) {
+           bool cut_short, data::Fit& fit) {
   const Squares sum = squares(problem, solution);
   warn_unexplained(sum, fit);
   const Misfit worst = misfit(problem, sum);
@@ -238,6 +242,14 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
     return refuse("unexplained", "unexplained",
                   fmt::format("the model does not explain the track: the residuals of its {} are "
                               "{:.2g} times their noise",
+                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                  fit);
+  // Where there are many valleys another one may explain what this one does not.
+  if (cut_short && !is_tracked(problem) && worst.times * worst.times > chi2_gate(problem.rows()))
+    return refuse("unexplained", "unexplained",
+                  fmt::format("the search ended at its limit, and the best path it found does not "
+                              "explain the track: the residuals of its {} are {:.2g} times their "
+                              "noise",
                               kChannelWords[static_cast<int>(worst.channel)], worst.times),
                   fit);
   if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)

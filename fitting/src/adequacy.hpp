@@ -27,10 +27,12 @@ struct Squares {
 ///                    beyond 2 times those measures
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
+/// @param cut_short  the search ended at its limit before anything passed its gate: residuals that
+///                   do not pass it now, of independent errors, are unexplained.
 /// Sets converged, outcome, reason, verdict and verdict_words; warns of residuals above the
 /// scatter.
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
-           data::Fit& fit);
+           bool cut_short, data::Fit& fit);
 
 /// How far the centre of a body held at a pivot strays from its mean place [m] (rms of a
 /// coordinate); 0 without positions in metres.

@@ -108,10 +108,20 @@ std::vector<Start> with_frictions(const Problem& problem, const Start& start, in
   return best;
 }
 
+// Those starts that say nothing of friction: for a body that rolls.
+Starter without_friction(const Starter& starter) {
+  return [&starter](const ArcData& window) {
+    std::vector<Start> starts = starter(window);
+    std::erase_if(starts, [](const Start& start) { return start.values.contains("friction"); });
+    return starts;
+  };
+}
+
 // The search proper, on a problem whose spin angle is out of the way.
 Found search_path(const Problem& problem, const Quest& quest) {
   constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
   constexpr double kSlowly = 1.2;
+  constexpr double kNearlyExplained = 2.0;  // times the gate
   Found best;
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   const auto take = [&](Found found) {
@@ -120,6 +130,7 @@ Found search_path(const Problem& problem, const Quest& quest) {
     if (better(found, best)) best = std::move(found);
     return surely_found(problem, best);
   };
+  const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   bool searched = false;
   for (const Relative& relative : quest.relatives) {
     if (relative.model == nullptr) {
@@ -129,25 +140,31 @@ Found search_path(const Problem& problem, const Quest& quest) {
     }
     Problem easier = for_predictor(problem, *relative.model);
     // From positions alone neighbouring valleys are many, and a start has to be near the right one.
-    easier.rough = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+    easier.rough = seen;
     const bool rolls = relative.model->model_name() == "rolling";
     easier.partial = rolls ? std::make_shared<Partial>() : nullptr;
-    const Found rough = search(easier, quest.starter, rolls ? Effort::brief : Effort::full);
+    const Starter starter = rolls && !seen ? without_friction(quest.starter) : quest.starter;
+    const Found rough = search(easier, starter, rolls ? Effort::brief : Effort::full);
     if (rough.solution.usable && rough.unexplained < kRoughly) {
       easier.set_base(rough.solution.u);
       const Start near = start_from(easier, rough.path);
       if (take(grow(problem, carried_over(problem, relative, near), all))) return best;
       const Start plain = with_given_losses(problem, near);
-      if (take(grow(problem, plain, std::max(24, all / 4), kSlowly))) return best;
+      if (take(grow(problem, plain, std::max(24, all / 4), {kSlowly}))) return best;
     }
     // A body may roll for a while and slide then.
     if (!rolls || easier.partial->samples == 0) continue;
     easier.base[0] = easier.partial->values;
     const int window = easier.partial->samples;
-    // An extra try: unless it explains all there is the search goes on as without it.
+    // An extra try: unless it explains all there is the search goes on as without it. From
+    // positions alone there is much left to search when a try has used up its steps.
     const double work = *problem.work;
-    for (const Start& start : with_frictions(problem, start_from(easier, "rolls_first"), window))
-      if (take(grow(problem, start, window, kSlowly))) return best;
+    for (const Start& start : with_frictions(problem, start_from(easier, "rolls_first"), window)) {
+      const bool enough =
+          take(grow(problem, start, window, {kSlowly, seen ? 0.0 : kNearlyExplained}));
+      if (!seen) *problem.work = work;
+      if (enough && surely_found(problem, best)) return best;
+    }
     *problem.work = work;
   }
   if (!searched && !exhausted(problem, best)) take(search(problem, quest.starter));
@@ -199,8 +216,10 @@ Found find_arc(Problem problem, const Quest& quest) {
         fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
                     options.strategy));
   Found best = with_other_losses(problem, quest, search_path(problem, quest));
+  best.cut_short = !best.passed && exhausted(problem, best);
   if (best.passed || !quest.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
+  from_given.cut_short = best.cut_short && !from_given.passed;
   return from_given.solution.usable &&
                  (!best.solution.usable || from_given.reduced_chi2 < best.reduced_chi2)
              ? from_given
@@ -224,8 +243,8 @@ Found find(Problem& problem, const Quest& quest) {
     alone[arc].set_base(found[arc].solution.u);
     problem.base[arc] = alone[arc].base[0];
     best.path = arc == 0 || best.path == found[arc].path ? found[arc].path : "mixed";
+    best.cut_short |= found[arc].cut_short;
   }
-  const std::string path = best.path;
   std::vector<Problem> trials(alone.size(), problem);
   std::vector<Solution> solutions(alone.size());
   in_parallel(arcs, threads, [&](int leader) {
@@ -242,7 +261,6 @@ Found find(Problem& problem, const Quest& quest) {
     best.solution = solution;
     problem.base = trials[leader].base;
   }
-  best.path = path;
   return best;
 }
 

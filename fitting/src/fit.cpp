@@ -196,7 +196,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   }
   heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
   describe(problem, solution, error, scene, fit);
-  judge(problem, solution, error, fit);
+  judge(problem, solution, error, found.cut_short, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
     fit.converged = false;
     fit.outcome = fit.verdict = "unexplained";

@@ -101,9 +101,9 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
   Found best;
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
-    std::vector<double> valleys;
+    Valleys valleys;
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
-      Found found = grow(problem, starts[i], window, 1.5, &valleys);
+      Found found = grow(problem, starts[i], window, {.known = &valleys});
       if (better(found, best)) best = std::move(found);
       if (settles_it(problem, best) || exhausted(problem, best)) return best;
       if (seen && best.unexplained < kExplained) return best;
@@ -149,38 +149,64 @@ std::vector<Start> settled(const Problem& window, const Starter& starter, Starts
   return best;
 }
 
-// Ends when the best valley has been reached so often that no better one is to be expected: it is
-// not the model's fault alone then if it does not pass.
-Found search_widely(const Problem& problem, const Starter& starter, Found best,
-                    StartsFrom from = StartsFrom::all) {
-  constexpr std::size_t kGrown = 6;
-  constexpr int kOftenEnough = 3;
-  constexpr double kSameValley = 1e-3;  // of chi-square
-  int reached = 0;
-  constexpr double kSlowly = 1.2;
-  const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  const int shortest = shortest_window(problem.arcs[0], kFewestSamples);
-  for (int window = std::min(shortest, all); window <= all; window *= 2) {
-    const std::vector<Start> starts = settled(windowed(problem, window), starter, from);
-    for (std::size_t i = 0; i < std::min(kGrown, starts.size()); ++i) {
-      Found found = grow(problem, starts[i], window, kSlowly);
-      if (!found.solution.usable) {
-        if (exhausted(problem, best)) return best;
-        continue;
-      }
-      const double gain = best.reduced_chi2 / found.reduced_chi2 - 1.0;
-      if (!best.solution.usable || gain > kSameValley)
-        reached = 1;
-      else if (gain > -kSameValley)
-        ++reached;
-      if (better(found, best)) best = std::move(found);
-      if (settles_it(problem, best) || best.unexplained < kExplained || reached >= kOftenEnough ||
-          exhausted(problem, best))
-        return best;
+// From positions alone, grows many starts as long as they explain all they were grown over; then,
+// if none of those passes, few of them come what may. Ends when the best valley has been reached so
+// often that no better one is to be expected: it is not the model's fault alone then if it does not
+// pass.
+class WideSearch {
+ public:
+  WideSearch(const Problem& problem, Found best) : problem_(problem), best_(std::move(best)) {}
+
+  Found run(const Starter& starter, StartsFrom from) {
+    const bool seen = problem_.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+    const int all = static_cast<int>(problem_.arcs[0].t_s.size());
+    const int shortest = shortest_window(problem_.arcs[0], kFewestSamples);
+    for (int window = std::min(shortest, all); window <= all; window *= 2) {
+      const std::vector<Start> starts = settled(windowed(problem_, window), starter, from);
+      constexpr std::size_t kMany = 20, kFew = 6;
+      constexpr double kExplainedAll = 1.0, kComeWhatMay = 0.0;  // of the gate
+      if (!seen && grown(starts, window, kMany, kExplainedAll)) break;
+      if ((seen || !best_.passed) && grown(starts, window, kFew, kComeWhatMay)) break;
     }
+    return std::move(best_);
   }
-  return best;
-}
+
+ private:
+  // Whether that was enough.
+  bool grown(const std::vector<Start>& starts, int window, std::size_t most,
+             double most_over_gate) {
+    constexpr int kOftenEnough = 3;
+    constexpr double kSlowly = 1.2;
+    Valleys dead_ends;
+    for (std::size_t i = 0; i < std::min(most, starts.size()); ++i) {
+      const std::size_t known = dead_ends.size();
+      Found found = grow(problem_, starts[i], window,
+                         {kSlowly, most_over_gate, most_over_gate > 0.0 ? &dead_ends : nullptr});
+      if (found.solution.usable) {
+        dead_ends.resize(known);
+        take(std::move(found));
+      }
+      if (settles_it(problem_, best_) || best_.unexplained < kExplained ||
+          reached_ >= kOftenEnough || exhausted(problem_, best_))
+        return true;
+    }
+    return false;
+  }
+
+  void take(Found found) {
+    constexpr double kSameValley = 1e-3;  // of chi-square
+    const double gain = best_.reduced_chi2 / found.reduced_chi2 - 1.0;
+    if (!best_.solution.usable || gain > kSameValley)
+      reached_ = 1;
+    else if (gain > -kSameValley)
+      ++reached_;
+    if (better(found, best_)) best_ = std::move(found);
+  }
+
+  const Problem& problem_;
+  Found best_;
+  int reached_ = 0;
+};
 
 }  // namespace
 
@@ -195,13 +221,13 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   if (settles_it(problem, best) || !rim || effort == Effort::brief ||
       best.unexplained < kExplained || exhausted(problem, best))
     return best;
-  best = search_widely(problem, starter, std::move(best));
+  best = WideSearch(problem, std::move(best)).run(starter, StartsFrom::all);
   if (best.solution.usable || !seen) return best;
   // Angles that lead nowhere: starts from the positions alone.
   const Starter blind = [&](const ArcData& window) {
     return starter(window.without(Channel::phi));
   };
-  return search_widely(problem, blind, std::move(best), StartsFrom::positions);
+  return WideSearch(problem, std::move(best)).run(blind, StartsFrom::positions);
 }
 
 Found from_best_start(const Problem& problem, const Starter& starter) {

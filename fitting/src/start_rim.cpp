@@ -42,25 +42,37 @@ std::pair<double, double> at(const AngleSeries& series, double t_s) {
 }
 
 struct Motion {
-  Eigen::Vector2d position_m, velocity_m_s;
-  double turning_rad_s = 0.0;      // median rate of the heading
-  double acceleration_m_s2 = 0.0;  // upper tenth
+  Eigen::Vector2d position_m, velocity_m_s, acceleration_m_s2;
+  double turning_rad_s = 0.0;   // median rate of the heading
+  double veering_rad_s = 0.0;   // and of the acceleration's direction
+  double strongest_m_s2 = 0.0;  // upper tenth of the acceleration
 };
+
+double cross(const Eigen::RowVector2d& a, const Eigen::RowVector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
 Motion motion_of(const ArcData& arc) {
   const SmoothCurve curve = smooth_auto(arc.t_s, arc.positions_m());
-  std::vector<double> turning, acceleration;
+  std::vector<double> turning, veering, acceleration;
   for (Eigen::Index i = 0; i < curve.value.rows(); ++i) {
     const Eigen::RowVector2d v = curve.first.row(i), a = curve.second.row(i);
     const double speed2 = v.squaredNorm();
     acceleration.push_back(a.norm());
-    if (speed2 > 0.0) turning.push_back((v.x() * a.y() - v.y() * a.x()) / speed2);
+    if (speed2 > 0.0) turning.push_back(cross(v, a) / speed2);
+    if (i == 0) continue;
+    const Eigen::RowVector2d before = curve.second.row(i - 1);
+    veering.push_back(std::atan2(cross(before, a), before.dot(a)) / (arc.t_s[i] - arc.t_s[i - 1]));
   }
   const auto upper =
       acceleration.begin() + static_cast<std::ptrdiff_t>(acceleration.size() * 9 / 10);
   std::nth_element(acceleration.begin(), upper, acceleration.end());
-  return {curve.value.row(0).transpose(), curve.first.row(0).transpose(),
-          median(std::move(turning)), *upper};
+  return {.position_m = curve.value.row(0).transpose(),
+          .velocity_m_s = curve.first.row(0).transpose(),
+          .acceleration_m_s2 = curve.second.row(0).transpose(),
+          .turning_rad_s = median(std::move(turning)),
+          .veering_rad_s = median(std::move(veering)),
+          .strongest_m_s2 = *upper};
 }
 
 // Spin of a body that rolls without slip with the measured velocity.
@@ -195,22 +207,58 @@ std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
   return starts;
 }
 
+// A rim that slips is braked against its slip, by friction times gravity: the acceleration at the
+// window's first sample gives the slip's direction and the friction, a grid its speed. The spin and
+// the tilting rate are those that let the contact point slip so.
+std::vector<Start> from_slip(const RimShape& shape, const Motion& motion) {
+  constexpr double kSteepest = 0.5;  // tilting over turning: what spins does not fall over
+  const double brake_m_s2 = motion.acceleration_m_s2.norm();
+  if (!(brake_m_s2 > 0.0)) return {};
+  const double heading = std::atan2(motion.acceleration_m_s2.y(), motion.acceleration_m_s2.x());
+  const double friction = std::clamp(brake_m_s2 / shape.g, 0.03, 0.9);
+  std::vector<Start> starts;
+  for (double theta = 0.15; theta < 1.5; theta += 0.15)
+    for (int direction = 0; direction < 12; ++direction)
+      for (const double share : {0.1, 0.2, 0.4, 0.8}) {
+        const double phi = heading - 2.0 * kPi * direction / 12;
+        const Eigen::Vector2d along(std::cos(phi), std::sin(phi)), across(-along.y(), along.x());
+        const Eigen::Vector2d slip =
+            -share * std::sqrt(shape.g * shape.R) / brake_m_s2 * motion.acceleration_m_s2;
+        const Eigen::Vector2d rolled = motion.velocity_m_s - slip;
+        const double z = shape.R * std::sin(theta) + shape.h * std::cos(theta);
+        const double w1 = -rolled.dot(across) / z;
+        std::vector<double> rates{motion.turning_rad_s, motion.veering_rad_s};
+        for (const double rate : steady_rates(shape, theta, rolled.dot(along)))
+          rates.push_back(rate);
+        for (const double rate : rates) {
+          const double w2 = rate * std::sin(theta);
+          if (std::abs(w1) > kSteepest * std::abs(w2)) continue;
+          const double w3 = (shape.h * w2 - rolled.dot(along)) / shape.R;
+          starts.push_back(state(motion, theta, phi, w1, w2, w3, "slip"));
+          starts.back().values["friction"] = friction;
+        }
+      }
+  return starts;
+}
+
 }  // namespace
 
 std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
   if (window.t_s.size() < 12) return {};
   const Motion motion = motion_of(window);
   std::vector<Start> starts = from_angles(window, shape, motion);
-  if (starts.empty()) starts = from_positions(shape, motion);
+  const bool seen = !starts.empty();
+  if (!seen) starts = from_positions(shape, motion);
   if (!shape.slides) return starts;
   // Friction is what accelerates the centre, so it is at least that strong; the scene's own value
   // is the other guess.
   const std::size_t plain = starts.size();
   for (std::size_t i = 0; i < plain; ++i) {
     starts.push_back(starts[i]);
-    starts.back().values["friction"] =
-        std::clamp(1.1 * motion.acceleration_m_s2 / shape.g, 0.05, 0.9);
+    starts.back().values["friction"] = std::clamp(1.1 * motion.strongest_m_s2 / shape.g, 0.05, 0.9);
   }
+  if (!seen)
+    for (Start& start : from_slip(shape, motion)) starts.push_back(std::move(start));
   return starts;
 }
 

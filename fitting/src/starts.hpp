@@ -44,7 +44,8 @@ struct RimShape {
 /// With tilt and precession in the track: w1 = dtheta, w2 = dphi sin(theta); no slip, v_n = h w2 -
 /// R w3, gives the spin, and so does steady rolling where a turn has few readings. From positions
 /// alone: a grid over the tilt, the direction of motion against the node line and the precession
-/// rate (the path's turning rate, and the two roots of steady rolling).
+/// rate (the path's turning rate, and the two roots of steady rolling). A body that slides may also
+/// slip at its start, against its acceleration: a grid over the slip's speed.
 [[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.

@@ -179,16 +179,27 @@ Solution without_strays(Problem& current, int& window, Solution solution,
   return solution;
 }
 
+// Whether no start before ended there; remembers it.
+bool is_new(Valleys& valleys, int window, double chi2) {
+  constexpr double kSameValley = 1e-3;  // of chi-square
+  const bool known = std::any_of(valleys.begin(), valleys.end(), [&](const auto& valley) {
+    return valley.first == window && std::abs(valley.second - chi2) < kSameValley * chi2;
+  });
+  if (!known) valleys.emplace_back(window, chi2);
+  return !known;
+}
+
 }  // namespace
 
-Found grow(const Problem& problem, const Start& start, int first_window, double growth,
-           std::vector<double>* valleys) {
-  constexpr double kSameValley = 1e-3;  // of chi-square
+Found grow(const Problem& problem, const Start& start, int first_window, const Growth& growth) {
   int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
   constexpr double kLost = 4.0;  // of chi-square per row: a turn was lost on the way
   constexpr int kMostRetreats = 4, kLeastStep = 4;
+  constexpr double kFarFromExplained = 30.0;  // times the gate
+  const bool gated = growth.most_over_gate > 0.0;
+  double rate = growth.rate;
   int before = 0, retreats = 0;  // the window explained last
   std::vector<double> strays_s;
   double explained = chi2_gate(all);
@@ -203,34 +214,31 @@ Found grow(const Problem& problem, const Start& start, int first_window, double 
     part = windowed(current, window);
     all = static_cast<int>(current.arcs[0].t_s.size());
     const double reduced = solution.chi2 / free_rows(part);
-    const bool lost = !solution.usable || reduced > kLost * explained;
+    const double gate = chi2_gate(part.rows());
+    const bool lost =
+        !solution.usable || reduced > (gated ? growth.most_over_gate * gate : kLost * explained);
     if (!first && lost && retreats < kMostRetreats && window - before > kLeastStep) {
       ++retreats;
-      growth = 1.0 + 0.5 * (growth - 1.0);
+      rate = 1.0 + 0.5 * (rate - 1.0);
       window = before + (window - before) / 2;
       continue;
     }
     if (!solution.usable) return {};
     part.set_base(solution.u);
     current.base = part.base;
-    if (first && window < all && valleys != nullptr) {
-      const bool known = std::any_of(valleys->begin(), valleys->end(), [&](double chi2) {
-        return std::abs(solution.chi2 - chi2) < kSameValley * chi2;
-      });
-      if (known) return {};
-      valleys->push_back(solution.chi2);
-    }
+    const bool looked_up = growth.known != nullptr && (first || gated);
+    if (window < all && looked_up && !is_new(*growth.known, window, solution.chi2)) return {};
     // A window that is far from explained will not lead anywhere.
-    if (window < all && reduced > 30.0 * chi2_gate(part.rows())) {
+    if (window < all && (gated ? lost : reduced > kFarFromExplained * gate)) {
       if (problem.shortfalls) ++problem.shortfalls->departed;
       return {};
     }
-    if (problem.partial && window > problem.partial->samples && reduced < chi2_gate(part.rows()))
+    if (problem.partial && window > problem.partial->samples && reduced < gate)
       *problem.partial = {window, part.base[0]};
     if (window == all) break;
-    explained = std::max(reduced, chi2_gate(part.rows()));
+    explained = std::max(reduced, gate);
     before = window;
-    window = std::min(static_cast<int>(growth * window) + 8, all);
+    window = std::min(static_cast<int>(rate * window) + 8, all);
   }
   Solution solution =
       problem.rough ? seek(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3})

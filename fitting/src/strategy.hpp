@@ -17,6 +17,7 @@ struct Found {
   double reduced_chi2 = 0.0;          ///< on the full arc but strays, before robust weights
   double unexplained = 1.0;           ///< chi-square over that of knowing nothing (null_chi2)
   bool passed = false;                ///< the chi-square gate
+  bool cut_short = false;             ///< the search ended at its limit before anything passed
   std::vector<double> strays_s = {};  ///< times of samples wrong by all others, left out
 };
 
@@ -40,15 +41,25 @@ void apply(const Start& start, Problem& problem);
 /// short window hardly shows, are kept near their given values.
 [[nodiscard]] Problem windowed(const Problem& problem, int samples);
 
+/// Where starts ended: samples of a window and chi-square there.
+using Valleys = std::vector<std::pair<int, double>>;
+
+struct Growth {
+  double rate = 1.5;  ///< samples of a window over those of the one before
+  /// Chi-square over its gate at which a window is lost, and the start with it. 0: a window is lost
+  /// at several times what the one before left, the start where a window is far from explained.
+  double most_over_gate = 0.0;
+  /// Where other starts ended, this one's ends are added: one that ends where one before it did is
+  /// not followed further. On the first window; on any if the gate is what counts. Null: all are.
+  Valleys* known = nullptr;
+};
+
 /// Levenberg-Marquardt on a thinned window, then on windows half as long again each, then on
 /// all samples. A sample that alone leaves a good part of a window unexplained is left out: one
 /// wrong azimuth among dozens of angles outweighs them all.
 /// @param first_window samples of the first window.
-/// @param growth       of a window over the one before.
-/// @param valleys      chi-squares at which other starts ended on the first window, this one's is
-///                     added: a start that ends where one before it did is not followed further.
 [[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window,
-                         double growth = 1.5, std::vector<double>* valleys = nullptr);
+                         const Growth& growth = {});
 
 /// Where a cost has ripples, as events that come and go with the parameters make them: steps off
 /// the best known point, as far as the misfit lets the linearised problem, and downhill again,

@@ -3,10 +3,14 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <random>
 
+#include "adequacy.hpp"
+#include "prepare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
+#include "values_with.hpp"
 
 // What a fit says of its own worth.
 namespace trochoid::fitting {
@@ -62,18 +66,13 @@ data::Fit fit_of(const data::Track& track, const data::Scene& scene) {
   return fit(std::span(&track, 1), scene);
 }
 
+const std::map<std::string, double> kNutating{
+    {"a_1_s2", 8.0}, {"b_1_s", 6.0}, {"l_m", 0.1}, {"theta_rad", 0.8}};
+
 // A nutating top, 2.5 nutations in the three seconds.
 Path nutating_top() {
   const auto predictor = model::make_predictor(top());
-  Eigen::VectorXd values(predictor->parameters().size());
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = predictor->parameters()[i].value;
-  const auto set = [&](const char* name, double value) {
-    values[predictor->index_of(name)] = value;
-  };
-  set("a_1_s2", 8.0);
-  set("b_1_s", 6.0);
-  set("l_m", 0.1);
-  set("theta_rad", 0.8);
+  const Eigen::VectorXd values = values_with(*predictor, kNutating);
   std::vector<double> t_s;
   for (int i = 0; i < kSamples; ++i) t_s.push_back(i / kRate_Hz);
   model::PredictRequest request;
@@ -122,6 +121,29 @@ TEST(Verdict, IsWeakWhereTheModelLeavesSeveralTimesTheNoise) {
   const data::Fit fit = fit_of(track_of(drifting, white(kSigma_m, 8)), top());
   EXPECT_EQ(fit.verdict, "weak") << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
+}
+
+// The same, less, where the search ended before anything passed: another valley may explain it.
+TEST(Verdict, IsUnexplainedWhereACutShortSearchLeavesMoreThanTheNoise) {
+  const auto verdict = [](double drift_m, bool cut_short) {
+    const auto drifting = [path = nutating_top(), drift_m](double t) -> Eigen::Vector2d {
+      return path(t) + drift_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
+    };
+    const data::Track track = track_of(drifting, white(kSigma_m, 8));
+    const auto predictor = model::make_predictor(top());
+    FitOptions options;
+    options.start = kNutating;
+    const Problem problem = prepare(std::span(&track, 1), *predictor, top(), options);
+    Solution solution;
+    solution.u = problem.start();
+    solution.usable = solution.converged = true;
+    data::Fit fit;
+    judge(problem, solution, {}, cut_short, fit);
+    return fit.verdict;
+  };
+  EXPECT_EQ(verdict(2.0 * kSigma_m, true), "unexplained");
+  EXPECT_EQ(verdict(2.0 * kSigma_m, false), "good");
+  EXPECT_EQ(verdict(0.0, true), "good");
 }
 
 TEST(Verdict, FindsNothingOfATopInAStraightLine) {
