@@ -24,6 +24,7 @@ struct Recorded {
       frame.t_s = i / 100.0;
       Sighting seen;
       seen.rim = Ellipse::from_axes({0.0, 0.0}, 40.0, 30.0, 0.0);
+      seen.accepted = 0.9;
       const double since = i - kHit, jitter = 0.02 * (i % 3 - 1);
       const double y = since < 0 ? 0.03 * since * since : -6.0 * since + 0.03 * since * since;
       seen.centre_px = {100.0 + 4.0 * since + jitter, 80.0 + y};
@@ -72,6 +73,32 @@ TEST(PathOutliers, WhereTooFewFramesAreNearNothingIsDoubted) {
   few[1].seen->centre_px.x() += 20.0;
   doubt_what_leaves_the_path(few);
   EXPECT_EQ(doubted(few), std::vector<int>{});
+}
+
+// Frames 4 to 9, seen so well and so far off the path.
+std::vector<int> forgotten(double accepted, const Eigen::Vector2d& off_px) {
+  Recorded recorded;
+  for (std::size_t i = 4; i < 10; ++i) {
+    recorded.glimpses[i].seen->accepted = accepted;
+    recorded.glimpses[i].seen->centre_px += off_px;
+  }
+  forget_what_the_path_jumps_to(recorded.glimpses);
+  std::vector<int> out;
+  for (const Glimpse& g : recorded.glimpses)
+    if (!g.seen) out.push_back(static_cast<int>(g.frame->index));
+  return out;
+}
+
+TEST(PathOutliers, WhatHidesTheBodyAndIsTakenForItIsForgotten) {
+  EXPECT_EQ(forgotten(0.3, {25.0, -20.0}), (std::vector<int>{4, 5, 6, 7, 8, 9}));
+}
+
+TEST(PathOutliers, ABodyHalfHiddenOnItsPathIsKept) {
+  EXPECT_EQ(forgotten(0.3, {0.5, -0.5}), std::vector<int>{});
+}
+
+TEST(PathOutliers, ABodyWellSeenIsKeptWhereverItIs) {
+  EXPECT_EQ(forgotten(0.9, {25.0, -20.0}), std::vector<int>{});
 }
 
 }  // namespace

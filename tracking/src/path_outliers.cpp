@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "polynomial.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -104,6 +105,56 @@ class Path {
   std::array<double, kWays> usual_px_{};
 };
 
+// Posed frames without a gap or a jump between them.
+struct Run {
+  std::vector<std::size_t> frames;
+  double accepted = 0.0;  // median
+  bool torn = false;      // the path jumps at one of its ends
+};
+
+// Whether the centre goes farther from one posed frame to the next than the path on either side
+// leads, by so much of the body's size that no impact does it.
+bool jumps(const std::vector<Glimpse>& glimpses, std::size_t from, std::size_t to) {
+  constexpr double kOfRadius = 0.3;
+  const auto centre = [&](std::size_t i) { return glimpses[i].seen->centre_px; };
+  const auto steps = static_cast<double>(to - from);
+  // At the speed of the frame beyond, if that was seen.
+  const auto beside = [&](std::size_t i, std::ptrdiff_t step) -> Eigen::Vector2d {
+    const auto k = static_cast<std::ptrdiff_t>(i) + step;
+    if (k < 0 || k >= std::ssize(glimpses) || !glimpses[static_cast<std::size_t>(k)].posed())
+      return Eigen::Vector2d::Zero();
+    return centre(i) - centre(static_cast<std::size_t>(k));
+  };
+  const double reach_px = kOfRadius * steps * glimpses[from].seen->rim.semi_major_px();
+  const Eigen::Vector2d ahead = centre(from) + steps * beside(from, -1);
+  const Eigen::Vector2d back = centre(to) + steps * beside(to, 1);
+  return (centre(to) - ahead).norm() > reach_px && (centre(from) - back).norm() > reach_px;
+}
+
+std::vector<Run> runs_of(const std::vector<Glimpse>& glimpses) {
+  std::vector<Run> runs;
+  std::vector<double> accepted;
+  std::optional<std::size_t> last;
+  const auto close = [&] {
+    if (!accepted.empty()) runs.back().accepted = data::median(std::exchange(accepted, {}));
+  };
+  for (std::size_t i = 0; i < glimpses.size(); ++i) {
+    if (!glimpses[i].posed()) continue;
+    const bool jump = last && jumps(glimpses, *last, i);
+    if (jump) runs.back().torn = true;
+    if (!last || jump || i > *last + 1) {
+      close();
+      runs.emplace_back();
+      runs.back().torn = jump;
+    }
+    runs.back().frames.push_back(i);
+    accepted.push_back(glimpses[i].seen->accepted);
+    last = i;
+  }
+  close();
+  return runs;
+}
+
 }  // namespace
 
 void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
@@ -118,6 +169,19 @@ void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
     pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
     pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
   }
+}
+
+void forget_what_the_path_jumps_to(std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kLongest = 12;
+  constexpr double kLittle = 0.6;
+  std::vector<double> accepted;
+  for (const Glimpse& g : glimpses)
+    if (g.posed()) accepted.push_back(g.seen->accepted);
+  if (accepted.empty()) return;
+  const double usual = data::median(std::move(accepted));
+  for (const Run& run : runs_of(glimpses))
+    if (run.torn && run.frames.size() <= kLongest && run.accepted < kLittle * usual)
+      for (const std::size_t i : run.frames) glimpses[i].seen.reset();
 }
 
 }  // namespace trochoid::tracking

@@ -11,4 +11,9 @@ namespace trochoid::tracking {
 /// then holds the place on the path as well; what was seen is not moved.
 void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses);
 
+/// Forgets short runs of frames in which little of the body is seen compared with the rest of the
+/// recording and which the path jumps to or from, farther than it leads: while the body is hidden,
+/// what hides it can pass for it.
+void forget_what_the_path_jumps_to(std::vector<Glimpse>& glimpses);
+
 }  // namespace trochoid::tracking

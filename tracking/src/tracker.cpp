@@ -244,6 +244,7 @@ class Tracking {
       if (const auto at = path.frames.find(frame.index); at != path.frames.end())
         glimpses.back().seen = std::move(at->second.seen);
     }
+    forget_what_the_path_jumps_to(glimpses);
     decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
