@@ -19,7 +19,7 @@ using Role = ParameterInfo::Role;
 enum class Floor { rolling, smooth, sliding };
 
 /// Places of the parameters in RimInput: initial state, losses, friction.
-constexpr int kInitial = 10, kFriction = kInitial + kLosses, kSlots = kFriction + 1;
+constexpr int kInitial = 10, kFriction = kInitial + kLosses;
 enum Slot : int { kTheta, kPhi, kPsi, kW1, kW2, kW3, kX, kY, kVx, kVy };
 
 template <class S>

@@ -8,7 +8,6 @@ inline namespace TROCHOID_ISA {
 namespace top_kernel {
 
 typedef double Eight __attribute__((vector_size(64)));
-typedef long long EightIndices __attribute__((vector_size(64)));
 constexpr int kEight = 8;
 
 /// Coefficients of x and y of one quantity (the value, or one derivative), copied together.
@@ -36,8 +35,8 @@ TROCHOID_INLINE void write_column(const PathSeries& series, double t0_s, const d
       y = y * s + series.y[i];
     }
     emit(x, y);
-    Eight pair[2] = {__builtin_shuffle(x, y, EightIndices{0, 8, 1, 9, 2, 10, 3, 11}),
-                     __builtin_shuffle(x, y, EightIndices{4, 12, 5, 13, 6, 14, 7, 15})};
+    Eight pair[2] = {__builtin_shufflevector(x, y, 0, 8, 1, 9, 2, 10, 3, 11),
+                     __builtin_shufflevector(x, y, 4, 12, 5, 13, 6, 14, 7, 15)};
     double* out = column + 2 * static_cast<long>(n);
     if (count == kEight) {
       __builtin_memcpy(out, pair, sizeof pair);

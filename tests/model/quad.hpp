@@ -1,14 +1,19 @@
 #pragma once
-#include <quadmath.h>
-
 #include "trochoid/model/taylor.hpp"
+
+// Of libquadmath, whose header only GCC finds.
+extern "C" {
+__extension__ typedef __float128 trochoid_float128;
+trochoid_float128 sinq(trochoid_float128) noexcept;
+trochoid_float128 cosq(trochoid_float128) noexcept;
+}
 
 namespace trochoid::model {
 
 /// Quadruple precision (113 bits) as a scalar of the equations: what double-precision runs and
 /// their derivatives are compared with.
 struct Quad {
-  __extension__ typedef __float128 Raw;
+  using Raw = trochoid_float128;
   Raw v;
 
   Quad() : v(0) {}

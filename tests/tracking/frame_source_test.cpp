@@ -98,7 +98,7 @@ TEST_F(FrameSourceTest, ColourComesOnlyWhenAsked) {
 TEST_F(FrameSourceTest, ARateGivenOverridesTheTimeStamps) {
   const auto source = open_video(write_clip("clip.mp4", "mp4v", 30.0), {.frame_rate_hz = 240.0});
   EXPECT_DOUBLE_EQ(source->info().frame_rate_hz, 240.0);
-  source->next();
+  ASSERT_TRUE(source->next());
   EXPECT_DOUBLE_EQ(source->next()->t_s, 1.0 / 240.0);
 }
 
