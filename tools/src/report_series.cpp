@@ -161,8 +161,9 @@ class Series {
     json chart{{"label", label}, {"series", json::array()}};
     for (const auto& [factor, shade] : {std::pair(2.0, "band2"), std::pair(1.0, "band")})
       for (const double sign : {1.0, -1.0}) {
-        json edge = line("band", "band", shade,
-                         column([&](std::size_t i) { return sign * factor * sigma(i); }));
+        json edge =
+            line("band", "band", shade,
+                 column([&, factor = factor](std::size_t i) { return sign * factor * sigma(i); }));
         edge["upper"] = sign > 0.0;
         chart["series"].push_back(std::move(edge));
       }
