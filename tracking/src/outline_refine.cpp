@@ -219,6 +219,14 @@ EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look
   return e;
 }
 
+// An edge that is expected to be seen so much too far out; by how much really, differs along it.
+void allow_for_shadow(double too_far_px, EdgeEquation& equation) {
+  constexpr double kUnsureShare = 0.4;
+  equation.offset_px -= too_far_px;
+  equation.shadow_px = too_far_px;
+  equation.model_px = std::hypot(equation.model_px, kUnsureShare * too_far_px);
+}
+
 // How much an edge off by this speaks for the pose, 0..1: an edge is certain at a gain of 3.
 double certainty(const ProfileEdge& edge, double off_px, double tolerance_px) {
   constexpr double kCertain = 3.0;
@@ -283,13 +291,8 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i], colour);
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
-    if (sample.silhouette && !colour) {
-      constexpr double kUnsureShare = 0.4;
-      const double too_far_px = shadow_px(around[i], sample.height_px);
-      equation.offset_px -= too_far_px;
-      equation.shadow_px = too_far_px;
-      equation.model_px = std::hypot(equation.model_px, kUnsureShare * too_far_px);
-    }
+    if (sample.silhouette && !colour)
+      allow_for_shadow(shadow_px(around[i], sample.height_px), equation);
     keep(sample, looks[i].edge, equation, out);
     out.shading.push_back(fit.shading[i]);
     out.blurs_px.push_back(looks[i].blur_px);

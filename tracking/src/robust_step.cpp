@@ -36,7 +36,7 @@ constexpr double kToneSdPx = 0.05;
 // common place of the samples.
 constexpr double kColourPolaritySdPx = 0.3, kColourShiftSdPx = 0.08;
 
-// The shadow beside the body, over the usual one.
+// By what share the shadow beside the body may be wider or narrower than expected.
 constexpr double kShadowSd = 0.5;
 
 // The few unknowns an equation depends on, in the order of their indices but for the knots.
