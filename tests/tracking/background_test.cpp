@@ -40,6 +40,20 @@ TEST(Background, ABodyThatRestsMostOfTheTimeIsNotFloor) {
   EXPECT_NEAR(seen[0].detection.semi_major_px, 15.0, 1.5);
 }
 
+// Without its frames left out nothing of the picture is ever still, and the body stays in the floor.
+TEST(Background, AHandThatReachesAcrossThePictureIsLeftOut) {
+  const cv::Mat floor = drawn_floor(200, 120, 150.0);
+  std::vector<cv::Point2d> places(16, {150.0, 60.0});  // rests for 11 of 16 samples
+  for (int i = 0; i < 5; ++i) places[static_cast<std::size_t>(i)] = {20.0 + 18.0 * i, 60.0};
+  std::vector<cv::Mat> frames = frames_of(floor, places);
+  for (int i = 0; i < 6; ++i)
+    frames[static_cast<std::size_t>(10 + i)](cv::Rect(0, 14 * i, 200, 50)) = 95;
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(level_at(background.plate().luma, 150, 60), level_at(floor, 150, 60), 3.0);
+  EXPECT_GT(background.active().at<std::uint8_t>(5, 5), 0) << "what the hand changed did change";
+  EXPECT_FALSE(background.camera_moves());
+}
+
 TEST(Background, NoiseIsMeasuredAndFlickerIsTakenOut) {
   std::mt19937 random(4);
   const cv::Mat floor = drawn_floor(160, 120, 120.0);

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kGrid_px = 12;  // of the brightness comparison
 constexpr int kSamples = Background::kSamples;
+constexpr double kMostActive = 0.7;  // of the picture; beyond, nothing in it is known to be static
 using Row = std::vector<std::uint8_t>;
 
 double median_ratio(const cv::Mat& image, const cv::Mat& reference) {
@@ -190,7 +191,6 @@ cv::Mat restless_of(const Quantiles& q, double noise) {
 /// Replaces, in one plane of the plate, what does not look like the static surroundings.
 void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat& active,
              const cv::Mat& restless, double noise) {
-  constexpr double kMostActive = 0.7;  // beyond, the camera moves and nothing is static
   const int count = cv::countNonZero(active);
   if (count == 0 || count > kMostActive * static_cast<double>(active.total())) return;
   const Surroundings around = Surroundings::of(plane, active);
@@ -231,26 +231,81 @@ cv::Rect halved(const cv::Rect& box, const cv::Size& half) {
   return cv::Rect(from, to) & cv::Rect({}, half);
 }
 
+/// An image at the brightness of the reference it has this gain over.
+cv::Mat levelled(const cv::Mat& image, double gain) {
+  // Below one percent the correction would only add rounding.
+  if (std::abs(gain - 1.0) <= 0.01) return image;
+  cv::Mat scaled;
+  image.convertTo(scaled, CV_8U, 1.0 / gain);
+  return scaled;
+}
+
+/// How much a pixel differs between two samples if it changed [levels].
+double least_change(double noise) {
+  return std::max(14.0, 7.0 * noise);
+}
+
+/// A hand that reaches across the picture changes all of it at one time or another, and then
+/// nothing tells the floor from a body that hovers over one place. The samples closest to the
+/// plate, as many as together leave most of the picture alone; all of them if those are few,
+/// because then it is the camera that moves.
+BackgroundSamples without_passers_by(const BackgroundSamples& samples, const Plate& plate) {
+  constexpr double kMostChanged = 0.4, kFewest = 1.0 / 3.0;
+  const std::size_t count = samples.luma.size();
+  std::vector<std::pair<int, std::size_t>> by_change;
+  std::vector<cv::Mat> changes(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const cv::Mat& image = samples.luma[k];
+    cv::absdiff(levelled(image, median_ratio(image, plate.luma)), plate.luma, changes[k]);
+    changes[k] = above(changes[k], least_change(plate.noise_levels));
+    by_change.emplace_back(cv::countNonZero(changes[k]), k);
+  }
+  std::sort(by_change.begin(), by_change.end());
+  cv::Mat changed = cv::Mat::zeros(plate.luma.size(), CV_8U);
+  std::vector<std::size_t> calm;
+  for (const auto& [pixels, k] : by_change) {
+    cv::bitwise_or(changed, changes[k], changed);
+    if (cv::countNonZero(changed) > kMostChanged * static_cast<double>(changed.total())) break;
+    calm.push_back(k);
+  }
+  if (static_cast<double>(calm.size()) < kFewest * static_cast<double>(count)) return samples;
+  std::sort(calm.begin(), calm.end());
+  BackgroundSamples chosen;
+  for (const std::size_t k : calm) {
+    chosen.luma.push_back(samples.luma[k]);
+    if (!samples.chroma.empty()) chosen.chroma.push_back(samples.chroma[k]);
+  }
+  return chosen;
+}
+
 }  // namespace
 
 Background Background::from_samples(const BackgroundSamples& samples) {
-  std::vector<cv::Mat> level = samples.luma;
-  std::vector<double> gains;
+  Background background = estimated(samples);
+  const auto total = static_cast<double>(background.active_.total());
+  if (cv::countNonZero(background.active_) <= kMostActive * total) return background;
+  const BackgroundSamples calm = without_passers_by(samples, background.plate_);
+  if (calm.luma.size() == samples.luma.size()) return background;
+  const cv::Mat active = background.active_;
+  background = estimated(calm);
+  cv::bitwise_or(background.active_, active, background.active_);
+  return background;
+}
+
+Background Background::estimated(const BackgroundSamples& samples) {
   const cv::Mat& reference = samples.luma[samples.luma.size() / 2];
-  for (cv::Mat& image : level) {
+  std::vector<cv::Mat> level;
+  std::vector<double> gains;
+  for (const cv::Mat& image : samples.luma) {
     gains.push_back(median_ratio(image, reference));
-    // Below one percent the correction would only add rounding.
-    if (std::abs(gains.back() - 1.0) <= 0.01) continue;
-    cv::Mat scaled;
-    image.convertTo(scaled, CV_8U, 1.0 / gains.back());
-    image = scaled;
+    level.push_back(levelled(image, gains.back()));
   }
   Background background;
   const Quantiles q = quantiles_of(level);
   Plate& plate = background.plate_;
   plate.luma = q.median;
   plate.noise_levels = noise_of(q);
-  background.active_ = above(q.range, std::max(14.0, 7.0 * plate.noise_levels));
+  background.active_ = above(q.range, least_change(plate.noise_levels));
   const cv::Mat restless = restless_of(q, plate.noise_levels);
   background.restless_ =
       static_cast<double>(cv::countNonZero(restless)) / static_cast<double>(restless.total());

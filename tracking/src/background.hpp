@@ -28,6 +28,8 @@ class Background {
   /// changed and the median does not look like the static surroundings - a body rested or hovered
   /// there most of the time - samples that do take its place; where none does and the picture never
   /// settles, the surroundings themselves do.
+  /// Samples in which something else, a hand, covers much of the picture are left out, as long as
+  /// most of the others agree.
   /// Where the chroma of pixels changed - a body as dark as the floor - they changed as well.
   /// @param samples CV_8UC1 (and CV_8UC2) of one size, at least one.
   static Background from_samples(const BackgroundSamples& samples);
@@ -49,6 +51,7 @@ class Background {
   void scaled_into(Plate& plate, double gain, const cv::Rect& box) const;
 
  private:
+  static Background estimated(const BackgroundSamples& samples);
   void estimate_chroma(const std::vector<cv::Mat>& samples, const std::vector<double>& gains);
 
   Plate plate_;
