@@ -41,5 +41,14 @@ TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
   for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
 }
 
+// At the height of the wrong reading the rim looks too large or too small, now this, now that.
+TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatKeepsTheSizeOfTheBodyIsRight) {
+  const Oracle oracle([](int) { return -1.0; }, [](int i) { return 0.4 * std::sin(0.2 * i); });
+  auto glimpses = tracked(oracle, [](int i) { return i >= 20 && i < 50; });
+  decide_attitudes(background_, oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+  for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -40,7 +40,8 @@ TEST(Background, ABodyThatRestsMostOfTheTimeIsNotFloor) {
   EXPECT_NEAR(seen[0].detection.semi_major_px, 15.0, 1.5);
 }
 
-// Without its frames left out nothing of the picture is ever still, and the body stays in the floor.
+// Without its frames left out nothing of the picture is ever still, and the body stays in the
+// floor.
 TEST(Background, AHandThatReachesAcrossThePictureIsLeftOut) {
   const cv::Mat floor = drawn_floor(200, 120, 150.0);
   std::vector<cv::Point2d> places(16, {150.0, 60.0});  // rests for 11 of 16 samples

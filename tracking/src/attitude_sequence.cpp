@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "forecast.hpp"
@@ -25,7 +26,8 @@ struct Node {
   std::array<Pose, 2> poses;  ///< as tracked, mirrored
   double tilt_rad;            ///< half the angle between the two axes
   bool weighed = false;
-  double speaks = 0.0;              ///< how much the picture speaks for the first
+  double shows = 0.0;               ///< how much the edges in the picture speak for the first
+  double speaks = 0.0;              ///< how much all of it does
   std::optional<Sighting> again{};  ///< the first measured afresh, where more speaks for it then
   std::optional<Sighting> other{};  ///< the second
 
@@ -63,8 +65,10 @@ class Chain {
   void decide() {
     if (nodes_.size() < 3) return;
     weigh(first_choice());
+    compare_sizes();
     solve();
     weigh(in_doubt());
+    compare_sizes();
     solve();
     discount();
     solve();
@@ -109,14 +113,84 @@ class Chain {
         node.again = std::move(again);
       node.other = measured(measure, chosen[k], 1);
       if (!node.other) {
-        node.speaks = node.wall() * kNothingThere;
+        node.shows = node.wall() * kNothingThere;
         return;
       }
-      const Sighting& own = node.again ? *node.again : *glimpse.seen;
+      const Sighting& own = first_of(node);
       const double ours = own.pose->evidence, theirs = node.other->pose->evidence;
       const double share = (ours - theirs) / std::max({ours, theirs, 1e-9});
-      node.speaks = node.wall() * std::clamp(kPerShare * share, -kMost, kMost);
+      node.shows = node.wall() * std::clamp(kPerShare * share, -kMost, kMost);
     });
+  }
+
+  [[nodiscard]] const Sighting& first_of(const Node& node) const {
+    return node.again ? *node.again : *glimpses_[node.at].seen;
+  }
+
+  /// A body has one size. The two readings of a picture lie at different heights: at the wrong one
+  /// the rim looks too large or too small, by as much as the camera then shows it larger or
+  /// smaller. Of all readings the right ones are those that agree.
+  void compare_sizes() {
+    constexpr std::size_t kFewest = 8;
+    constexpr double kLeastSd_px = 0.1;
+    const double whole = least_whole();
+    std::vector<double> larger_px;
+    for (Node& node : nodes_) {
+      node.speaks = node.shows;
+      if (shows_size(node, whole))
+        larger_px.insert(larger_px.end(),
+                         {first_of(node).pose->larger_px, node.other->pose->larger_px});
+    }
+    if (larger_px.size() < 2 * kFewest) return;
+    const auto [usual_px, spread_px] = where_half_agree(std::move(larger_px));
+    for (Node& node : nodes_)
+      if (shows_size(node, whole))
+        node.speaks += size_speaks(node, usual_px, std::max(kLeastSd_px, spread_px));
+  }
+
+  /// How much its size speaks for the first reading of a node.
+  [[nodiscard]] double size_speaks(const Node& node, double usual_px, double sd_px) const {
+    constexpr double kMost = 1.5;
+    const Sighting &one = first_of(node), &other = *node.other;
+    const double expected_px = one.rim.semi_major_px() - other.rim.semi_major_px();
+    const double seen_px = other.pose->larger_px - one.pose->larger_px;
+    if (expected_px * seen_px <= 0.0) return 0.0;
+    // The middle of the two is half of what they differ by off the usual, on the side of the wrong
+    // one.
+    const double half_px =
+        0.5 * std::copysign(std::min(std::abs(expected_px), std::abs(seen_px)), seen_px);
+    const double middle_px = 0.5 * (one.pose->larger_px + other.pose->larger_px) - usual_px;
+    const double off_one = std::pow((middle_px - half_px) / sd_px, 2);
+    const double off_other = std::pow((middle_px + half_px) / sd_px, 2);
+    return std::clamp(std::log1p(off_other) - std::log1p(off_one), -kMost, kMost);
+  }
+
+  /// So much of the outline is seen of a body that nothing hides: of part of it the size is not
+  /// known apart from the place.
+  [[nodiscard]] double least_whole() const {
+    constexpr double kOfUsual = 0.85;
+    std::vector<double> accepted;
+    for (const Node& node : nodes_) accepted.push_back(first_of(node).accepted);
+    return kOfUsual * data::median(std::move(accepted));
+  }
+
+  [[nodiscard]] bool shows_size(const Node& node, double least_accepted) const {
+    return node.other && std::min(first_of(node).accepted, node.other->accepted) >= least_accepted;
+  }
+
+  /// Mean of the half of the values that lie closest together, and the standard deviation of those
+  /// that belong there.
+  static std::pair<double, double> where_half_agree(std::vector<double> values) {
+    constexpr double kDeviations = 3.0;  // that half, all of what belongs there, spans
+    std::sort(values.begin(), values.end());
+    const std::size_t half = values.size() / 2;
+    std::size_t from = 0;
+    for (std::size_t k = 0; k + half <= values.size(); ++k)
+      if (values[k + half - 1] - values[k] < values[from + half - 1] - values[from]) from = k;
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto last = first + static_cast<std::ptrdiff_t>(half);
+    const double mean = std::accumulate(first, last, 0.0) / static_cast<double>(half);
+    return {mean, (*(last - 1) - *first) / kDeviations};
   }
 
   /// What pictures of one body say has errors that all of them share (a raised rim, a shadow): if

@@ -268,13 +268,19 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
   ShadingMemory shading;
+  double rim_px = 0.0;
   for (size_t i = 0; i < r.equations.size(); ++i) {
     const EdgeEquation& e = r.equations[i];
     if (e.weight < 0.5) continue;
+    if (r.samples[i].silhouette && e.swell > 0.0 && !e.colour) {
+      m.larger_px += e.arc_px * (r.solution.swell_px + e.polarity * r.solution.polarity_px);
+      rim_px += e.arc_px;
+    }
     shading.add(r.shading[i]);
     m.edges.push_back({r.samples[i].image_px + e.offset_px * r.samples[i].normal_px,
                        r.samples[i].normal_px, std::sqrt(e.variance_px2), e.residual_px});
   }
+  if (rim_px > 0.0) m.larger_px /= rim_px;
   m.shading = std::make_shared<ShadingMemory>(std::move(shading));
   return m;
 }

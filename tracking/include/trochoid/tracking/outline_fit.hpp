@@ -49,6 +49,9 @@ struct PoseMeasurement {
   /// How far edges lie towards their brighter side (> 0) of where the transfer curve puts them;
   /// what edges do not tell, a prior takes for 0.
   double polarity_px = 0.0;
+  /// How much farther out the rim is seen than the body's radius and the height of this pose put it
+  /// [px], as far as all of it agrees on that: an edge model may be wrong by so much, or the pose.
+  double larger_px = 0.0;
   /// Replaces `inflation` by a better one.
   void inflate(double better);
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
