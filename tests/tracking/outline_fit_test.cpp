@@ -327,6 +327,44 @@ TEST(OutlineFitter, AContactShadowAsDarkAsTheDiscHardlyPullsIt) {
   }
 }
 
+// A disc with a dot on its upper face, predicted the wrong way up: its outline is the same.
+TEST(OutlineFitter, AMarkTellsWhichFaceIsSeen) {
+  constexpr double kTheta = 0.6, kPsi = 0.9, kRadius_px = 30.0, kDot_px = 16.0;
+  constexpr double kTolerance_rad = 0.05;  // the dot is 3 px wide, the thin wall hardly shows
+  FlatDisc disc;
+  disc.body.thickness_m = 1e-4;
+  disc.body.marks = {{.distance_m = 1e-3 * kDot_px, .size_m = 0.003, .on_lower_face = false}};
+  const Eigen::Vector2d centre(80.2, 70.4);
+  std::mt19937 random(12);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const cv::Mat floor = drawn_floor(160, 140, 150.0);
+  cv::Mat plate;
+  floor.convertTo(plate, CV_8U);
+  data::Pose<> predicted;
+  predicted.theta_rad = std::numbers::pi - kTheta;
+  predicted.phi_rad = std::numbers::pi;
+  predicted.centre_m = disc.camera.table_from_image(
+      centre, data::height_on_floor_m(kTheta, disc.body.radius_m, disc.body.half_thickness_m()));
+  for (const bool dotted : {true, false}) {
+    cv::Mat picture = floor.clone();
+    draw_disc(picture, centre.x(), centre.y(), kRadius_px, kRadius_px * std::cos(kTheta), 0.0,
+              60.0);
+    if (dotted)
+      draw_disc(picture, centre.x() + kDot_px * std::cos(kPsi),
+                centre.y() - kDot_px * std::sin(kPsi) * std::cos(kTheta), 3.0,
+                3.0 * std::cos(kTheta), 0.0, 200.0);
+    const cv::Mat luma = developed(picture, 2.0, random);
+    const auto seen = fitter.measure(
+        {.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
+    ASSERT_TRUE(seen);
+    EXPECT_EQ(seen->sigma_psi_rad.has_value(), dotted);
+    EXPECT_NEAR(seen->pose.theta_rad, dotted ? kTheta : std::numbers::pi - kTheta, kTolerance_rad);
+    if (!dotted) continue;
+    const double turned_rad = seen->pose.phi_rad + seen->pose.psi_rad - kPsi;
+    EXPECT_NEAR(std::remainder(turned_rad, 2.0 * std::numbers::pi), 0.0, kTolerance_rad);
+  }
+}
+
 TEST(OutlineFitter, TellsTheBlurForTheNextFrame) {
   const FlatDisc disc;
   std::mt19937 random(7);

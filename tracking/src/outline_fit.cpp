@@ -285,11 +285,27 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   return m;
 }
 
-// Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
-void fold(data::Pose<>& pose) {
-  if (pose.theta_rad <= 0.5 * std::numbers::pi) return;
+// The other attitude with the same outline: the faces have changed places.
+data::Pose<> turned_over(data::Pose<> pose) {
   pose.theta_rad = std::numbers::pi - pose.theta_rad;
   pose.phi_rad = std::remainder(pose.phi_rad + std::numbers::pi, 2.0 * std::numbers::pi);
+  return pose;
+}
+
+// Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
+void fold(data::Pose<>& pose) {
+  if (pose.theta_rad > 0.5 * std::numbers::pi) pose = turned_over(pose);
+}
+
+// Reads the marks; those of the other face show that a prediction had the body the wrong way up.
+std::optional<MarkReading> read_marks_of_either_face(const cv::Mat& luma, const data::Body& body,
+                                                     const data::Camera& camera,
+                                                     data::Pose<>& pose) {
+  if (auto marks = read_marks(luma, body, camera, pose)) return marks;
+  const data::Pose<> over = turned_over(pose);
+  auto marks = read_marks(luma, body, camera, over);
+  if (marks) pose = over;
+  return marks;
 }
 
 // Spin is counted from the node line: what phi is wrong by, psi takes back. An axis that is off
@@ -383,7 +399,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   if (!believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
   if (alike) fold(m.pose);
-  if (const auto marks = read_marks(evidence.luma, body_, camera_, m.pose)) {
+  const bool either = mirrors && !alike && body_.axle_above_m <= 0.0;
+  if (const auto marks = either ? read_marks_of_either_face(evidence.luma, body_, camera_, m.pose)
+                                : read_marks(evidence.luma, body_, camera_, m.pose)) {
     m.pose.psi_rad = marks->psi_rad;
     m.sigma_psi_rad = spin_sigma_rad(m, *marks);
   }
