@@ -89,7 +89,11 @@ class CylinderFinder final : public BodyFinder {
         pivoted_(support.kind == data::SupportKind::pivot),
         motion_(body, support, camera),
         fitter_(body, support, camera, effort),
-        looks_again_(effort != Effort::quick) {}
+        looks_again_(effort != Effort::quick) {
+    if (support.kind != data::SupportKind::floor) return;
+    const data::Support flat{data::SupportKind::flat, {}};
+    lying_ = std::make_unique<CylinderFinder>(body, flat, camera, exposure_fraction, effort);
+  }
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     const OutlineEvidence evidence{
@@ -135,6 +139,7 @@ class CylinderFinder final : public BodyFinder {
     if (motion_.rotation() < 0 || pivoted_) return std::nullopt;
     return tracking::mirrored(camera_, motion_, pose);
   }
+  [[nodiscard]] const BodyFinder* lying() const override { return lying_.get(); }
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
     try {
       const Eigen::Vector3d at = camera_.table_from_image(at_px, body_.half_thickness_m());
@@ -195,6 +200,7 @@ class CylinderFinder final : public BodyFinder {
   PoseMotion motion_;
   OutlineFitter fitter_;
   bool looks_again_;
+  std::unique_ptr<CylinderFinder> lying_;
 };
 
 }  // namespace

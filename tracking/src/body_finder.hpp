@@ -51,6 +51,8 @@ class BodyFinder {
       const data::Pose<>& /*pose*/) const {
     return std::nullopt;
   }
+  /// For a body on the floor that is known to lie on its face; null where there is no difference.
+  [[nodiscard]] virtual const BodyFinder* lying() const { return nullptr; }
   /// Semi-major axis of the rim of the body lying there [px]; 0 if its size is not known.
   [[nodiscard]] virtual double expected_major_px(const Eigen::Vector2d& /*at_px*/) const {
     return 0.0;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <future>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 
 void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen) {
@@ -11,6 +13,21 @@ void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sigh
   seen.covariance_px2 += px2;
   seen.pose->covariance_px2 += px2, seen.pose->common.px2 += px2;
   seen.pose->covariance_m2 += m2, seen.pose->common.m2 += m2;
+}
+
+Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i) {
+  constexpr std::size_t kReach = 6;
+  Surroundings out;
+  std::vector<double> blurs_px;
+  for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
+       ++k) {
+    if (!glimpses[k].posed()) continue;
+    const PoseMeasurement& pose = *glimpses[k].seen->pose;
+    blurs_px.push_back(pose.blur_px);
+    if (k != i && pose.shading) out.shading.add(*pose.shading);
+  }
+  out.blur_px = data::median(std::move(blurs_px));
+  return out;
 }
 
 double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike) {

@@ -2,9 +2,11 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "background.hpp"
 #include "body_finder.hpp"
+#include "shading_prior.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tracking {
@@ -39,6 +41,14 @@ class Measuring {
 /// Runs work(measuring, i) for i of 0..count on two cores.
 void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
                    const std::function<void(Measuring&, std::size_t)>& work);
+
+/// What the frames around frame i show of the picture: the light beside the outline, and how sharp
+/// it is.
+struct Surroundings {
+  ShadingMemory shading;
+  double blur_px;
+};
+[[nodiscard]] Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i);
 
 /// Allows for the centre being this far off as well, in the picture and on the floor.
 void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen);

@@ -9,7 +9,6 @@
 #include "forecast.hpp"
 #include "polynomial.hpp"
 #include "pose_motion.hpp"
-#include "shading_prior.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -229,28 +228,6 @@ std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::
                           after ? *after : beyond(*before, pose));
 }
 
-/// What the frames around frame i show of the picture: the light beside the outline, and how sharp
-/// it is.
-struct Surroundings {
-  ShadingMemory shading;
-  double blur_px;
-};
-
-Surroundings around(const std::vector<Glimpse>& glimpses, std::size_t i) {
-  constexpr std::size_t kReach = 6;
-  Surroundings out;
-  std::vector<double> blurs_px;
-  for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
-       ++k) {
-    if (!glimpses[k].posed()) continue;
-    const PoseMeasurement& pose = *glimpses[k].seen->pose;
-    blurs_px.push_back(pose.blur_px);
-    if (k != i && pose.shading) out.shading.add(*pose.shading);
-  }
-  out.blur_px = data::median(std::move(blurs_px));
-  return out;
-}
-
 /// Measures a frame again where its neighbours contradict it. Nothing if what was seen stands.
 class Mending {
  public:
@@ -366,7 +343,7 @@ void measure_again(const Background& background, const BodyFinder& finder, std::
     const std::optional<Pose> before = one_frame_before(was, i, alike);
     if (!before) return;
     const Sighting& seen = *was[i].seen;
-    const Surroundings surroundings = around(was, i);
+    const Surroundings surroundings = surroundings_of(was, i);
     Sighting guess = seen;
     guess.pose->blur_px = surroundings.blur_px;
     auto again = measure(*was[i].frame, std::move(guess), before, &surroundings.shading);

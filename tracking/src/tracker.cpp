@@ -9,6 +9,7 @@
 
 #include "attitude_sequence.hpp"
 #include "body_search.hpp"
+#include "lying.hpp"
 #include "neighbours.hpp"
 #include "path_motion.hpp"
 #include "path_outliers.hpp"
@@ -248,6 +249,7 @@ class Tracking {
     decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
+    measure_what_lies(background_, *finder_, glimpses);
     doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
