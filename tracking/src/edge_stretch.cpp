@@ -1,6 +1,6 @@
 #include "edge_stretch.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,10 +29,11 @@ struct Noise {
 };
 
 using Variances = std::array<float, 3>;  // of a sample inside, outside and on the edge
+constexpr Variances kEqual{1.0f, 1.0f, 1.0f};
 
 // How a sample, of which such a share is outside, belongs to inside, outside and the edge.
 Variances parts_of(float share) {
-  const float on = 4.0f * share * (1.0f - share), beside = 1.0f - on;
+  const float off = 1.0f - 2.0f * share, beside = off * off * off * off, on = 1.0f - beside;
   return {beside * (1.0f - share), beside * share, on};
 }
 
@@ -311,8 +312,9 @@ float shaded(float level, float slope, float bend, float s) {
 }
 
 // Squared residuals beside and on the edge about the best step with this shading, whose levels it
-// keeps.
-void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
+// keeps, and the degrees of freedom that the fit has left them.
+void find_noise(const StretchProfile& p, const Columns& c, const Variances& assumed, double noise2,
+                Working& w) {
   Eigen::Matrix3d m;
   Eigen::Vector3d r;
   for (int i = 0; i < kOwn; ++i) {
@@ -324,7 +326,9 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
       r[i] -= static_cast<double>(w.normal[static_cast<size_t>(kOwn + k)][row]) * w.shading[k];
   }
   m(2, 2) += 1.0;
-  const Eigen::Vector3f own = m.ldlt().solve(r).cast<float>();
+  const Eigen::Matrix3d inverse = m.inverse();
+  const Eigen::Vector3f own = (inverse * r).cast<float>();
+  const Eigen::Matrix3f leverage = inverse.cast<float>();
   const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
   const float inner = w.inner + own[0], outer = w.outer + own[1];
   const double own_share = 1.0 / p.profile.shared;
@@ -332,20 +336,24 @@ void find_noise(const StretchProfile& p, const Columns& c, Working& w) {
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px[k], a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
+    const float d = (w.inner - w.outer * c.ground[k]) * c.density[k];
     const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
-                       shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] -
-                       own[2] * (w.inner - w.outer * c.ground[k]) * c.density[k];
+                       shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] - own[2] * d;
+    const Eigen::Vector3f row(a, b, d);
+    const double free =
+        own_share - static_cast<double>(row.dot(leverage * row) / variance_at(assumed, c.share[k]));
     const Variances part = parts_of(c.share[k]);
-    const Eigen::Array3d parts = own_share * Eigen::Array3d(part[0], part[1], part[2]);
-    w.noise.square += parts * static_cast<double>(rest * rest);
-    w.noise.freedom += parts;
+    const Eigen::Array3d parts(part[0], part[1], part[2]);
+    w.noise.square += own_share * static_cast<double>(rest * rest) * parts;
+    w.noise.freedom += free * parts;
   }
   w.inner = inner, w.outer = outer;
-  // Levels come from either side, the offset from the edge; priors make slopes and bends count
-  // less.
-  const Eigen::Array3d fitted(1.4, 1.4, 1.0);
+  // Of the shading the share that the samples determine and not what is known of it beforehand;
+  // it comes from either side of the edge.
+  const double shading = w.shading_covariance.cwiseProduct(w.shading_normal).sum() / noise2;
   constexpr double kLeastFreedom = 0.2;
-  w.noise.freedom = (w.noise.freedom - fitted).max(kLeastFreedom);
+  w.noise.freedom -= Eigen::Array3d(0.5, 0.5, 0.0) * shading;
+  w.noise.freedom = w.noise.freedom.max(kLeastFreedom);
 }
 
 // Variances of a sample from a stretch of the outline.
@@ -447,13 +455,14 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
     columns_of(profiles[i], columns[i]);
     all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
     if (!all[i].usable) continue;
-    accumulate(profiles[i], columns[i], {1.0f, 1.0f, 1.0f}, all[i]);
+    accumulate(profiles[i], columns[i], kEqual, all[i]);
     reduce(profiles[i], all[i]);
   }
-  StretchFit out = find_shadings(profiles, noise_of_looks(profiles, all), known, all);
+  const std::vector<double> noise2 = noise_of_looks(profiles, all);
+  StretchFit out = find_shadings(profiles, noise2, known, all);
   for (size_t i = 0; i < profiles.size(); ++i)
-    if (all[i].usable) find_noise(profiles[i], columns[i], all[i]);
-  const std::vector<Variances> noise = noise_of_neighbours(all, profiles);
+    if (all[i].usable) find_noise(profiles[i], columns[i], kEqual, noise2[i], all[i]);
+  std::vector<Variances> noise = noise_of_neighbours(all, profiles);
   if (weighed) {
     for (size_t i = 0; i < profiles.size(); ++i) {
       if (!all[i].usable) continue;
@@ -461,6 +470,9 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
       reduce(profiles[i], all[i]);
     }
     out = find_shadings(profiles, std::vector<double>(all.size(), 1.0), known, all);
+    for (size_t i = 0; i < profiles.size(); ++i)
+      if (all[i].usable) find_noise(profiles[i], columns[i], noise[i], 1.0, all[i]);
+    noise = noise_of_neighbours(all, profiles);
   }
   for (size_t i = 0; i < profiles.size(); ++i) {
     profiles[i].found = false;

@@ -360,9 +360,11 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMoti
   // Noise grows with the correlation, what the edge models may be wrong by does not.
   const double grown = solution.correlation * scale2 / (solution.scale * solution.scale);
   solution.covariance = grown * inverse;
-  constexpr double kLeast = 0.6, kMost = 25.0;  // a small ratio may also be luck
+  // Six answers tell a ratio roughly; a third of the belief stays with what the covariance says.
+  constexpr double kMost = 25.0, kBelieved = 2.0 / 3.0;
   const double ratio = jackknife_ratio(all, sectors, solution.covariance);
-  if (std::isfinite(ratio)) solution.inflation = std::clamp(ratio, kLeast, kMost);
+  if (std::isfinite(ratio))
+    solution.inflation = std::min(kBelieved * ratio + 1.0 - kBelieved, kMost);
   solution.common = common_covariance(equations, rows, factorised, solution.scale, first, n);
   solution.covariance = solution.inflation * solution.covariance + solution.common;
 }
