@@ -52,19 +52,20 @@ int run(int argc, char** argv) {
       "Say on stderr what is being done and why");
   trochoid::fitting::silence_solver_log();
   using namespace trochoid::tools;
-  add_simulate_command(app);
-  add_fit_command(app);
-  add_study_command(app);
-  add_report_command(app);
+  // In the order of work: what --help lists first is wanted first.
 #ifdef TROCHOID_HAS_TRACKING
+  add_init_command(app);
+  add_calibrate_command(app);
+  add_run_command(app);
   add_track_command(app);
   add_overlay_command(app);
-  add_run_command(app);
   add_campaign_command(app);
   add_render_command(app);
-  add_calibrate_command(app);
-  add_init_command(app);
 #endif
+  add_fit_command(app);
+  add_simulate_command(app);
+  add_report_command(app);
+  add_study_command(app);
   add_manual_command(app);
   try {
     app.parse(argc, argv);

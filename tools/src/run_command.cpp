@@ -328,14 +328,16 @@ void add_run_command(CLI::App& app) {
       ->add_option("--model", options->model,
                    "Model to fit, or auto: compare; overrides the scene's")
       ->check(fitted_model());
-  command->add_option("--objects", options->objects, "Number of moving bodies")
+  command
+      ->add_option("--objects", options->objects,
+                   "Number of moving bodies, all of the size the scene gives")
       ->check(CLI::Range(1, 64));
   add_at(*command, options->at);
   command->add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
   command->add_option("--to", options->to, "Last moment: seconds or a frame");
   command
       ->add_option("--rate", options->rate_hz,
-                   "True frame rate [Hz], where the file's is not (slow motion)")
+                   "True frame rate [Hz]: of slow motion, or of an image folder or series")
       ->check(positive_number());
   add_effort(
       *command, options->effort,

@@ -70,12 +70,14 @@ void tell(const Options& options, const tracking::TrackResult& result,
           std::optional<std::int64_t> interpolated) {
   const tracking::TrackSummary& s = result.summary;
   if (!options.json) {
+    const std::size_t count = result.file.tracks.size();
+    const std::string bodies = count == 1 ? "1 body" : fmt::format("{} bodies", count);
     note(
-        fmt::format("{}: {} bodies in {} frames: {} found, {} lost, {} doubtful,{} {} frames "
+        fmt::format("{}: {} in {} frames: {} found, {} lost, {} doubtful,{} {} frames "
                     "damaged; metres: {}",
-                    options.output.string(), result.file.tracks.size(), s.frames, s.found, s.lost,
-                    s.doubtful, interpolated ? fmt::format(" {} interpolated,", *interpolated) : "",
-                    s.damaged, s.camera_words));
+                    options.output.string(), bodies, s.frames, s.found, s.lost, s.doubtful,
+                    interpolated ? fmt::format(" {} interpolated,", *interpolated) : "", s.damaged,
+                    s.camera_words));
     for (const std::string& line : result.file.notes) note(line);
     return;
   }
@@ -140,9 +142,12 @@ void add_track_command(CLI::App& app) {
   CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
   track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
       ->required();
-  track->add_option("--scene", options->scene, "Scene file (docs/formats.md)");
+  track->add_option("--scene", options->scene,
+                    "Scene file (docs/formats.md); without body and camera a track in pixels");
   track->add_option("--camera", options->camera, "Camera file; replaces the scene's");
-  track->add_option("--objects", options->objects, "Number of moving bodies")
+  track
+      ->add_option("--objects", options->objects,
+                   "Number of moving bodies, all of the size the scene gives")
       ->check(CLI::Range(1, 64));
   track->add_option("--from", options->from, "First frame to use: seconds (1.5) or frame (f120)");
   track->add_option("--to", options->to, "Last frame to use: seconds or frame");
@@ -152,7 +157,7 @@ void add_track_command(CLI::App& app) {
                     "Also write smoothed positions and velocities (CSV); never fit these");
   track
       ->add_option("--rate", options->rate_hz,
-                   "True frame rate [Hz], where the file's is not (slow motion)")
+                   "True frame rate [Hz]: of slow motion, or of an image folder or series")
       ->check(positive_number());
   add_effort(
       *track, options->effort,
