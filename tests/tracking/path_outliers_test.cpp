@@ -101,5 +101,22 @@ TEST(PathOutliers, ABodyWellSeenIsKeptWhereverItIs) {
   EXPECT_EQ(forgotten(0.9, {25.0, -20.0}), std::vector<int>{});
 }
 
+// Frames 5 to 15 hidden but for frame 10.
+TEST(PathOutliers, WhatIsSeenAloneInAGapIsDoubtedWhereTheLineAcrossTheGapDoesNotLead) {
+  for (const double off_px : {0.0, 30.0}) {
+    Recorded recorded;
+    for (std::size_t i = 5; i <= 15; ++i)
+      if (i != 10) recorded.glimpses[i].seen.reset();
+    Sighting& lone = *recorded.glimpses[10].seen;
+    const Eigen::Vector2d true_px = lone.centre_px;
+    lone.centre_px.x() += off_px;
+    doubt_what_stands_alone(recorded.glimpses);
+    EXPECT_EQ(lone.attitude_doubtful, off_px > 0.0);
+    if (off_px == 0.0) continue;
+    const Eigen::Vector2d off = lone.centre_px - true_px;
+    EXPECT_LT(off.dot(lone.covariance_px2.inverse() * off), 4.0) << "two standard deviations";
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -155,19 +156,55 @@ std::vector<Run> runs_of(const std::vector<Glimpse>& glimpses) {
   return runs;
 }
 
+// A sighting may as well be at another place: its covariance then holds both.
+void doubt(const Place& place, Sighting& seen) {
+  PoseMeasurement& pose = *seen.pose;
+  const Eigen::Vector2d px = place.px - seen.centre_px;
+  seen.attitude_doubtful = true;
+  allow_for(px, place.m - pose.pose.centre_m.head<2>(), seen);
+  // A fit that went astray did so in all it says.
+  const double astray_rad = px.norm() / seen.rim.semi_major_px();
+  pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
+  pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+}
+
+// Where a straight line between two other frames puts the body in frame i.
+Place between(const std::vector<Glimpse>& glimpses, std::size_t from, std::size_t i,
+              std::size_t to) {
+  const double start_s = glimpses[from].frame->t_s;
+  const double share = (glimpses[i].frame->t_s - start_s) / (glimpses[to].frame->t_s - start_s);
+  const auto at = [&](const auto& a, const auto& b) { return a + share * (b - a); };
+  const Eigen::Vector2d from_m = glimpses[from].pose().centre_m.head<2>();
+  const Eigen::Vector2d to_m = glimpses[to].pose().centre_m.head<2>();
+  return {at(glimpses[from].seen->centre_px, glimpses[to].seen->centre_px), at(from_m, to_m)};
+}
+
 }  // namespace
 
 void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
-  for (const auto& [i, place] : Path(glimpses).take_out()) {
-    Sighting& seen = *glimpses[i].seen;
-    PoseMeasurement& pose = *seen.pose;
-    const Eigen::Vector2d px = place.px - seen.centre_px;
-    seen.attitude_doubtful = true;
-    allow_for(px, place.m - pose.pose.centre_m.head<2>(), seen);
-    // A fit that went astray did so in all it says.
-    const double astray_rad = px.norm() / seen.rim.semi_major_px();
-    pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
-    pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  for (const auto& [i, place] : Path(glimpses).take_out()) doubt(place, *glimpses[i].seen);
+}
+
+void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kMost = 3;
+  constexpr double kOfRadius = 0.3;
+  const std::vector<Run> runs = runs_of(glimpses);
+  const auto followed = [&](const Run& run) { return run.frames.size() > kMost; };
+  for (auto run = runs.begin(); run != runs.end(); ++run) {
+    if (followed(*run)) continue;
+    const auto before = std::find_if(std::reverse_iterator(run), runs.rend(), followed);
+    const auto after = std::find_if(run, runs.end(), followed);
+    if (before == runs.rend() || after == runs.end()) continue;
+    for (const std::size_t i : run->frames) {
+      Sighting& seen = *glimpses[i].seen;
+      const Place place = between(glimpses, before->frames.back(), i, after->frames.front());
+      const Eigen::Vector2d px = place.px - seen.centre_px;
+      const Eigen::Vector2d m = place.m - seen.pose->pose.centre_m.head<2>();
+      if (px.norm() < kOfRadius * seen.rim.semi_major_px()) continue;
+      doubt(place, seen);
+      // The path need not have been straight in between.
+      allow_for({-px.y(), px.x()}, {-m.y(), m.x()}, seen);
+    }
   }
 }
 

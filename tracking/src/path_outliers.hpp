@@ -11,6 +11,11 @@ namespace trochoid::tracking {
 /// then holds the place on the path as well; what was seen is not moved.
 void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses);
 
+/// Doubts up to three frames between gaps or jumps of the path that are far, for the body's size,
+/// from the line between the frames on either side: nothing near confirms them, and while the body
+/// is hidden, what hides it can pass for it. Their covariance then holds the place on that line.
+void doubt_what_stands_alone(std::vector<Glimpse>& glimpses);
+
 /// Forgets short runs of frames in which little of the body is seen compared with the rest of the
 /// recording and which the path jumps to or from, farther than it leads: while the body is hidden,
 /// what hides it can pass for it.

@@ -252,6 +252,7 @@ class Tracking {
     measure_what_lies(background_, *finder_, glimpses);
     doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
+    doubt_what_stands_alone(glimpses);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
