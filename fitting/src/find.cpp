@@ -26,7 +26,8 @@ Found with_spin(const Problem& problem, Found found) {
   Eigen::VectorXd sign;
   fold_tilt(*problem.predictor, whole.base[0], sign);
   start_spin(whole, 0);
-  found.solution = solve(whole, whole.start());
+  constexpr double kNear = 1e-5;  // the polish goes on from there
+  found.solution = seek(whole, whole.start(), {.function_tolerance = kNear});
   return found;
 }
 
@@ -71,14 +72,16 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
   return start;
 }
 
+constexpr double kRoughly = 0.05;  // of the variance: somewhere near the right valley
+
 // Without angles neighbouring valleys explain the path nearly as well as the right one; a sliding
-// body has some with them too.
+// body has some with them too. About a path that is not even roughly the body's there is nothing.
 Found look_about(const Problem& problem, Found found) {
   constexpr int kMisses = 3;
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
-  if (!rim || (seen && !slides)) return found;
+  if (!rim || (seen && !slides) || found.unexplained > kRoughly) return found;
   if ((seen || !slides) && surely_explained(problem, found)) return found;
   return hop(problem, std::move(found), kMisses);
 }
@@ -119,7 +122,6 @@ Starter without_friction(const Starter& starter) {
 
 // The search proper, on a problem whose spin angle is out of the way.
 Found search_path(const Problem& problem, const Quest& quest) {
-  constexpr double kRoughly = 0.05;  // of the variance: worth a try with the model itself
   constexpr double kSlowly = 1.2;
   constexpr double kNearlyExplained = 2.0;  // times the gate
   Found best;

@@ -32,32 +32,51 @@ Found search_without_outliers(Problem& problem, const Quest& quest) {
   return found;
 }
 
+// From a minimum of a slightly other cost; where steps are dear, only a few. @param runs  of all
+// arcs without derivatives that problem.work counts; a step takes about a dozen.
+int affordable_steps(const Problem& problem, double runs, double most) {
+  constexpr double kRunsPerStep = 12.0, kFewest = 3.0, kMostWork = 3e6;
+  const double step = kRunsPerStep * *problem.work / runs;
+  return static_cast<int>(std::clamp(kMostWork / step, kFewest, most));
+}
+
 // Robust weights and noise until they settle.
 Solution settle_weights(Problem& problem, Solution solution, double fixed_tolerance) {
   // Weights within half a per cent and chi-square within a millionth: a hundredth of a sigma.
   constexpr double kSettled = 5e-3;
-  for (int round = 0; round < 4; ++round) {
-    const double change = reweight(problem, solution.u, true);
-    if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
-    Solution next = seek(problem, solution.u, {.iterations = 20, .function_tolerance = 1e-7});
-    if (!next.usable) break;
+  // While they still change much, chi-square need not be least to more digits than they are known.
+  constexpr double kMuch = 0.1, kNear = 1e-5, kLeast = 1e-7, kMostSteps = 20.0;
+  const auto go_on = [&](double tolerance) {
+    const int steps = affordable_steps(problem, 1.0, kMostSteps);
+    Solution next =
+        seek(problem, solution.u, {.iterations = steps, .function_tolerance = tolerance});
+    if (!next.usable) return false;
     next.converged = next.converged || solution.converged;
     solution = std::move(next);
+    return true;
+  };
+  bool near = false;
+  for (int round = 0; round < 4; ++round) {
+    problem.work = std::make_shared<double>(0.0);
+    const double change = reweight(problem, solution.u, true);
+    if (change < kSettled && (round > 0 || fixed_tolerance <= 0.0)) break;
+    near = change > kMuch;
+    if (!go_on(near ? kNear : kLeast)) break;
   }
+  if (near) go_on(kLeast);
+  problem.work.reset();
   return solution;
 }
 
 // Integrates ever finer until that no longer shows. @returns the integration error left, in sigma.
 double silence_integration(Problem& problem, Solution& solution, double fixed_tolerance) {
   constexpr double kSilent = 0.01, kFinest = 1e-12;
-  // From a minimum of a slightly other cost; more than a few steps only follow its noise.
-  constexpr double kMostSteps = 12.0, kFewest = 3.0, kMostWork = 1e6;
+  constexpr double kMostSteps = 12.0;  // more only follow the integration's noise
   problem.work = std::make_shared<double>(0.0);
   double error = integration_error_sigma(problem, solution.u);
   while (fixed_tolerance <= 0.0 && error > kSilent && problem.tolerance > kFinest) {
     problem.tolerance *= 1e-2;
-    const double step = 6.0 * *problem.work;  // two runs were made; this is about one's derivatives
-    const int steps = static_cast<int>(std::clamp(kMostWork / step, kFewest, kMostSteps));
+    const int steps = affordable_steps(problem, 2.0, kMostSteps);
     Solution finer = seek(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
     if (!finer.usable) break;
     finer.converged = finer.converged || solution.converged;

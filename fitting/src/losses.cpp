@@ -39,22 +39,27 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u) {
 
 namespace {
 
+// What is left of chi-square below that moves nothing by a tenth of its error bar: the weights
+// change afterwards by more, and the polish goes on from there.
+constexpr double kNear = 1e-5;
+
 // To the minimum; what vanishes on the way is held, else it would take all the iterations.
 Solution descend(Problem& problem) {
   const bool losses = std::any_of(problem.free.begin(), problem.free.end(),
                                   [&](const FreeParameter& p) { return is_loss(problem, p); });
-  if (!losses) return seek(problem, problem.start());
+  if (!losses) return seek(problem, problem.start(), {.function_tolerance = kNear});
   // Far below one sigma of anything, also where residuals are larger than the noise.
   const auto nothing = [](double chi2) { return std::max(0.1, 1e-4 * chi2); };
   double before = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 6; ++round) {
-    const Solution solution = seek(problem, problem.start(), {.iterations = 15});
+    const Solution solution =
+        seek(problem, problem.start(), {.iterations = 15, .function_tolerance = kNear});
     const bool stands_still = before - solution.chi2 < nothing(solution.chi2);
     if (!solution.usable || solution.converged || stands_still) return solution;
     before = solution.chi2;
     hold_vanished(problem, solution.u);
   }
-  return seek(problem, problem.start());
+  return seek(problem, problem.start(), {.function_tolerance = kNear});
 }
 
 // A vanished loss and what a little of it would do.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -13,6 +14,7 @@ namespace trochoid::fitting {
 namespace {
 
 constexpr double kGentle_m_s = 1e-3;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Trial {
   double log_eps = 0.0;
@@ -35,12 +37,15 @@ std::optional<data::Fit> fit_with(std::span<const data::Track> tracks, const Fit
   return std::nullopt;
 }
 
-// Follows the softness from trial to trial while that helps. Best last but one, or last if the
-// sharpest law was reached.
+// Follows the softness from trial to trial while that helps and BIC may still fall below
+// `worth_it`: near its least BIC is a parabola, and no further trial gains more than the last one.
+// Best last but one, or last if the sharpest law was reached.
 void follow(std::span<const data::Track> tracks, const FitOptions& options, const Rung& rung,
-            double factor, int most, std::vector<Trial>& trials) {
+            double factor, int most, double worth_it, std::vector<Trial>& trials) {
   for (int i = 0; i < most; ++i) {
     const Trial& last = trials.back();
+    const double gain = i > 0 ? trials[trials.size() - 2].fit.bic - last.fit.bic : kInfinity;
+    if (last.fit.bic - (most - i) * gain > worth_it) return;
     const double log_eps = last.log_eps + std::log(factor);
     auto next = fit_with(tracks, options, rung, std::exp(log_eps), &last.fit);
     if (!next) return;
@@ -50,9 +55,10 @@ void follow(std::span<const data::Track> tracks, const FitOptions& options, cons
   }
 }
 
-// Vertex and curvature of the parabola of BIC in log eps through the best trial and its neighbours.
+// Of the parabola of BIC in log eps through the best trial and its neighbours.
 struct Vertex {
   double log_eps = 0.0, curvature = 0.0;
+  double gain = 0.0;  // of BIC over the best trial
 };
 
 std::optional<Vertex> vertex_of(const std::vector<Trial>& ascending, std::size_t best) {
@@ -63,7 +69,8 @@ std::optional<Vertex> vertex_of(const std::vector<Trial>& ascending, std::size_t
   const double curvature = 2.0 * (right - left) / (c.log_eps - a.log_eps);
   if (!(curvature > 0.0)) return std::nullopt;
   const double middle = 0.5 * (a.log_eps + b.log_eps);
-  return Vertex{std::clamp(middle - left / curvature, a.log_eps, c.log_eps), curvature};
+  const double log_eps = std::clamp(middle - left / curvature, a.log_eps, c.log_eps);
+  return Vertex{log_eps, curvature, 0.5 * curvature * std::pow(log_eps - b.log_eps, 2)};
 }
 
 std::size_t best_of(std::vector<Trial>& trials) {
@@ -118,16 +125,19 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
     rung.scene.model.slip_regularisation_m_s = gentle_m_s;
     return;
   }
+  // Beyond that a smaller model is ruled out, whatever the softness.
+  const double worth_it = above != nullptr ? above->bic + kVeryStrong : kInfinity;
   std::vector<Trial> trials{{std::log(gentle_m_s), std::move(*first)}};
-  follow(tracks, options, rung, kFactor, kSharper, trials);
+  follow(tracks, options, rung, kFactor, kSharper, worth_it, trials);
   std::size_t best = best_of(trials);
   if (best + 1 == trials.size() && trials.size() <= 2) {  // the gentlest so far
     std::vector<Trial> softer{trials.back()};
-    follow(tracks, options, rung, 1.0 / kFactor, kSofter, softer);
+    follow(tracks, options, rung, 1.0 / kFactor, kSofter, worth_it, softer);
     trials.insert(trials.end(), softer.begin() + 1, softer.end());
     best = best_of(trials);
   }
-  if (const auto vertex = vertex_of(trials, best)) {
+  const auto vertex = vertex_of(trials, best);
+  if (vertex && trials[best].fit.bic - vertex->gain < worth_it) {
     if (auto refined =
             fit_with(tracks, options, rung, std::exp(vertex->log_eps), &trials[best].fit))
       trials.push_back({vertex->log_eps, std::move(*refined)});
@@ -137,7 +147,7 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
                                 static_cast<double>(trials[best].fit.covariance_names.size()));
   const double allowed = trials[best].fit.bic + price + kStrong;
   // Whether it shows at all: against Coulomb's law, unless a sharper law than the best does worse.
-  if (trials.front().fit.bic < allowed)
+  if (trials.front().fit.bic < std::min(allowed, worth_it))
     if (auto sharp = fit_with(tracks, options, rung, 0.0, &trials.front().fit);
         sharp && sharp->bic < allowed) {
       rung.fit = std::move(*sharp);
@@ -148,8 +158,8 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
   chosen.bic += price;
   chosen.aicc += 2.0;
   std::string known;
-  if (const auto vertex = vertex_of(trials, best)) {
-    const double sigma_log = std::sqrt(2.0 / vertex->curvature);
+  if (const auto least = vertex_of(trials, best)) {
+    const double sigma_log = std::sqrt(2.0 / least->curvature);
     widen(trials[best], trials[best + 1], sigma_log, chosen);
     known = fmt::format(" +- {:.2g}", sigma_log * eps_m_s);
   }

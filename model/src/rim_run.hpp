@@ -167,6 +167,15 @@ class RimRun {
     return false;
   }
 
+  /// The limit on steps is one of the whole run, however many phases it has.
+  template <int N>
+  [[nodiscard]] StepControl<N> control(const RimBody& body) const {
+    StepControl<N> control = rim_control<N>(body, options_);
+    const int taken = end_.statistics.steps + end_.statistics.rejected;
+    control.max_steps = std::max(1, control.max_steps - taken);
+    return control;
+  }
+
   template <class Stepper, class Sink>
   auto phase(Stepper& stepper, Sink& sink, const EventRule* rules) {
     const int offset = next_;
@@ -207,7 +216,7 @@ class RimRun {
     static constexpr EventRule kRules[] = {{-1}, {-1}, {-1}, {-1}};
     const State<S, 8> y = rolling_part(end_.y);
     if (!starts_inside(roll_, y)) return;
-    DormandPrince<Roll> stepper(roll_, rim_control<8>(roll_.body, options_));
+    DormandPrince<Roll> stepper(roll_, control<8>(roll_.body));
     stepper.start(end_.end_s, y);
     const auto result = phase(stepper, sink, kRules);
     end_.y = with_slip(result.y, S(0.0), S(0.0));
@@ -234,7 +243,7 @@ class RimRun {
   void sliding_phase(Sink& sink) {
     static constexpr EventRule kRules[] = {{-1}, {-1}, {-1}, {-1}, {-1}};
     if (!starts_inside(slide_, end_.y)) return;
-    DormandPrince<Slide> stepper(slide_, rim_control<10>(slide_.body, options_));
+    DormandPrince<Slide> stepper(slide_, control<10>(slide_.body));
     stepper.start(end_.end_s, end_.y);
     const auto result = phase(stepper, sink, kRules);
     end_.y = result.y;
