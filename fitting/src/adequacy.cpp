@@ -204,8 +204,15 @@ void accept(const Solution& solution, const Uncertainty& error, const Misfit& wo
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
+  const bool doubtful = worst.times > kDoubtful;
   std::string words = "the model explains the track";
-  if (correlated)
+  if (doubtful)
+    words = fmt::format(
+        "the model follows the track, but does not explain it: the residuals of its {} are {:.2g} "
+        "times their noise, the model lacks something, or a better minimum exists, and the error "
+        "bars are too small",
+        kChannelWords[static_cast<int>(worst.channel)], worst.times);
+  else if (correlated)
     words += fmt::format(
         " to {:.2g} times its stated noise; what is left hangs together over {:.2g} s, and the "
         "error bars are widened {:.2g} times for that",
@@ -214,14 +221,10 @@ void accept(const Solution& solution, const Uncertainty& error, const Misfit& wo
     words += fmt::format(", and what is left looks like noise ({:.2g} times the stated)",
                          fit.noise_scale);
   const std::vector<std::string> open = undetermined(fit);
-  const bool doubtful = worst.times > kDoubtful;
-  fit.verdict = doubtful || !open.empty() ? "weak" : correlated ? "good_correlated" : "good";
-  if (doubtful)
-    words += fmt::format(
-        "; but the residuals of its {} are {:.2g} times their noise: the model lacks something, or "
-        "a "
-        "better minimum exists, and the error bars are too small",
-        kChannelWords[static_cast<int>(worst.channel)], worst.times);
+  fit.verdict = doubtful        ? "doubtful"
+                : !open.empty() ? "weak"
+                : correlated    ? "good_correlated"
+                                : "good";
   if (!open.empty()) words += "; not determined: " + listed(open);
   fit.verdict_words = words;
 }

@@ -23,8 +23,8 @@ struct Squares {
 ///                    beyond 8 times; or a 30th of the motion's variance left
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
-///   weak             explained, but parameters of the motion are not determined; or residuals
-///                    beyond 2 times those measures
+///   doubtful         followed, but residuals are beyond 2 times those measures
+///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
 /// @param cut_short  the search ended at its limit before anything passed its gate: residuals that

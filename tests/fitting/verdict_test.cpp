@@ -114,12 +114,13 @@ TEST(Verdict, DoesNotTakeAWobbleForNoise) {
 }
 
 // Residuals of three times the noise, whose sigmas somebody stated: followed, but not explained.
-TEST(Verdict, IsWeakWhereTheModelLeavesSeveralTimesTheNoise) {
+TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
   const auto drifting = [path = nutating_top()](double t) -> Eigen::Vector2d {
     return path(t) + 5.0 * kSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
   };
   const data::Fit fit = fit_of(track_of(drifting, white(kSigma_m, 8)), top());
-  EXPECT_EQ(fit.verdict, "weak") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("does not explain it"));
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
 }
 

@@ -154,7 +154,7 @@ TEST(RimPredictor, DifferentiatesRegularisedSlidingByEveryParameter) {
 TEST(RimPredictor, DifferentiatesStiffFrictionByEveryParameter) {
   std::mt19937 draw(7);
   data::Scene scene = random_scene(draw, "s08_slide_disc");
-  scene.model.slip_regularisation_m_s = 1e-5;  // millions of explicit steps
+  scene.model.slip_regularisation_m_s = 1e-6;  // too many explicit steps
   const auto predictor = make_predictor(scene);
   // Two runs of an implicit method differ by more than rounding: wider steps, laxer agreement.
   expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.02, 0.2}, 1e-3, 3e-3);
@@ -165,6 +165,18 @@ TEST(RimPredictor, DifferentiatesAcrossStickAndSlip) {
   const auto predictor = make_predictor(random_scene(draw, "s10_stick_slip_event"));
   expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.02, 0.2, 0.5, 0.8},
                            1e-4);
+}
+
+// The record sticks and slips: no single phase takes as many steps as the run.
+TEST(RimPredictor, CountsTheStepsOfAllPhasesAgainstTheLimit) {
+  const auto predictor = make_predictor(reference_scene("s10_stick_slip_event"));
+  const std::vector<double> t_s{0.2, 0.5, 0.8};
+  PredictRequest request;
+  request.t_s = t_s;
+  const Prediction free = predictor->predict(defaults(*predictor), request);
+  ASSERT_EQ(free.outcome, Outcome::reached_end);
+  request.max_steps = free.steps - 1;
+  EXPECT_EQ(predictor->predict(defaults(*predictor), request).outcome, Outcome::step_limit);
 }
 
 TEST(RimPredictor, AsksForTheMassOnlyWhenATermNeedsIt) {

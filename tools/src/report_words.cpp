@@ -43,10 +43,12 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
             fmt::format("The model “{}” was tried: {}. Do not use its numbers.", fit.model,
                         fit.verdict_words.empty() ? fit.reason : fit.verdict_words),
             {}};
-  const char* word = weak                               ? "explained, not all determined"
+  const bool followed = fit.verdict == "doubtful";
+  const char* word = followed                           ? "followed, not explained"
+                     : weak                             ? "explained, not all determined"
                      : fit.verdict == "good_correlated" ? "explained, residuals correlated"
                                                         : "explained";
-  verdict = {weak || wide ? "fair" : "good",
+  verdict = {weak || followed || wide ? "fair" : "good",
              word,
              fmt::format("{}: the model “{}” follows them with {}: {}.", tracked_words(facts),
                          fit.model, scatter, fit.verdict_words),

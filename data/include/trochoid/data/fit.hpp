@@ -83,8 +83,8 @@ struct Fit {
   std::string outcome;
   std::string reason;  ///< one sentence
   /// What the fit is worth: good; good_correlated, residuals hang together and error bars are
-  /// widened for that; weak, explained but parameters are not determined or residuals beyond twice
-  /// their noise; no_feature; unexplained.
+  /// widened for that; weak, explained but parameters are not determined; doubtful, followed but
+  /// residuals beyond twice their noise; no_feature; unexplained.
   std::string verdict;
   std::string verdict_words;  ///< the same as a sentence
   std::string
