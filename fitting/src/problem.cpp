@@ -123,7 +123,10 @@ int Problem::max_steps() const {
   std::size_t samples = 0;
   for (const ArcData& arc : arcs) samples = std::max(samples, arc.t_s.size());
   const bool slides = predictor->model_name() == "sliding";
-  return (slides ? 20000 : 2000) + 20 * static_cast<int>(samples);
+  const int steps = (slides ? 20000 : 2000) + 20 * static_cast<int>(samples);
+  // A search may give up what a polish, finer, has to follow to the end.
+  constexpr double kSearching = 1e-8, kPower = 0.25, kMost = 15.0;
+  return static_cast<int>(steps * std::clamp(std::pow(kSearching / tolerance, kPower), 1.0, kMost));
 }
 
 int Problem::rows() const {
