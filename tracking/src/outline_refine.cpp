@@ -138,7 +138,7 @@ double unknown_share(const ProfileEdge& edge) {
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, levels beyond the range of the picture.
 double model_sd_px(const StretchProfile& look, const Surroundings& around, bool silhouette) {
-  constexpr double kShapePx = 0.01, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
+  constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
   constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
   const double shape_px =

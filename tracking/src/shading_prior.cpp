@@ -8,8 +8,9 @@
 namespace trochoid::tracking {
 namespace {
 
-// The least keeps matrices regular; where looks show no shading there is hardly any.
-constexpr double kLeastVariance = 0.001, kMostVariance = 1.0;
+// The least allows for what the model of an edge leaves that is no shading: pixels, compression.
+// Less would suit plain pictures, and misleads where contrast is low or the floor has a pattern.
+constexpr double kLeastVariance = 0.03, kMostVariance = 1.0;
 
 // Minimises x^T A x / 2 - b^T x over 0 <= x <= kMostVariance, A positive semidefinite, one
 // coordinate at a time, from x.
