@@ -45,22 +45,15 @@ Start start_at(const Problem& problem, const Eigen::VectorXd& u) {
   return start;
 }
 
-}  // namespace
-
-Found shoot_top(const Problem& problem, const Start& start) {
-  if (problem.predictor->index_of("a_1_s2") < 0)
-    throw InputError("strategy 'multiple' fits model 'top' only");
-  // Over a few nutations the chain of states is well conditioned; from there single shooting
-  // carries on.
-  constexpr double kNutations = 2.5;
+// From one start over the first so many nutations, as its b counts them.
+Found shoot_over(const Problem& problem, const Problem& started, double over_nutations) {
   constexpr int kFewestSamples = 6;
-  Problem own = problem;
-  apply(start, own);
+  Problem own = started;
   const ArcData& arc = problem.arcs[0];
   const double b = std::abs(own.base[0][own.predictor->index_of("b_1_s")]);
   const double nutations = arc.duration_s() * b / (2.0 * std::numbers::pi);
   const int all = static_cast<int>(arc.t_s.size());
-  const double share = std::min(1.0, kNutations / std::max(nutations, 1e-9));
+  const double share = std::min(1.0, over_nutations / std::max(nutations, 1e-9));
   const int window = std::clamp(static_cast<int>(share * all), std::min(24, all), all);
   own.arcs[0] = arc.slice(0, window);
   // Shorter than the path reaches out no l can be.
@@ -75,6 +68,24 @@ Found shoot_top(const Problem& problem, const Start& start) {
     if (!found.solution.usable) continue;
     Found whole = grow(problem, start_at(own, found.solution.u), window);
     if (better(whole, best)) best = std::move(whole);
+    if (best.passed) break;
+  }
+  return best;
+}
+
+}  // namespace
+
+Found shoot_top(const Problem& problem, const Start& start) {
+  if (problem.predictor->index_of("a_1_s2") < 0)
+    throw InputError("strategy 'multiple' fits model 'top' only");
+  Problem started = problem;
+  apply(start, started);
+  // Over a few nutations the chain of states is well conditioned; from there single shooting
+  // carries on. A start whose b is far off counts them wrongly.
+  Found best;
+  for (const double nutations : {2.5, 1.5, 4.0}) {
+    Found found = shoot_over(problem, started, nutations);
+    if (better(found, best)) best = std::move(found);
     if (best.passed) break;
   }
   return best;

@@ -80,6 +80,7 @@ bool Chain::linearise(int j, const Eigen::VectorXd& s, const Eigen::VectorXd& p,
   request.start_s = segment.data.start_s;
   request.observables = segment.data.observables;
   request.tolerance = problem_.tolerance;
+  request.max_steps = problem_.max_steps();
   request.want_end_state = !last;
   if (derivatives) {
     request.derivatives = state_;
@@ -161,7 +162,8 @@ class Shooter {
       polished.base[0][parameter.index] = parameter.transform.value(iterate.p[static_cast<int>(i)]);
     }
     Found found;
-    found.solution = solve(polished, polished.start());
+    found.solution =
+        seek(polished, polished.start(), {.iterations = 30, .function_tolerance = 1e-3});
     found.path = "multiple_shooting";
     const int dof = std::max(1, problem_.rows() - static_cast<int>(problem_.free.size()));
     found.reduced_chi2 =
