@@ -122,7 +122,8 @@ using NodeStarter = std::function<void(double t_s, Eigen::VectorXd& values)>;
 
 /// Multiple shooting for a single arc: the arc is cut into segments with a state each, which
 /// `nodes` starts from the data; continuity is imposed on the linearised chain, which is condensed
-/// to the first state and the dynamics before it is solved. Ends with single shooting, roughly: what follows minimises again.
+/// to the first state and the dynamics before it is solved. Ends with single shooting, roughly:
+/// what follows minimises again.
 [[nodiscard]] Found multiple_shooting(const Problem& problem, int segments,
                                       const NodeStarter& nodes);
 
