@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kGrid_px = 12;  // of the brightness comparison
 constexpr int kSamples = Background::kSamples;
-constexpr double kMostActive = 0.7;  // of the picture; beyond, nothing in it is known to be static
+constexpr double kMostStirred = 0.7;  // of the picture; beyond, nothing in it is known to be static
 using Row = std::vector<std::uint8_t>;
 
 double median_ratio(const cv::Mat& image, const cv::Mat& reference) {
@@ -192,7 +192,7 @@ cv::Mat restless_of(const Quantiles& q, double noise) {
 void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat& active,
              const cv::Mat& restless, double noise) {
   const int count = cv::countNonZero(active);
-  if (count == 0 || count > kMostActive * static_cast<double>(active.total())) return;
+  if (count == 0 || count > kMostStirred * static_cast<double>(active.total())) return;
   const Surroundings around = Surroundings::of(plane, active);
   const cv::Mat doubtful = smoothed_mask(restless);
   // The rim of what changed changed too, by less than counts.
@@ -283,7 +283,7 @@ BackgroundSamples without_passers_by(const BackgroundSamples& samples, const Pla
 Background Background::from_samples(const BackgroundSamples& samples) {
   Background background = estimated(samples);
   const auto total = static_cast<double>(background.active_.total());
-  if (cv::countNonZero(background.active_) <= kMostActive * total) return background;
+  if (cv::countNonZero(background.active_) <= kMostStirred * total) return background;
   const BackgroundSamples calm = without_passers_by(samples, background.plate_);
   if (calm.luma.size() == samples.luma.size()) return background;
   const cv::Mat active = background.active_;
