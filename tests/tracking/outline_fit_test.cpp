@@ -141,9 +141,7 @@ TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSayWherePixelsOnTheEdgeAreTheNoi
     fit_stretches(profiles);
     square_pull += mean_square_pull(profiles) / kPictures;
   }
-  // Noise that begins and ends at once is not quite what is assumed to be there.
-  constexpr double kTolerance = 0.25;
-  EXPECT_NEAR(square_pull, 1.0, kTolerance);
+  EXPECT_NEAR(square_pull, 1.0, kPullTolerance);
 }
 
 TEST(EdgeStretch, TellsThatEdgesAreWiderThanTheModel) {
