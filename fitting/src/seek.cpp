@@ -46,7 +46,7 @@ class Seeker {
     Solution solution;
     solution.u = u_;
     solution.chi2 = std::numeric_limits<double>::infinity();
-    if (!look()) {
+    if (!all_rows(problem_, u_, rows_, nullptr) || !look()) {
       solution.message = "no prediction at the start";
       return solution;
     }
@@ -87,9 +87,12 @@ class Seeker {
   }
 
  private:
-  // Residuals and derivatives where we are.
+  // Derivatives where we are. The residuals stay those of the run without: with derivatives the
+  // integration takes other steps, and where friction is nearly sharp its error changes chi-square
+  // by more than a step along the valley gains; only like is compared with like.
   bool look() {
-    if (!all_rows(problem_, u_, rows_, &jacobian_)) return false;
+    Eigen::VectorXd rows;
+    if (!all_rows(problem_, u_, rows, &jacobian_)) return false;
     chi2_ = rows_.squaredNorm();
     normal_ = jacobian_.transpose() * jacobian_;
     constexpr double kLeast = 1e-6;  // of what no residual sees yet
@@ -114,7 +117,7 @@ class Seeker {
 
   // A step that leads downhill, or none (no entries).
   struct Way {
-    Eigen::VectorXd step;
+    Eigen::VectorXd step, rows;
     double chi2 = std::numeric_limits<double>::infinity(), kept = 0.0, damping = 0.0;
   };
 
@@ -155,10 +158,11 @@ class Seeker {
   }
 
   [[nodiscard]] Way tried(const Eigen::VectorXd& step, double promised) const {
-    Eigen::VectorXd rows;
-    Way way{step, std::numeric_limits<double>::infinity(), 0.0, damping_};
-    if (!all_rows(problem_, u_ + step, rows, nullptr)) return way;
-    way.chi2 = rows.squaredNorm();
+    Way way;
+    way.step = step;
+    way.damping = damping_;
+    if (!all_rows(problem_, u_ + step, way.rows, nullptr)) return way;
+    way.chi2 = way.rows.squaredNorm();
     way.kept = (chi2_ - way.chi2) / promised;
     return way;
   }
@@ -170,6 +174,7 @@ class Seeker {
     if (way.kept > kSome)
       damping_ = std::max(damping_ * (way.kept > kMuch ? 0.05 : 0.2), kLeastDamping);
     u_ += way.step;
+    rows_ = way.rows;
     chi2_ = way.chi2;
     return true;
   }
