@@ -37,7 +37,8 @@ struct PredictRequest {
   std::vector<int> derivatives;  ///< indices into parameters(); empty: values only
   double tolerance = 1e-9;
   /// Integration steps after which the run ends as step_limit (a fit's wild trial point may ask for
-  /// millions); 0 = the model's own limit.
+  /// millions); 0 = the model's own limit. Sliding with regularised friction may take more: as many
+  /// as stability asks for, whatever the motion.
   int max_steps = 0;
   /// Also return the state at the last time, expressed in the `initial` parameters (for shooting).
   bool want_end_state = false;
