@@ -33,7 +33,8 @@ struct Uncertainty {
 /// moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
-/// Largest change of a whitened residual when the integrator works a hundred times finer.
+/// Largest change of a whitened residual when the integrator works a hundred times finer; where
+/// that exceeds the step limit, a hundred times coarser.
 [[nodiscard]] double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u);
 
 struct Criteria {
