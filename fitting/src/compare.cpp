@@ -50,6 +50,18 @@ Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
   return rung;
 }
 
+// For one of several rungs that are fitted side by side; what is said of it names it.
+FitOptions options_for(const Rung& rung, const FitOptions& options) {
+  FitOptions own = options;
+  if (options.progress)
+    own.progress = [&rung, &options](const std::string& stage, double fraction) {
+      options.progress(rung.name + ": " + stage, fraction);
+    };
+  if (options.log)
+    own.log = [&rung, &options](const std::string& line) { options.log(rung.name + ": " + line); };
+  return own;
+}
+
 // All extensions of rungs[current] by one term, tried at the same time. @returns the index of the
 // best rung now known.
 std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
@@ -68,7 +80,8 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   one.threads = 1;
   in_parallel(static_cast<int>(added.size()), options.threads, [&](int i) {
     const auto n = static_cast<std::size_t>(i);
-    fit_rung(tracks, &rungs[current], added[n], one, rungs[first + n]);
+    Rung& rung = rungs[first + n];
+    fit_rung(tracks, &rungs[current], added[n], options_for(rung, one), rung);
   });
   std::size_t best = current;
   for (std::size_t i = first; i < rungs.size(); ++i)
@@ -105,7 +118,8 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
       if (!known) rungs.push_back(rung_with(ladder, terms));
     }
     in_parallel(static_cast<int>(rungs.size() - first), options.threads, [&](int i) {
-      fit_smaller_rung(tracks, rungs[current], one, rungs[first + static_cast<std::size_t>(i)]);
+      Rung& rung = rungs[first + static_cast<std::size_t>(i)];
+      fit_smaller_rung(tracks, rungs[current], options_for(rung, one), rung);
     });
     std::size_t best = current;
     for (std::size_t i = first; i < rungs.size(); ++i)
@@ -131,11 +145,9 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   const std::size_t terms = ladder.terms.size();
   rungs.reserve(2 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
   rungs.push_back(rung_with(ladder, {}));
-  fit_rung(tracks, nullptr, nullptr, options, rungs[0]);
+  fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   std::size_t current = 0;
   for (std::size_t size = 1; size <= std::min(kMostTerms, ladder.terms.size()); ++size) {
-    if (options.progress)
-      options.progress(rungs[current].name, static_cast<double>(size - 1) / kMostTerms);
     const std::size_t best = step_up(ladder, tracks, options, false, current, rungs);
     const bool worth = best != current && rungs[best].bic < rungs[current].bic - kStrong;
     if (!worth) break;
@@ -161,7 +173,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
       rungs[current].fit.converged ? rungs[current].terms : std::set<int>{};
   if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
-    fit_rung(tracks, nullptr, nullptr, options, rungs.back());
+    fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
     step_down(ladder, tracks, options, rungs.size() - 1, rungs);
   }
   return rungs;

@@ -32,6 +32,26 @@ Found search_without_outliers(Problem& problem, const Quest& quest) {
   return found;
 }
 
+// Tells the caller what is being done: when that changes, and with every minimisation.
+class Stages {
+ public:
+  explicit Stages(const FitOptions& options) : options_(options) {}
+  void enter(const char* stage) {
+    stage_ = stage;
+    line(stage);
+  }
+  void line(const std::string& words) const {
+    constexpr double kUnknown = -1.0;
+    if (options_.progress) options_.progress(stage_, kUnknown);
+    if (options_.log) options_.log(words);
+  }
+  [[nodiscard]] bool wanted() const { return options_.progress || options_.log; }
+
+ private:
+  const FitOptions& options_;
+  const char* stage_ = "";
+};
+
 // From a minimum of a slightly other cost; where steps are dear, only a few. @param runs  of all
 // arcs without derivatives that problem.work counts; a step takes about a dozen.
 int affordable_steps(const Problem& problem, double runs, double most) {
@@ -75,10 +95,14 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
   problem.work = std::make_shared<double>(0.0);
   double error = integration_error_sigma(problem, solution.u);
   while (fixed_tolerance <= 0.0 && error > kSilent && problem.tolerance > kFinest) {
+    const double coarse = problem.tolerance;
     problem.tolerance *= 1e-2;
     const int steps = affordable_steps(problem, 2.0, kMostSteps);
     Solution finer = seek(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
-    if (!finer.usable) break;
+    if (!finer.usable) {  // so fine a run exceeds the step limit
+      problem.tolerance = coarse;
+      break;
+    }
     finer.converged = finer.converged || solution.converged;
     solution = std::move(finer);
     *problem.work = 0.0;
@@ -199,13 +223,18 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   fit.model = predictor.model_name();
   fit.seed = options.seed;
 
+  Stages stages(options);
+  if (stages.wanted()) problem.log = [&](const std::string& words) { stages.line(words); };
+  stages.enter("looking for the path");
   const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
   const Found found = search_without_outliers(
       problem, {starter_for(predictor, scene), &options, start_given, relatives});
   fit.start_path = found.path;
   if (!found.solution.usable) return refuse(problem, problem.shortfalls->words(), fit);
 
+  stages.enter("weighing the samples");
   const Solution solution = polish(problem, found.solution, options, fit);
+  stages.enter("error bars");
   Uncertainty error;
   try {
     error = uncertainty(problem, solution.u);

@@ -138,7 +138,6 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
                 const data::Scene& scene, const FitOptions& options) {
   const std::string& model = predictor.model_name();
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
-  problem.log = options.log;
   problem.shortfalls = std::make_shared<Shortfalls>();
   for (const ArcData& whole : problem.arcs) {
     const ArcData arc = whole.keep(consistent_samples(whole));

@@ -126,6 +126,10 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   options.start = values_of(rung.fit);
   if (!options.start.empty()) options.strategy = "single";
   options.hold_back = kHeldBack;
+  if (options.progress)
+    options.progress = [say = options.progress](const std::string& stage, double fraction) {
+      say("without the last third, " + stage, fraction);
+    };
   const data::Fit early = fit(tracks, rung.scene, options);
   if (!usable(early)) return kInfinity;
   Squares seen, unseen;

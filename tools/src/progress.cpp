@@ -90,8 +90,11 @@ void Progress::update(const std::string& stage, double fraction) {
   const std::lock_guard lock(mutex_);
   if (!due()) return;
   const double elapsed_s = std::chrono::duration<double>(last_ - start_).count();
-  draw(fmt::format("{}: {} {:.0f} %{}", what_, stage, 100.0 * std::clamp(fraction, 0.0, 1.0),
-                   time_left_words(elapsed_s, fraction)));
+  if (fraction < 0.0)
+    draw(fmt::format("{}: {} ({})", what_, stage, duration_words(elapsed_s)));
+  else
+    draw(fmt::format("{}: {} {:.0f} %{}", what_, stage, 100.0 * std::min(fraction, 1.0),
+                     time_left_words(elapsed_s, fraction)));
 }
 
 }  // namespace trochoid::tools
