@@ -84,24 +84,6 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
                     error.whiteness.correlation_time_s, error.widened));
 }
 
-// Noise of one kind leaves a few in a thousand outside; where many are, it depends on the path
-// which of them count, and no error bar knows of the other choice.
-void warn_many_stand_out(const Problem& problem, data::Fit& fit) {
-  constexpr double kMany = 0.05;
-  double all = 0.0, out = 0.0;
-  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
-    for (const Reading& reading : problem.arcs[arc].readings) {
-      all += 1.0;
-      const Eigen::VectorXd& weights = problem.row_weights[arc];
-      out += weights.size() > 0 && weights[reading.row] < 1.0 ? 1.0 : 0.0;
-    }
-  if (out > kMany * all)
-    fit.warnings.push_back(fmt::format(
-        "{:.0f} % of the measurements stand out of their noise and count little: another path may "
-        "leave out others, and the error bars do not allow for that",
-        100.0 * out / all));
-}
-
 // Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes.
 void warn_short_top(const Problem& problem, data::Fit& fit) {
   const auto* b = fit.find("b_1_s");
@@ -161,7 +143,6 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   report_parameters(problem, error, fit);
   describe_arcs(problem, fit);
   warn(problem, error, fit);
-  warn_many_stand_out(problem, fit);
   tell_whether_one_friction(problem, fit);
   warn_short_rim(problem, fit);
   if (!fit.model.starts_with("top")) return;

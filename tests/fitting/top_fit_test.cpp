@@ -147,22 +147,6 @@ TEST(TopFit, ShrugsOffGlitches) {
   EXPECT_LT(result.noise_scale, 1.2);
 }
 
-// Every 31st sample or every eighth: 3 % are glitches, 12 % are doubts.
-TEST(TopFit, SaysWhereManySamplesStandOut) {
-  const auto says = testing::Contains(testing::HasSubstr("stand out"));
-  for (const std::size_t every : {31, 8}) {
-    data::Track track = track_of({});
-    for (std::size_t i = 7; i < track.samples.size(); i += every)
-      track.samples[i].centre_m.x() += 0.02;
-    const data::Fit result = fit_one(track);
-    ASSERT_TRUE(result.converged) << result.reason;
-    if (every == 8)
-      EXPECT_THAT(result.warnings, says);
-    else
-      EXPECT_THAT(result.warnings, testing::Not(says));
-  }
-}
-
 TEST(TopFit, SaysThatAShortTrackIsShort) {
   Planted planted;
   planted.duration_s = 3.0;  // a third of a nutation
