@@ -5,10 +5,16 @@
 
 #include <unistd.h>
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <string>
+#include <vector>
 
 #include "trochoid/data/error.hpp"
 
@@ -75,6 +81,58 @@ TEST_F(FrameSourceTest, HandsOutEveryFrameWithItsOwnTime) {
   }
   EXPECT_FALSE(source->next());
   EXPECT_FALSE(source->next()) << "the end stays the end";
+}
+
+/// Replaces the matrix in the header of an MP4's only track (ISO/IEC 14496-12, 8.3.2), whose
+/// entries a, b, c, d map stored to displayed x and y.
+void set_display_matrix(const fs::path& path, const std::array<int, 4>& abcd) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(file), {});
+  const size_t header = bytes.find("tkhd");
+  ASSERT_NE(header, std::string::npos);
+  const std::array<int, 4> place{0, 4, 12, 16};
+  constexpr int kMatrix = 44;  // after the box's type, in its version 0
+  for (size_t k = 0; k < place.size(); ++k) {
+    const auto value = static_cast<std::uint32_t>(abcd[k]) << 16;  // big-endian 16.16
+    file.seekp(static_cast<std::streamoff>(header) + kMatrix + place[k]);
+    for (const int shift : {24, 16, 8, 0}) file.put(static_cast<char>(value >> shift));
+  }
+}
+
+TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
+  struct Case {
+    std::array<int, 4> abcd;
+    cv::Size size;
+    cv::Point bright;  // where the stored top left corner is seen
+  };
+  const cv::Size lying(kWidth, kHeight), standing(kHeight, kWidth);
+  const std::vector<Case> cases{
+      {{1, 0, 0, 1}, lying, {5, 5}},
+      {{0, 1, -1, 0}, standing, {kHeight - 6, 5}},         // a quarter turn clockwise
+      {{-1, 0, 0, -1}, lying, {kWidth - 6, kHeight - 6}},  // upside down
+      {{0, -1, 1, 0}, standing, {5, kWidth - 6}}};         // a quarter turn back
+  for (const Case& c : cases) {
+    const fs::path path = folder_ / "sideways.mp4";
+    cv::Mat picture(kHeight, kWidth, CV_8UC3, cv::Scalar::all(40));
+    picture(cv::Rect(0, 0, 16, 16)).setTo(cv::Scalar::all(220));
+    {
+      cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG,
+                             cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 50.0, lying, true);
+      ASSERT_TRUE(writer.isOpened());
+      for (int i = 0; i < 3; ++i) writer.write(picture);
+    }
+    set_display_matrix(path, c.abcd);
+    const auto source = open_video(path);
+    EXPECT_EQ(source->info().width_px, c.size.width);
+    EXPECT_EQ(source->info().height_px, c.size.height);
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    ASSERT_EQ(frame->luma.size(), c.size);
+    cv::Mat smooth;
+    cv::blur(frame->luma, smooth, cv::Size(9, 9));
+    EXPECT_GT(smooth.at<uchar>(c.bright), 180);
+    EXPECT_LT(cv::mean(smooth)[0], 90.0);
+  }
 }
 
 TEST_F(FrameSourceTest, LimitedRangeLumaIsStretched) {
