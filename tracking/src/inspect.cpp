@@ -13,11 +13,11 @@
 namespace trochoid::tracking {
 namespace {
 
-/// Share of the band between two multiples of the rim that looks like the floor.
-double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim, double noise,
-                   double from, double to) {
+/// Places in the band between two multiples of the rim, those within the picture.
+std::vector<cv::Point> places_between(const Ellipse& rim, double from, double to,
+                                      const cv::Size& picture) {
   constexpr int kRays = 24, kRings = 4;
-  int inside = 0, floor = 0;
+  std::vector<cv::Point> places;
   for (int ring = 0; ring < kRings; ++ring)
     for (int ray = 0; ray < kRays; ++ray) {
       const double angle = 2.0 * CV_PI * ray / kRays, r = from + (to - from) * ring / (kRings - 1);
@@ -25,12 +25,41 @@ double floor_share(const cv::Mat& luma, const cv::Mat& plate, const Ellipse& rim
           rim.centre_px + rim.shape_px * Eigen::Vector2d(r * std::cos(angle), r * std::sin(angle));
       const cv::Point at(static_cast<int>(std::lround(p.x())),
                          static_cast<int>(std::lround(p.y())));
-      if (!cv::Rect({}, luma.size()).contains(at)) continue;
-      ++inside;
-      const int difference = std::abs(luma.at<std::uint8_t>(at) - plate.at<std::uint8_t>(at));
-      floor += difference < 6.0 + 3.0 * noise;
+      if (cv::Rect({}, picture).contains(at)) places.push_back(at);
     }
-  return inside > 0 ? static_cast<double>(floor) / inside : 0.0;
+  return places;
+}
+
+/// Levels between which the floor around a body mostly lies.
+struct Levels {
+  double least = 0.0, most = 255.0;
+  [[nodiscard]] bool hold(double level, double tolerance) const {
+    return level > least - tolerance && level < most + tolerance;
+  }
+};
+
+Levels floor_around(const cv::Mat& plate, const Ellipse& rim) {
+  constexpr double kFrom = 1.2, kTo = 1.8, kRobust = 0.05;
+  std::vector<double> levels;
+  for (const cv::Point& at : places_between(rim, kFrom, kTo, plate.size()))
+    levels.push_back(plate.at<std::uint8_t>(at));
+  if (levels.empty()) return {};
+  return {data::quantile(levels, kRobust), data::quantile(levels, 1.0 - kRobust)};
+}
+
+/// Share of the band between two multiples of the rim that looks like the floor. A body that turns
+/// in place is in the plate itself: there the plate is not like the floor around it.
+double floor_share(const cv::Mat& luma, const Plate& plate, const Levels& around,
+                   const Ellipse& rim, double from, double to) {
+  const double tolerance = 6.0 + 3.0 * plate.noise_levels;
+  const std::vector<cv::Point> places = places_between(rim, from, to, luma.size());
+  int floor = 0;
+  for (const cv::Point& at : places) {
+    const double expected = plate.luma.at<std::uint8_t>(at);
+    const double difference = std::abs(luma.at<std::uint8_t>(at) - expected);
+    floor += difference < tolerance && around.hold(expected, tolerance);
+  }
+  return places.empty() ? 0.0 : static_cast<double>(floor) / static_cast<double>(places.size());
 }
 
 /// The rims seen in a window of frames, from the seed both ways.
@@ -48,10 +77,10 @@ struct Watch {
     const cv::Rect2d point(rim.centre_px.x(), rim.centre_px.y(), 1e-9, 1e-9);
     box = radii.size() == 1 ? point : (box | point);
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
-    const double noise = plate.noise_levels;
+    const Levels around = floor_around(plate.luma, rim);
     // Less what looks like the floor where the body certainly is: it may have its colour.
-    bore.push_back(floor_share(frame.luma, plate.luma, rim, noise, 0.1, 0.4) -
-                   floor_share(frame.luma, plate.luma, rim, noise, 0.88, 0.96));
+    bore.push_back(floor_share(frame.luma, plate, around, rim, 0.1, 0.4) -
+                   floor_share(frame.luma, plate, around, rim, 0.88, 0.96));
   }
 };
 

@@ -1,0 +1,89 @@
+#include "trochoid/tracking/inspect.hpp"
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+
+namespace trochoid::tracking {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFrames = 60, kWidth = 240, kHeight = 200;
+constexpr double kRadius_px = 40.0;
+
+/// A filmed body on a floor whose brightness changes across the picture, with camera noise.
+class InspectTest : public testing::Test {
+ protected:
+  ~InspectTest() override { fs::remove(path_); }
+
+  Inspection inspected(const std::function<void(int frame, cv::Mat& picture)>& draw) const {
+    cv::VideoWriter writer(path_.string(), cv::CAP_FFMPEG,
+                           cv::VideoWriter::fourcc('F', 'F', 'V', '1'), 60.0,
+                           cv::Size(kWidth, kHeight), true);
+    EXPECT_TRUE(writer.isOpened());
+    cv::RNG noise(7);
+    for (int i = 0; i < kFrames; ++i) {
+      cv::Mat picture(kHeight, kWidth, CV_8UC3);
+      for (int x = 0; x < kWidth; ++x) picture.col(x).setTo(cv::Scalar::all(150.0 + 0.15 * x));
+      draw(i, picture);
+      cv::GaussianBlur(picture, picture, cv::Size(), 0.7);
+      cv::Mat grain(picture.size(), CV_16SC3), sum;
+      noise.fill(grain, cv::RNG::NORMAL, 0.0, 1.0);
+      cv::add(picture, grain, sum, cv::noArray(), CV_8UC3);
+      writer.write(sum);
+    }
+    writer.release();
+    return inspect_video(path_);
+  }
+
+  fs::path path_ = fs::temp_directory_path() /
+                   ("trochoid_inspect_" +
+                    std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
+                    std::to_string(::getpid()) + ".mkv");
+};
+
+/// A body tilted by about 45 degrees towards a direction that turns.
+cv::RotatedRect tilted(int frame, const cv::Point2f& centre, double radius_px) {
+  const auto size = static_cast<float>(2.0 * radius_px);
+  return {centre, cv::Size2f(size, 0.7f * size), static_cast<float>(13.0 * frame)};
+}
+
+TEST_F(InspectTest, TheFloorSeenThroughTheMiddleMakesARing) {
+  const Inspection seen = inspected([](int i, cv::Mat& picture) {
+    const cv::Point2f centre(60.0f + 2.0f * static_cast<float>(i), 100.0f);
+    cv::Mat floor = picture.clone();
+    cv::ellipse(picture, tilted(i, centre, kRadius_px), cv::Scalar::all(50), cv::FILLED,
+                cv::LINE_AA);
+    cv::Mat bore(picture.size(), CV_8UC1, cv::Scalar(0));
+    cv::ellipse(bore, tilted(i, centre, 0.7 * kRadius_px), cv::Scalar(255), cv::FILLED);
+    floor.copyTo(picture, bore);
+  });
+  ASSERT_TRUE(seen.body);
+  EXPECT_TRUE(seen.body->bore_shows);
+  EXPECT_NEAR(seen.body->radius_px, kRadius_px, 2.0);
+}
+
+TEST_F(InspectTest, ADiscThatTurnsInPlaceHidesItsFloorAndIsNoRing) {
+  const Inspection seen = inspected([](int i, cv::Mat& picture) {
+    const auto turn = static_cast<float>(13.0 * i * CV_PI / 180.0);
+    const cv::Point2f centre(120.0f + 6.0f * std::cos(turn), 100.0f + 6.0f * std::sin(turn));
+    // The face mirrors more light now and then.
+    const double face = 60.0 + (i % 7 == 0 ? 60.0 : 0.0);
+    cv::ellipse(picture, tilted(i, centre, kRadius_px), cv::Scalar::all(face), cv::FILLED,
+                cv::LINE_AA);
+  });
+  ASSERT_TRUE(seen.body);
+  EXPECT_FALSE(seen.body->bore_shows);
+  EXPECT_NEAR(seen.body->radius_px, kRadius_px, 2.0);
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
