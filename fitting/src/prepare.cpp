@@ -77,7 +77,7 @@ double tolerance_for(const std::vector<ArcData>& arcs, double share) {
 }
 
 // Turns parameters on that only some measurements show, and off those nothing shows: the spin angle
-// without a mark, and a puck's spin, which the path alone hardly carries.
+// without a mark, and a puck's spin, which the path alone hardly carries, unless a prior does.
 void suit_to_data(Problem& problem, const data::Scene& scene) {
   const bool puck = problem.predictor->model_name() == "puck";
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
@@ -88,8 +88,13 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       if (index < 0 || scene.fit.fixed.contains(name)) continue;
       const auto same = [&](const FreeParameter& p) { return p.index == index && p.arc == arc; };
       const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
-      if (seen && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
-      if (!seen && is_free) std::erase_if(problem.free, same);
+      const auto prior = scene.fit.prior.find(name);
+      const bool told = puck && prior != scene.fit.prior.end();
+      if (told && !is_free)
+        problem.free.push_back({index, arc, {}, prior->second, {}, prior->second.value});
+      else if (seen && !is_free)
+        problem.free.push_back({index, arc, {}, {}, {}});
+      if (!seen && !told && is_free) std::erase_if(problem.free, same);
     }
   }
   // A face that is crowned rests further in than its rim; path and spin together tell.

@@ -207,6 +207,9 @@ TEST(PuckFit, AllowsForASpinThatNothingShows) {
   const data::FitParameter marked = *fit(std::span(&track, 1), scene).find("friction");
   for (data::TrackSample& sample : track.samples) sample.psi.reset();
   const data::Fit blind = fit(std::span(&track, 1), scene);
+  scene.fit.prior["w3_rad_s"] = {truth.at("w3_rad_s"), 1.0};
+  const data::Fit told = fit(std::span(&track, 1), scene);
+  scene.fit.prior.clear();
   scene.fit.fixed["w3_rad_s"] = 0.0;
   const data::FitParameter trusting = *fit(std::span(&track, 1), scene).find("friction");
   const data::FitParameter* friction = blind.find("friction");
@@ -214,6 +217,11 @@ TEST(PuckFit, AllowsForASpinThatNothingShows) {
   EXPECT_LT(std::abs(marked.value - kFriction), 4.0 * marked.sigma);
   EXPECT_LT(std::abs(friction->value - kFriction), 4.0 * friction->sigma);
   EXPECT_GT(std::abs(trusting.value - kFriction), 4.0 * trusting.sigma) << "else it tests nothing";
+  // Who knows the spin otherwise gets the friction as well as from a mark, or nearly so.
+  ASSERT_NE(told.find("w3_rad_s"), nullptr);
+  EXPECT_EQ(told.find("w3_rad_s")->status, data::ParameterStatus::prior);
+  EXPECT_LT(std::abs(told.find("friction")->value - kFriction), 4.0 * told.find("friction")->sigma);
+  EXPECT_LT(told.find("friction")->sigma, 0.5 * friction->sigma);
 }
 
 TEST(PuckFit, RefusesABodyAtRest) {

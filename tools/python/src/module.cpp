@@ -157,8 +157,11 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   py::dict summary;
   if (!options["smooth"].is_none()) {
     const auto target = options["smooth"].cast<fs::path>();
-    const tracking::SmoothTrack smoothed = tracking::smooth_track(result.file);
-    data::write_table(smoothed.table, target);
+    tracking::SmoothTrack smoothed;
+    run_interruptibly([&](const Interrupt&) {
+      smoothed = tracking::smooth_track(result.file);
+      data::write_table(smoothed.table, target);
+    });
     summary["interpolated"] = smoothed.interpolated;
   }
   summary["frames"] = s.frames;
