@@ -124,7 +124,7 @@ struct Solution {
   bool usable = false;
   bool converged = false;
   int iterations = 0;
-  std::string message;
+  std::string message;  ///< why not, unless converged
 };
 
 struct SolveOptions {

@@ -167,7 +167,8 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   solution.usable = summary.IsSolutionUsable() && std::isfinite(solution.chi2);
   solution.converged = summary.termination_type == ceres::CONVERGENCE || settled(summary);
   solution.iterations = static_cast<int>(summary.iterations.size()) - 1;
-  solution.message = summary.message;
+  if (!solution.converged)
+    solution.message = fmt::format("the minimum was not reached in {} steps", solution.iterations);
   if (problem.log)
     problem.log(fmt::format(
         "{} rows, {} parameters: chi2 {:.6g} -> {:.6g} in {} iterations, {} "
