@@ -54,11 +54,13 @@ Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
 FitOptions options_for(const Rung& rung, const FitOptions& options) {
   FitOptions own = options;
   if (options.progress)
-    own.progress = [&rung, &options](const std::string& stage, double fraction) {
-      options.progress(rung.name + ": " + stage, fraction);
+    own.progress = [&rung, &options](const std::string& stage) {
+      options.progress(fmt::format("{}: {}", rung.name, stage));
     };
   if (options.log)
-    own.log = [&rung, &options](const std::string& line) { options.log(rung.name + ": " + line); };
+    own.log = [&rung, &options](const std::string& line) {
+      options.log(fmt::format("{}: {}", rung.name, line));
+    };
   return own;
 }
 

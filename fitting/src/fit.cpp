@@ -41,8 +41,7 @@ class Stages {
     line(stage);
   }
   void line(const std::string& words) const {
-    constexpr double kUnknown = -1.0;
-    if (options_.progress) options_.progress(stage_, kUnknown);
+    if (options_.progress) options_.progress(stage_);
     if (options_.log) options_.log(words);
   }
   [[nodiscard]] bool wanted() const { return options_.progress || options_.log; }

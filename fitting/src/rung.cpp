@@ -127,8 +127,8 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   if (!options.start.empty()) options.strategy = "single";
   options.hold_back = kHeldBack;
   if (options.progress)
-    options.progress = [say = options.progress](const std::string& stage, double fraction) {
-      say("without the last third, " + stage, fraction);
+    options.progress = [say = options.progress](const std::string& stage) {
+      say(fmt::format("without the last third, {}", stage));
     };
   const data::Fit early = fit(tracks, rung.scene, options);
   if (!usable(early)) return kInfinity;

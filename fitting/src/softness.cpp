@@ -31,9 +31,7 @@ std::optional<data::Fit> fit_with(std::span<const data::Track> tracks, const Fit
   const std::string law =
       eps_m_s > 0.0 ? fmt::format("slip over {:.2g} m/s, ", eps_m_s) : "Coulomb's law, ";
   if (options.progress)
-    own.progress = [&](const std::string& stage, double fraction) {
-      options.progress(law + stage, fraction);
-    };
+    own.progress = [&](const std::string& stage) { options.progress(law + stage); };
   if (options.log) own.log = [&](const std::string& line) { options.log(law + line); };
   if (from != nullptr) own.start = values_of(*from);
   try {

@@ -96,6 +96,17 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
   return tracks;
 }
 
+data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& tracks,
+                 const data::Scene& scene) {
+  fitting::FitOptions options = command.options;
+  Progress progress("fit");
+  if (talk() == Talk::verbose)
+    options.log = detail;
+  else
+    options.progress = [&progress](const std::string& stage) { progress.update(stage); };
+  return fit_job(tracks, scene, options, command.compare);
+}
+
 void run(const FitCommand& command) {
   std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
   inputs.emplace_back(command.scene);
@@ -109,10 +120,7 @@ void run(const FitCommand& command) {
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
-  fitting::FitOptions options = command.options;
-  if (talk() == Talk::verbose) options.log = detail;
-  data::Fit fit =
-      in_scene(command.scene, [&] { return fit_job(tracks, scene, options, command.compare); });
+  data::Fit fit = in_scene(command.scene, [&] { return fitted(command, tracks, scene); });
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
   if (command.json)

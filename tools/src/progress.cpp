@@ -85,16 +85,12 @@ void Progress::update(std::int64_t done, std::int64_t total) {
   }
 }
 
-void Progress::update(const std::string& stage, double fraction) {
+void Progress::update(const std::string& stage) {
   if (!enabled_) return;
   const std::lock_guard lock(mutex_);
   if (!due()) return;
   const double elapsed_s = std::chrono::duration<double>(last_ - start_).count();
-  if (fraction < 0.0)
-    draw(fmt::format("{}: {} ({})", what_, stage, duration_words(elapsed_s)));
-  else
-    draw(fmt::format("{}: {} {:.0f} %{}", what_, stage, 100.0 * std::min(fraction, 1.0),
-                     time_left_words(elapsed_s, fraction)));
+  draw(fmt::format("{}: {} ({})", what_, stage, duration_words(elapsed_s)));
 }
 
 }  // namespace trochoid::tools

@@ -24,9 +24,8 @@ class Progress {
 
   /// `done` of `total` units; total <= 0: unknown, then only the count and the rate are shown.
   void update(std::int64_t done, std::int64_t total);
-  /// For work in stages of changing name (a fit), with the fraction that is done; below 0: nobody
-  /// knows, then the time it has taken.
-  void update(const std::string& stage, double fraction);
+  /// For work in stages of changing name of which nobody knows how many there will be (a fit).
+  void update(const std::string& stage);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -111,9 +111,7 @@ fitting::FitOptions fit_options(const Options& options, Progress& progress) {
     how.profile = true;
     how.bootstrap = 200;
   }
-  how.progress = [&progress](const std::string& stage, double fraction) {
-    progress.update(stage, fraction);
-  };
+  how.progress = [&progress](const std::string& stage) { progress.update(stage); };
   return how;
 }
 
@@ -125,7 +123,7 @@ void fit(Run& run, const Options& options) {
     return;
   }
   const bool named = run.scene.model.name != "auto";
-  Progress progress("fit", "steps");
+  Progress progress("fit");
   fitting::FitOptions how = fit_options(options, progress);
   try {
     // The quick way takes the model the support suggests, the others compare what could apply.

@@ -63,7 +63,7 @@ data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
   data::Fit result;
   run_interruptibly([&](const Interrupt& interrupt) {
     how.log = [&](const std::string&) { interrupt.check(); };
-    how.progress = [&](const std::string&, double) { interrupt.check(); };
+    how.progress = [&](const std::string&) { interrupt.check(); };
     result = tools::fit_job(values, scene.scene, how, compare);
   });
   result.inputs = inputs;

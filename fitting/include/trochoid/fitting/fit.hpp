@@ -27,9 +27,8 @@ struct FitOptions {
   /// (single shooting), growing (windows), multiple (multiple shooting).
   std::string strategy = "auto";
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
-  /// What is being done now, and which fraction of all is done (below 0: nobody knows). Called from
-  /// several threads.
-  std::function<void(const std::string& stage, double fraction)> progress;
+  /// What is being done now, with every minimisation. Called from several threads.
+  std::function<void(const std::string& stage)> progress;
   std::function<void(const std::string& line)> log;  ///< one line per minimisation, when wanted
 };
 
