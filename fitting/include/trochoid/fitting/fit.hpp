@@ -29,7 +29,8 @@ struct FitOptions {
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   /// What is being done now, with every minimisation. Called from several threads.
   std::function<void(const std::string& stage)> progress;
-  std::function<void(const std::string& line)> log;  ///< one line per minimisation, when wanted
+  /// One line per stage and minimisation. Called from several threads.
+  std::function<void(const std::string& line)> log;
 };
 
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
