@@ -152,9 +152,7 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
       fit.warnings.push_back("no profile and no bootstrap of a fit that is not accepted");
     return;
   }
-  if (options.profile)
-    fit.profiles = profiles(problem, solution, error.covariance.diagonal().cwiseSqrt(),
-                            error.plain_variance, options.threads);
+  if (options.profile) fit.profiles = profiles(problem, solution, error, options.threads);
   if (options.bootstrap > 0)
     fit.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
                               options.bootstrap, options.seed, options.threads);
@@ -177,6 +175,25 @@ double frame_time_s(std::span<const data::Track> tracks) {
     for (std::size_t i = 1; i < track.samples.size(); ++i)
       steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
   return median(std::move(steps_s));
+}
+
+// The error bar of friction reaches as far as chi-square does on its flatter side; what goes with
+// friction goes farther with it.
+void heed_far_side(const Problem& problem, const Solution& solution, const FitOptions& options,
+                   Uncertainty& error, data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  const auto far = far_side_of_friction(problem, solution, error, options.threads);
+  if (!far) return;
+  const double variance = error.covariance(far->index, far->index);
+  const double times = far->sigma / std::sqrt(variance);
+  const Eigen::VectorXd along = error.covariance.col(far->index) / variance;
+  error.covariance += (far->sigma * far->sigma - variance) * along * along.transpose();
+  error.identifiable[far->index] = far->sigma < natural_size(problem, far->index, solution.u);
+  if (times > kWorthWords)
+    fit.warnings.push_back(fmt::format(
+        "chi-square is lopsided in {}: its error bar is that of the flatter side, {:.2g} "
+        "times what the curvature says (--profile shows both sides)",
+        problem.name(far->index), times));
 }
 
 // What the model takes for given is known as well as its priors say, and no better.
@@ -241,6 +258,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     // A finer tolerance can run into the step limit where a coarse one did not.
     return refuse(problem, failure.what(), fit);
   }
+  heed_far_side(problem, solution, options, error, fit);
   heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
   describe(problem, solution, error, scene, fit);
   judge(problem, solution, error, found.cut_short, fit);

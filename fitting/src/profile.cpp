@@ -1,6 +1,7 @@
 #include "profile.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -31,13 +32,13 @@ class OneParameter {
 
   // Rise of chi-square with the parameter at u + offset; starts where the last call ended.
   // Infinite where the model has no prediction.
-  double rise(double offset) {
+  double rise(double offset, const SolveOptions& options = {}) {
     const FreeParameter& parameter = problem_.free[index_];
     const double u = solution_.u[index_] + offset;
     for (std::size_t arc = 0; arc < held_.base.size(); ++arc)
       if (parameter.arc < 0 || parameter.arc == static_cast<int>(arc))
         held_.base[arc][parameter.index] = parameter.transform.value(u);
-    const Solution best = solve(held_, others_);
+    const Solution best = seek(held_, others_, options);
     if (!best.usable) return std::numeric_limits<double>::infinity();
     others_ = best.u;
     return best.chi2 + outside(u) - solution_.chi2;
@@ -114,6 +115,31 @@ bool tells_of_the_body(const Problem& problem, int index) {
          (info.unit != "rad" && info.unit != "m");
 }
 
+// Where the profile reaches the 95 % bound to one side [units of the value]; no farther than
+// looked.
+double bound_to_side(const Problem& problem, const Solution& solution, int index, double first_step,
+                     double inflation) {
+  constexpr double kFarther = 1.6;
+  constexpr int kMostSteps = 7;
+  constexpr SolveOptions kRoughly{.iterations = 8, .function_tolerance = 1e-5};
+  const double wanted = std::sqrt(kQuantile95 * inflation);
+  OneParameter parameter(problem, solution, index);
+  double offset = 0.0, root = 0.0, next = first_step;
+  for (int step = 0; step < kMostSteps; ++step, next *= kFarther) {
+    const double rise = parameter.rise(next, kRoughly);
+    if (!std::isfinite(rise)) break;
+    const double next_root = std::sqrt(std::max(rise, 0.0));
+    if (next_root >= wanted) {
+      offset += (wanted - root) / (next_root - root) * (next - offset);
+      break;
+    }
+    offset = next, root = next_root;
+  }
+  const Transform& transform = problem.free[index].transform;
+  const double u = solution.u[index];
+  return std::abs(transform.value(u + offset) - transform.value(u));
+}
+
 data::Profile assemble(const Problem& problem, const Solution& solution, int index,
                        const Side& below, const Side& above, double inflation) {
   const Transform& transform = problem.free[index].transform;
@@ -141,37 +167,53 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
 }  // namespace
 
 std::vector<data::Profile> profiles(const Problem& problem, const Solution& solution,
-                                    const Eigen::VectorXd& sigma,
-                                    const Eigen::VectorXd& plain_variance, int threads) {
+                                    const Uncertainty& error, int threads) {
   std::vector<int> chosen;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
     if (tells_of_the_body(problem, i)) chosen.push_back(i);
   constexpr double kFourDecades = 9.210340371976184;
-  // Chi-square takes residuals for independent: it rises so many times too fast.
-  const auto inflation = [&](int index) {
-    const double ratio = sigma[index] * sigma[index] / plain_variance[index];
-    return std::isfinite(ratio) ? std::max(1.0, ratio) : 1.0;
-  };
   std::vector<Side> sides(2 * chosen.size());
   in_parallel(static_cast<int>(sides.size()), threads, [&](int i) {
     const int index = chosen[static_cast<std::size_t>(i / 2)];
     const Transform& transform = problem.free[index].transform;
     const double slope = std::abs(transform.slope(solution.u[index]));
     const bool logarithmic = transform.kind == Transform::Kind::log;
-    double sd = sigma[index] / std::max(slope, 1e-300);
+    double sd = std::sqrt(error.covariance(index, index)) / std::max(slope, 1e-300);
     // An unidentifiable parameter has no scale of its own: a tenth of its size.
     const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(solution.u[index]), 1e-3);
     if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
     const double farthest = logarithmic ? kFourDecades : 100.0 * sd;
     const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd;
     sides[static_cast<std::size_t>(i)] =
-        walk(problem, solution, index, step, farthest, kQuantile95 * inflation(index));
+        walk(problem, solution, index, step, farthest, kQuantile95 * error.chi2_inflation[index]);
   });
   std::vector<data::Profile> result;
   for (std::size_t c = 0; c < chosen.size(); ++c)
     result.push_back(assemble(problem, solution, chosen[c], sides[2 * c], sides[2 * c + 1],
-                              inflation(chosen[c])));
+                              error.chi2_inflation[chosen[c]]));
   return result;
+}
+
+std::optional<FarSide> far_side_of_friction(const Problem& problem, const Solution& solution,
+                                            const Uncertainty& error, int threads) {
+  const int friction = problem.predictor->index_of("friction");
+  const bool slides_on_rim = friction >= 0 && problem.predictor->index_of("w1_rad_s") >= 0;
+  const auto& seen = error.identifiable;
+  if (!slides_on_rim || std::all_of(seen.begin(), seen.end(), [](bool one) { return one; }))
+    return std::nullopt;
+  const auto free = std::find_if(problem.free.begin(), problem.free.end(),
+                                 [&](const FreeParameter& one) { return one.index == friction; });
+  const auto index = static_cast<int>(free - problem.free.begin());
+  if (free == problem.free.end() || !seen[index]) return std::nullopt;
+  const double quantile = std::sqrt(kQuantile95), sigma = std::sqrt(error.covariance(index, index));
+  const double step = quantile * sigma / std::abs(free->transform.slope(solution.u[index]));
+  std::array<double, 2> bounds{};
+  in_parallel(2, threads, [&](int side) {
+    bounds[static_cast<std::size_t>(side)] = bound_to_side(
+        problem, solution, index, side == 0 ? -step : step, error.chi2_inflation[index]);
+  });
+  const FarSide far{index, std::max(bounds[0], bounds[1]) / quantile};
+  return far.sigma > sigma ? std::optional(far) : std::nullopt;
 }
 
 }  // namespace trochoid::fitting

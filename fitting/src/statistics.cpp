@@ -15,9 +15,6 @@
 
 namespace trochoid::fitting {
 
-namespace {
-
-// The size at which a parameter counts as "known to 100 %".
 double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u) {
   const FreeParameter& parameter = problem.free[index];
   const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
@@ -40,6 +37,8 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   if (info.unit == "m/s") return std::max(value, extent / duration);
   return value > 0.0 ? value : 1.0;
 }
+
+namespace {
 
 // What a constant offset of half a sample's sigma in one coordinate of a channel does to the
 // residuals of all arcs: a tracker whose errors hang together may also be off altogether (light,
@@ -218,11 +217,10 @@ Eigen::MatrixXd of_bends(const Directions& seen, const Eigen::MatrixXd& w,
 
 // Median over the parameters of how many times wider the error bars are than those of independent
 // residuals.
-double typical_widening(const Uncertainty& result) {
+double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& plain) {
   std::vector<double> ratios;
-  for (Eigen::Index i = 0; i < result.plain_variance.size(); ++i)
-    if (result.plain_variance[i] > 0.0)
-      ratios.push_back(std::sqrt(result.covariance(i, i) / result.plain_variance[i]));
+  for (Eigen::Index i = 0; i < plain.size(); ++i)
+    if (plain[i] > 0.0) ratios.push_back(std::sqrt(variance[i] / plain[i]));
   return std::max(1.0, median(std::move(ratios)));
 }
 
@@ -253,14 +251,18 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
     covariance = sandwich(problem, all, noise, scaled, seen.bread);
     chords = valley_along(seen).chords();
   }
+  result.chi2_inflation.resize(count);
+  for (int i = 0; i < count; ++i)
+    result.chi2_inflation[i] =
+        seen.bread(i, i) > 0.0 ? std::max(1.0, covariance(i, i) / seen.bread(i, i)) : 1.0;
   const Eigen::VectorXd sd =
       (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
   covariance += of_bends(seen, valley_along(seen).bends(chords, sd), sd);
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
-  result.plain_variance = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
-  result.widened = typical_widening(result);
+  const Eigen::VectorXd plain = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
+  result.widened = typical_widening(result.covariance.diagonal(), plain);
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   return result;

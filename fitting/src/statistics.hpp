@@ -10,8 +10,10 @@ namespace trochoid::fitting {
 
 /// What the data say about the free parameters at a solution.
 struct Uncertainty {
-  Eigen::MatrixXd covariance;      ///< of the values (not of u), order of Problem::free
-  Eigen::VectorXd plain_variance;  ///< were all residuals independent: what chi-square says
+  Eigen::MatrixXd covariance;  ///< of the values (not of u), order of Problem::free
+  /// How many times too fast chi-square, which takes residuals for independent, rises along each
+  /// parameter; at least 1.
+  Eigen::VectorXd chi2_inflation;
   std::vector<bool> identifiable;
   int rank = 0;  ///< directions known to better than 100 % (1 rad for angles)
   double condition = 0.0;
@@ -24,6 +26,10 @@ struct Uncertainty {
   double surprise = 0.0;
   std::vector<std::string> remarks;
 };
+
+/// The size at which a parameter of a free index counts as "known to 100 %" [its unit].
+[[nodiscard]] double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u);
+
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank. The
 /// covariance is the sandwich of least squares in noise that hangs together: each parameter is
 /// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the
