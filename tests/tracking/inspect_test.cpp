@@ -85,5 +85,24 @@ TEST_F(InspectTest, ADiscThatTurnsInPlaceHidesItsFloorAndIsNoRing) {
   EXPECT_NEAR(seen.body->radius_px, kRadius_px, 2.0);
 }
 
+TEST_F(InspectTest, ADiscAsDarkAsTheDarkFieldsOfItsFloorIsNoRing) {
+  const Inspection seen = inspected([](int i, cv::Mat& picture) {
+    constexpr int kField_px = 40;
+    const cv::Scalar dark = cv::Scalar::all(95.0);
+    for (int x = 0; x < kWidth; x += kField_px)
+      for (int y = 0; y < kHeight; y += kField_px)
+        if ((x + y) / kField_px % 2 == 0)
+          cv::rectangle(picture, cv::Rect(x, y, kField_px, kField_px), dark, cv::FILLED);
+    // From one dark field to the next across their common corner, slowly where all is dark.
+    const double along = 2.0 * i / kFrames,
+                 eased = along - std::sin(2.0 * CV_PI * along) / (2.0 * CV_PI);
+    const auto at = static_cast<float>(60.0 + kField_px * eased);
+    const cv::Point2f centre(at, at);
+    cv::ellipse(picture, tilted(i, centre, kRadius_px), dark, cv::FILLED, cv::LINE_AA);
+  });
+  ASSERT_TRUE(seen.body);
+  EXPECT_FALSE(seen.body->bore_shows);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "body_search.hpp"
@@ -47,19 +48,33 @@ Levels floor_around(const cv::Mat& plate, const Ellipse& rim) {
   return {data::quantile(levels, kRobust), data::quantile(levels, 1.0 - kRobust)};
 }
 
-/// Share of the band between two multiples of the rim that looks like the floor. A body that turns
-/// in place is in the plate itself: there the plate is not like the floor around it.
-double floor_share(const cv::Mat& luma, const Plate& plate, const Levels& around,
-                   const Ellipse& rim, double from, double to) {
+double median_level(const cv::Mat& luma, const std::vector<cv::Point>& places) {
+  std::vector<double> levels;
+  for (const cv::Point& at : places) levels.push_back(luma.at<std::uint8_t>(at));
+  return data::quantile(levels, 0.5);
+}
+
+/// Share of the body's middle that looks like the floor, of those places that tell: where the floor
+/// has the level of the body beside its rim, either may be seen. Nothing if hardly any place tells.
+/// A body that turns in place is in the plate itself: there the plate is not like the floor around.
+std::optional<double> floor_share(const cv::Mat& luma, const Plate& plate, const Ellipse& rim) {
+  constexpr double kFewest = 0.25;  // of all
   const double tolerance = 6.0 + 3.0 * plate.noise_levels;
-  const std::vector<cv::Point> places = places_between(rim, from, to, luma.size());
-  int floor = 0;
-  for (const cv::Point& at : places) {
+  const Levels around = floor_around(plate.luma, rim);
+  const std::vector<cv::Point> body = places_between(rim, 0.88, 0.96, luma.size());
+  const std::vector<cv::Point> middle = places_between(rim, 0.1, 0.4, luma.size());
+  if (body.empty()) return std::nullopt;
+  const double body_level = median_level(luma, body);
+  int floor = 0, telling = 0;
+  for (const cv::Point& at : middle) {
     const double expected = plate.luma.at<std::uint8_t>(at);
-    const double difference = std::abs(luma.at<std::uint8_t>(at) - expected);
-    floor += difference < tolerance && around.hold(expected, tolerance);
+    if (std::abs(expected - body_level) < 2.0 * tolerance) continue;
+    ++telling;
+    floor += std::abs(luma.at<std::uint8_t>(at) - expected) < tolerance &&
+             around.hold(expected, tolerance);
   }
-  return places.empty() ? 0.0 : static_cast<double>(floor) / static_cast<double>(places.size());
+  if (telling == 0 || telling < kFewest * static_cast<double>(middle.size())) return std::nullopt;
+  return static_cast<double>(floor) / telling;
 }
 
 /// The rims seen in a window of frames, from the seed both ways.
@@ -77,10 +92,7 @@ struct Watch {
     const cv::Rect2d point(rim.centre_px.x(), rim.centre_px.y(), 1e-9, 1e-9);
     box = radii.size() == 1 ? point : (box | point);
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
-    const Levels around = floor_around(plate.luma, rim);
-    // Less what looks like the floor where the body certainly is: it may have its colour.
-    bore.push_back(floor_share(frame.luma, plate, around, rim, 0.1, 0.4) -
-                   floor_share(frame.luma, plate, around, rim, 0.88, 0.96));
+    if (const auto share = floor_share(frame.luma, plate, rim)) bore.push_back(*share);
   }
 };
 
@@ -107,7 +119,7 @@ Inspection::Body body_of(const Watch& seen) {
           .least_axis_ratio = data::quantile(seen.ratios, kRobust),
           .usual_axis_ratio = data::quantile(seen.ratios, 0.5),
           .travel_px = std::hypot(seen.box.width, seen.box.height),
-          .bore_shows = data::quantile(seen.bore, 2.0 / 3.0) > kBore,
+          .bore_shows = !seen.bore.empty() && data::quantile(seen.bore, 2.0 / 3.0) > kBore,
           .frames = static_cast<int>(seen.radii.size())};
 }
 
