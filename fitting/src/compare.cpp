@@ -50,6 +50,13 @@ Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
   return rung;
 }
 
+Rung frictionless_rung(const Ladder& ladder) {
+  Rung rung;
+  rung.name = "smooth floor";
+  rung.scene = *ladder.frictionless;
+  return rung;
+}
+
 // For one of several rungs that are fitted side by side; what is said of it names it.
 FitOptions options_for(const Rung& rung, const FitOptions& options) {
   FitOptions own = options;
@@ -145,7 +152,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
   const std::size_t terms = ladder.terms.size();
-  rungs.reserve(2 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
+  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   std::size_t current = 0;
@@ -162,6 +169,11 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
            (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= kTrackersOwn);
   };
   if (explains(current)) return rungs;
+  if (ladder.frictionless) {
+    rungs.push_back(frictionless_rung(ladder));
+    fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
+    if (rungs.back().fit.converged && explains(rungs.size() - 1)) return rungs;
+  }
   // Where nothing leads anywhere, the last resort alone does not either.
   if (rungs[current].fit.converged) {
     const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);

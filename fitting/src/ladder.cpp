@@ -111,6 +111,8 @@ Ladder ladder_of(const Scene& scene) {
   ladder.plain.model = without_losses(scene.model, ladder.law);
   if (ladder.law == "rolling") {
     add_floor_terms(scene, ladder);
+    ladder.frictionless = scene;
+    ladder.frictionless->model = without_losses(scene.model, "smooth");
   } else if (ladder.law == "puck") {
     ladder.plain.model.friction = scene.model.friction.value_or(0.2);
     if (scene.body->mass_kg)

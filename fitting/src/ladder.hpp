@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ struct Ladder {
   std::string law;  ///< name of the plainest model
   data::Scene plain;
   std::vector<Term> terms;
+  /// For bodies on a floor: one without any friction, no rolling at all.
+  std::optional<data::Scene> frictionless;
   std::vector<std::string> left_out;  ///< why a term that belongs here is not tried
 };
 

@@ -40,8 +40,9 @@ std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chos
     list += fmt::format("{}{} (BIC {:+.0f})", list.empty() ? "" : ", ", term(*rung.terms.begin()),
                         rung.bic - chosen.bic);
   }
-  std::string words = fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explains it",
-                                  *from_s, acting.empty() ? "rolling without losses" : acting);
+  std::string words =
+      fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explains it", *from_s,
+                  acting.empty() ? chosen.name + " without losses" : acting);
   if (!alike.empty()) words += ", but this track cannot tell that from " + alike;
   if (!out.empty()) words += "; ruled out as the only loss: " + out;
   if (!nowhere.empty()) words += "; no fit at all with nothing but " + nowhere;

@@ -7,6 +7,8 @@
 #include <map>
 #include <random>
 
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
 
@@ -217,6 +219,37 @@ TEST(Compare, TellsWhichFrictionSlowsARing) {
     if (score.recommended) {
       EXPECT_LT(score.held_back_rms_sigma, 3.0);
     }
+}
+
+// From an independent integrator, with noise added: a disc on ice, as a tracker would see it.
+TEST(Compare, FindsThatAFloorHasNoFrictionAtAll) {
+  const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/s05_smooth_disc";
+  const data::Table table = data::read_table(base + ".csv");
+  constexpr int kSamples = 51;
+  constexpr double kSigma_m = 2e-4, kSigma_rad = 0.02;
+  std::mt19937_64 generator(11);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto at = [&](const char* name) { return table.column(name)[i]; };
+    data::TrackSample sample;
+    sample.t_s = at("t");
+    sample.centre_m = Eigen::Vector2d(at("x"), at("y")) +
+                      kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    sample.theta = data::MeasuredAngle{at("theta") + kSigma_rad * normal(generator), kSigma_rad};
+    sample.phi = data::MeasuredAngle{at("phi") + kSigma_rad * normal(generator), kSigma_rad};
+    track.samples.push_back(sample);
+  }
+  data::Scene scene;
+  scene.body = data::read_reference_case(base + ".json").scene.body;
+  scene.model.name = "auto";
+  const Comparison found = compare_one(track, scene);
+  EXPECT_EQ(found.fit.model, "smooth") << found.fit.recommendation;
+  EXPECT_TRUE(found.fit.converged) << found.fit.reason;
+  const data::FitParameter* spin = found.fit.find("w3_rad_s");
+  ASSERT_NE(spin, nullptr);
+  EXPECT_LT(std::abs(spin->value - 8.0), 4.0 * spin->sigma);
 }
 
 TEST(Compare, SaysWhatTurnsARingRetrograde) {
