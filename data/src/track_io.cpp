@@ -75,6 +75,12 @@ std::optional<MeasuredAngle> read_angle(const CsvReader& csv, std::pair<int, int
   if (std::isnan(sigma))
     throw InputError(fmt::format("{}: {} is given without {}; give both or neither", csv.place(),
                                  names.value, names.sigma));
+  constexpr double kMostTilt_rad = 3.2;  // pi, and what three digits make of it
+  if (names.member == &TrackSample::theta && std::abs(value) > kMostTilt_rad)
+    throw InputError(
+        fmt::format("{}: theta_rad = {:g} is no tilt: angles are in radians, a tilt at "
+                    "most pi",
+                    csv.place(), value));
   return MeasuredAngle{value, sigma};
 }
 

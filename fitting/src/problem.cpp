@@ -150,11 +150,13 @@ std::string Shortfalls::words() const {
   if (all == 0)
     return "no start could be made from the track: is it too short, or does nothing in it move as "
            "the model does?";
+  std::string_view ending = model::sentence(static_cast<model::Outcome>(commonest));
+  ending.remove_suffix(ending.ends_with('.') ? 1 : 0);
   return fmt::format(
       "no start led to a prediction of the whole track: {} attempts ended before it, {} of them "
       "so: "
-      "{}",
-      all, by_outcome[commonest].load(), model::sentence(static_cast<model::Outcome>(commonest)));
+      "{}; are the body's dimensions, the scale and the frame rate right?",
+      all, by_outcome[commonest].load(), ending);
 }
 
 Problem single_arc(const Problem& problem, int arc) {

@@ -220,6 +220,8 @@ INSTANTIATE_TEST_SUITE_P(
                 ":2:", "no covariance"},
         Refusal{"AngleWithoutSigma", "t_s,x_m,y_m,theta_rad,sigma_theta_rad\n0,1,2,0.5,\n",
                 ":2:", "sigma_theta_rad"},
+        Refusal{"Degrees", "t_s,x_m,y_m,theta_rad,sigma_theta_rad\n0,1,2,57,0.1\n",
+                ":2:", "theta_rad = 57 is no tilt"},
         Refusal{"NegativeSigma", "t_s,x_m,y_m,phi_rad,sigma_phi_rad\n0,1,2,0.5,-1\n",
                 ":2:", "sigma_phi_rad = -1"},
         Refusal{"Quality", "t_s,x_m,y_m,quality\n0,1,2,1.5\n", ":2:", "0..1"},

@@ -226,6 +226,67 @@ TEST(TrackVideo, FollowsTheBodyPointedAt) {
   EXPECT_LT(largest_error_px(result.file.tracks.at(0), slow), 0.5);
 }
 
+// Its outline never moves: it is part of the static background, and nothing but the mark changes.
+struct TurningInPlace {
+  static constexpr double kX_px = 119.5, kY_px = 64.5, kRadius_px = 48.0, kMark_px = 32.0;
+  static double psi_rad(int i) { return 0.12 * i; }
+  static void write(const std::filesystem::path& path) {
+    write_clip(path, drawn_floor(240, 130, 170.0), kFrames, 2.0, [](cv::Mat& picture, int i) {
+      draw_disc(picture, kX_px, kY_px, kRadius_px, kRadius_px, 0.0, 70.0);
+      draw_disc(picture, kX_px + kMark_px * std::cos(psi_rad(i)),
+                kY_px - kMark_px * std::sin(psi_rad(i)), 5.0, 5.0, 0.0, 200.0);
+    });
+  }
+};
+
+TEST(TrackVideo, ADiscThatTurnsInPlaceIsFollowedByItsRimWherePointed) {
+  const ScratchFolder folder("in_place");
+  TurningInPlace::write(folder / "clip.mkv");
+  data::Scene scene;
+  scene.tracking.at_px = {110.0, 70.0};
+  const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
+  const auto& samples = result.file.tracks.at(0).samples;
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(largest_error_px(
+                result.file.tracks[0],
+                [](int) { return Eigen::Vector2d(TurningInPlace::kX_px, TurningInPlace::kY_px); }),
+            0.3);
+  ASSERT_TRUE(samples.front().psi && samples.back().psi);
+  EXPECT_NEAR(samples.back().psi->value_rad - samples.front().psi->value_rad,
+              TurningInPlace::psi_rad(kFrames - 1), 0.05);
+}
+
+TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
+  const ScratchFolder folder("in_place_body");
+  TurningInPlace::write(folder / "clip.mkv");
+  constexpr double kScale_px_m = 1000.0;
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = TurningInPlace::kRadius_px / kScale_px_m;
+  body.thickness_m = 0.001;
+  scene.support.kind = data::SupportKind::flat;
+  const TrackResult result =
+      track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 130, kScale_px_m));
+  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(largest_error_px(
+                result.file.tracks[0],
+                [](int) { return Eigen::Vector2d(TurningInPlace::kX_px, TurningInPlace::kY_px); }),
+            0.3);
+}
+
+TEST(TrackVideo, APointOutsideThePictureIsSaidToBe) {
+  const ScratchFolder folder("outside");
+  TurningInPlace::write(folder / "clip.mkv");
+  data::Scene scene;
+  scene.tracking.at_px = {5000.0, 3.0};
+  try {
+    (void)track_video(folder / "clip.mkv", scene, std::nullopt);
+    FAIL() << "tracked what nobody can see";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("5000,3 (--at, at_px) is outside the picture"));
+  }
+}
+
 // An oblique look into the bore of a thick platter: its wall and the floor behind have edges of
 // their own, which pass for flat rims.
 TEST(TrackVideo, PointedIntoABoreItFollowsTheBoresRim) {

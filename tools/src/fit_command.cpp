@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -84,8 +85,13 @@ void print(const data::Fit& fit) {
 
 std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
   std::vector<data::Track> tracks;
+  std::map<std::string, std::string> by_checksum;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
+    const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(path), path);
+    if (!fresh)
+      throw InputError(
+          fmt::format("{}: is the same track as {}; a recording counts once", path, same->second));
     add_checksum(provenance.inputs, path);
     if (!file.source_sha256.empty()) provenance.inputs[file.source] = file.source_sha256;
     for (const data::Track& track : file.tracks)
@@ -128,7 +134,7 @@ void run(const FitCommand& command) {
   else
     print(fit);
   if (!fit.converged) {
-    const bool lacking = fit.verdict != "no_feature" && fit.comparison.empty();
+    const bool lacking = fit.outcome == "unexplained" && fit.comparison.empty();
     throw NotGood(fmt::format("the fit is not good: {}{}", fit.reason,
                               lacking ? "; --compare tries what the model lacks" : ""));
   }

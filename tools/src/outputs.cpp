@@ -24,7 +24,7 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
     if (input.empty()) continue;
     if (fs::equivalent(output, input, ignored))
       throw InputError(fmt::format(
-          "{}: is read by this command and would be lost; name another output", output.string()));
+          "{}: is read or written by this command already; name another output", output.string()));
     if (fs::weakly_canonical(output, ignored) == fs::weakly_canonical(input, ignored))
       throw InputError(
           fmt::format("{}: is named for two outputs; name two files", output.string()));

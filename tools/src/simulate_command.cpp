@@ -121,6 +121,12 @@ void tell(const Options& options, const model::Trajectory& run, const fs::path& 
   for (const std::string& picture : pictures) fmt::print("{}\n", picture);
 }
 
+bool broke_off(const model::Trajectory& run) {
+  using model::Outcome;
+  return run.outcome == Outcome::step_limit || run.outcome == Outcome::tolerance_not_reachable ||
+         run.outcome == Outcome::out_of_domain;
+}
+
 void simulate_scene(const Options& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
@@ -152,6 +158,9 @@ void simulate_scene(const Options& options) {
   }
 #endif
   tell(options, run, output, pictures);
+  if (broke_off(run))
+    throw NotGood(fmt::format("the run broke off at t = {:g} s: {}", run.end_s,
+                              model::sentence(run.outcome)));
 }
 
 void run(const Options& options) {

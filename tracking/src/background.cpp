@@ -340,6 +340,33 @@ void Background::estimate_chroma(const std::vector<cv::Mat>& samples,
   cv::bitwise_or(active_, full, active_);
 }
 
+void Background::clear_of(const Ellipse& rim) {
+  constexpr double kBlur_px = 2.0;  // the rim's own
+  constexpr int kReach_px = 6;
+  const auto covered = [&](const cv::Size& size, double scale, double wider_px) {
+    cv::Mat mask = cv::Mat::zeros(size, CV_8U);
+    const double grown = 1.0 + wider_px / rim.semi_minor_px();
+    std::vector<cv::Point> outline;
+    for (int k = 0; k < 64; ++k) {
+      const double angle = 2.0 * CV_PI * k / 64.0;
+      const Eigen::Vector2d p =
+          scale * (rim.centre_px +
+                   grown * rim.shape_px * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+      outline.emplace_back(static_cast<int>(std::lround(p.x())),
+                           static_cast<int>(std::lround(p.y())));
+    }
+    cv::fillPoly(mask, std::vector{outline}, 255);
+    return mask;
+  };
+  const auto fill = [&](cv::Mat& plane, double scale) {
+    const cv::Mat body = covered(plane.size(), scale, kBlur_px);
+    const cv::Mat beside = covered(plane.size(), scale, kBlur_px + kReach_px) & ~body;
+    plane.setTo(cv::mean(plane, beside), body);
+  };
+  fill(plate_.luma, 1.0);
+  if (!plate_.chroma.empty()) fill(plate_.chroma, 0.5);
+}
+
 bool Background::camera_moves() const {
   constexpr double kMostRestless = 0.15, kMostNoise = 8.0, kMostActive = 0.4;
   if (restless_ > kMostRestless) return true;

@@ -3,6 +3,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "rim_fit.hpp"
+
 namespace trochoid::tracking {
 
 /// The scene without the bodies, at the brightness of some frame.
@@ -33,6 +35,10 @@ class Background {
   /// Where the chroma of pixels changed - a body as dark as the floor - they changed as well.
   /// @param samples CV_8UC1 (and CV_8UC2) of one size, at least one.
   static Background from_samples(const BackgroundSamples& samples);
+
+  /// Continues the floor beside a rim below it: for a body whose outline never moves, which is in
+  /// the estimate itself.
+  void clear_of(const Ellipse& rim);
 
   [[nodiscard]] bool empty() const { return plate_.luma.empty(); }
   /// At the brightness of one of the samples; noise at least 0.7 levels.

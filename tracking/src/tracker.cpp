@@ -119,7 +119,7 @@ class Tracking {
                       "part where it is still with --from and --to",
                       video_.string()));
     throw InputError(
-        fmt::format("{}: no moving body found; point at it: track --at x,y, or at_px under "
+        fmt::format("{}: no moving body found; point at it: --at x,y, or at_px under "
                     "[tracking] in the scene",
                     video_.string()));
   }
@@ -131,6 +131,7 @@ class Tracking {
     background_ = Background::from_samples(recording_.samples());
     camera_moved_ = camera_moved_ || background_.camera_moves();
     explained_.assign(recording_.window().size(), {});
+    for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
     for (const BodyPath& path : paths_) explain(path);
     return true;
   }
@@ -163,15 +164,28 @@ class Tracking {
     constexpr int kAttempts = 4;
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const auto seed = find_seed(recording_.window(), background_, *finder_, explained_);
-      if (!seed) return false;
+      if (!seed) return paths_.empty() && follow_one_in_plate();
       Followed found = follow_from(*seed);
       if (attempt == 0) prefer_one_that_turns(found);
       explain(found.path);
-      if (!moves(found.path)) continue;
+      if (!moves(found.path) || is_known(found.path)) continue;
       add(std::move(found));
       return true;
     }
     return false;
+  }
+
+  /// A body followed already, found again in a frame in which it had been lost.
+  [[nodiscard]] bool is_known(const BodyPath& path) const {
+    constexpr double kSamePlace_radii = 0.3;
+    return std::any_of(paths_.begin(), paths_.end(), [&](const BodyPath& known) {
+      return std::any_of(path.frames.begin(), path.frames.end(), [&](const auto& frame) {
+        const auto at = known.frames.find(frame.first);
+        if (at == known.frames.end()) return false;
+        const Sighting &a = frame.second.seen, &b = at->second.seen;
+        return (a.centre_px - b.centre_px).norm() < kSamePlace_radii * b.rim.semi_minor_px();
+      });
+    });
   }
 
   void add(Followed found) {
@@ -196,8 +210,46 @@ class Tracking {
     found = std::move(other);
   }
 
-  [[nodiscard]] Seed seed_pointed_at() const {
-    auto seed = find_seed_at(recording_.window(), background_, *finder_, *scene_.tracking.at_px);
+  /// A body that turns in place about its own axis, with nothing but a mark that moves.
+  bool follow_one_in_plate() {
+    constexpr double kMost = 0.6;  // of what changes
+    const auto seed =
+        seed_in_plate(find_seed_turning(recording_.window(), background_, *make_rim_finder(false)));
+    if (!seed) return false;
+    Followed found = follow_from(*seed);
+    const cv::Mat& active = background_.active();
+    if (!moves(found.path) ||
+        changes_explained(found.path, active) < kMost * cv::countNonZero(active))
+      return false;
+    add(std::move(found));
+    return true;
+  }
+
+  /// A body whose outline never moves is in the plate itself. Once its rim is known, the floor is
+  /// continued below it, and it is seen like any other.
+  std::optional<Seed> seed_in_plate(const std::optional<Seed>& rim) {
+    if (!rim) return std::nullopt;
+    in_plate_.push_back(rim->seen.rim);
+    background_.clear_of(rim->seen.rim);
+    return find_seed_at(recording_.window(), background_, *finder_, rim->seen.centre_px);
+  }
+
+  [[nodiscard]] Seed seed_pointed_at() {
+    const auto& window = recording_.window();
+    const Eigen::Vector2d& at_px = *scene_.tracking.at_px;
+    const VideoInfo& video = recording_.info();
+    if (!(at_px.minCoeff() >= 0.0 && at_px.x() < video.width_px && at_px.y() < video.height_px))
+      throw InputError(
+          fmt::format("{}: the point {:g},{:g} (--at, at_px) is outside the picture of "
+                      "{} x {} pixels",
+                      video_.string(), at_px.x(), at_px.y(), video.width_px, video.height_px));
+    auto seed = find_seed_at(window, background_, *finder_, at_px);
+    // Of a body in its plate no edge is new.
+    constexpr double kNew = 0.3;
+    if (!seed)
+      seed = seed_in_plate(find_seed_at(window, background_, *make_rim_finder(false), at_px));
+    else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
+      seed = seed_in_plate(seed);
     if (!seed)
       throw InputError(
           fmt::format("{}: no rim found around the point given with --at", video_.string()));
@@ -394,6 +446,7 @@ class Tracking {
   std::optional<data::Camera> camera_;
   std::unique_ptr<BodyFinder> finder_;
   Background background_;
+  std::vector<Ellipse> in_plate_;  ///< rims of bodies that never move off the plate
   bool camera_moved_ = false;
   std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
