@@ -274,6 +274,35 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
             0.3);
 }
 
+// Seen face on, precession and spin are one angle.
+TEST(TrackVideo, ADiscOnAPinShowsItsTurnByItsMark) {
+  const ScratchFolder folder("pin");
+  TurningInPlace::write(folder / "clip.mkv");
+  constexpr double kScale_px_m = 1000.0;
+  constexpr double kHeight_m = 0.5, kPin_m = 0.02, kTop_m = kPin_m + 0.005;
+  const data::Camera camera = data::Camera::overhead(240, 130, kScale_px_m, kHeight_m);
+  const double px_per_m = kScale_px_m * kHeight_m / (kHeight_m - kTop_m);
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = TurningInPlace::kRadius_px / px_per_m;
+  body.thickness_m = 0.01;
+  body.marks.push_back(
+      {.distance_m = TurningInPlace::kMark_px / px_per_m, .size_m = 5.0 / px_per_m});
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m =
+      camera.table_from_image({TurningInPlace::kX_px, TurningInPlace::kY_px}, kPin_m);
+  const TrackResult result = track_video(folder / "clip.mkv", scene, camera);
+  const auto& samples = result.file.tracks.at(0).samples;
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  for (const auto& s : samples) {
+    ASSERT_TRUE(s.psi) << s.frame;
+    EXPECT_FALSE(s.phi) << s.frame;
+    const double off = s.psi->value_rad - TurningInPlace::psi_rad(static_cast<int>(s.frame));
+    EXPECT_NEAR(std::remainder(off, 2.0 * std::numbers::pi), 0.0, 0.02) << s.frame;
+    EXPECT_LT(s.psi->sigma_rad, 0.05) << s.frame;
+  }
+}
+
 TEST(TrackVideo, APointOutsideThePictureIsSaidToBe) {
   const ScratchFolder folder("outside");
   TurningInPlace::write(folder / "clip.mkv");

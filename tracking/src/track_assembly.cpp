@@ -71,6 +71,32 @@ void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bo
   if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
 }
 
+/// Seen face on, nothing tells which way the axis leans: then the turn of the face about the
+/// vertical is known, precession and spin together, and neither of them alone.
+bool turns_face_on(const BodyPath& path) {
+  constexpr double kVague_rad = 0.1;
+  std::vector<double> sigmas_rad;
+  for (const auto& [index, at] : path.frames)
+    if (at.seen.pose && at.seen.pose->sigma_psi_rad)
+      sigmas_rad.push_back(at.seen.pose->sigma_phi_rad);
+  return !sigmas_rad.empty() && data::quantile(std::move(sigmas_rad), 0.5) > kVague_rad;
+}
+
+/// @param measured as the picture gave it: the spin's error holds the precession's of that pose.
+void join_turns(const PoseMeasurement& measured, data::TrackSample& sample) {
+  if (sample.psi) {
+    const double theta = measured.pose.theta_rad;
+    const double of_phi =
+        std::isfinite(measured.sigma_phi_rad) ? std::cos(theta) * measured.sigma_phi_rad : 0.0;
+    // A lean that is not there moves a mark on its ellipse by so much.
+    const double of_lean = 0.25 * theta * theta;
+    const double own2 = *measured.sigma_psi_rad * *measured.sigma_psi_rad - of_phi * of_phi;
+    sample.psi = {sample.psi->value_rad + measured.pose.phi_rad,
+                  std::hypot(std::sqrt(std::max(own2, 0.0)), of_lean)};
+  }
+  sample.phi.reset();
+}
+
 /// Inflation of the covariances, smoothed over neighbours in time: one frame's own says as much
 /// about the frame, partly hidden maybe, as about luck.
 std::vector<double> smoothed_inflations(const BodyPath& path) {
@@ -111,6 +137,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
   Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
   const std::vector<double> inflations = smoothed_inflations(path);
   auto inflation = inflations.begin();
+  const bool face_on = options.on_pin && turns_face_on(path);
   const bool turns_as_it_spins = path.marks && lies(path);
   for (const auto& [index, at] : path.frames) {
     const Sighting& seen = at.seen;
@@ -128,6 +155,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
       sample.centre_m = pose.pose.centre_m.head<2>();
       sample.covariance_m2 = pose.covariance_m2;
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
+      if (face_on) join_turns(*seen.pose, sample);
     } else {
       metres_from_rim(sample, seen, rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.

@@ -31,6 +31,7 @@ struct MetreRule {
 
 struct AssemblyOptions {
   bool fold = false;       ///< faces look alike: report min(theta, pi - theta)
+  bool on_pin = false;     ///< held at its own middle: turns about the vertical where seen face on
   double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
   double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
   int height_px = 1;

@@ -388,6 +388,18 @@ class Tracking {
         std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear")};
   }
 
+  /// Held at its own middle, as far as the path tells.
+  [[nodiscard]] bool is_on_a_pin(const BodyPath& path) const {
+    if (scene_.support.kind != data::SupportKind::pivot || !scene_.support.pivot_m || !scene_.body)
+      return false;
+    std::vector<double> distances_m;
+    for (const auto& [index, at] : path.frames)
+      if (at.seen.pose)
+        distances_m.push_back((at.seen.pose->pose.centre_m - *scene_.support.pivot_m).norm());
+    return !distances_m.empty() &&
+           data::median(std::move(distances_m)) < scene_.body->half_thickness_m();
+  }
+
   TrackResult result() {
     TrackResult result;
     result.file.source = video_.filename().string();
@@ -404,6 +416,7 @@ class Tracking {
       const BodyPath& path = paths_[k];
       MetreRule rule;
       if (!(has_shape(scene_) && camera_)) rule = metre_rule(path, words);
+      how.on_pin = is_on_a_pin(path);
       result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), rule, how));
       const auto& samples = result.file.tracks.back().samples;
       const auto found = static_cast<std::int64_t>(samples.size());
