@@ -47,10 +47,10 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
   if (first >= last) {
     const data::TrackSample &start = track.samples.front(), &end = track.samples.back();
     throw InputError(fmt::format(
-        "no sample of object {} lies {}{}{}{}{}: its track runs from {:.4g} to {:.4g} s, "
-        "frames {} to {}",
+        "no sample of object {} lies {}{}{}{}{}: its track runs from {:.4g} to {:.4g} s{}",
         track.object, from.empty() ? "" : "from ", from, from.empty() || to.empty() ? "" : " ",
-        to.empty() ? "" : "to ", to, start.t_s, end.t_s, start.frame, end.frame));
+        to.empty() ? "" : "to ", to, start.t_s, end.t_s,
+        start.frame < 0 ? "" : fmt::format(", frames {} to {}", start.frame, end.frame)));
   }
   return {first, last};
 }

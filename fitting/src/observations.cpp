@@ -1,5 +1,7 @@
 #include "observations.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
@@ -49,10 +51,13 @@ void number_rows(ArcData& arc) {
 }
 
 // W with W W^T = inverse covariance: the inverse of the transposed Cholesky factor.
-Eigen::Matrix2d whitener_of(const Eigen::Matrix2d& covariance) {
-  const Eigen::LLT<Eigen::Matrix2d> cholesky(covariance);
+Eigen::Matrix2d whitener_of(const data::TrackSample& sample) {
+  const Eigen::LLT<Eigen::Matrix2d> cholesky(sample.covariance_m2);
   if (cholesky.info() != Eigen::Success)
-    throw InputError("a sample's covariance is not positive definite; give sxx_m2, syy_m2 > 0");
+    throw InputError(
+        fmt::format("the covariance of the sample at t = {:g} s is not positive definite; give "
+                    "sxx_m2, syy_m2 > 0",
+                    sample.t_s));
   const Eigen::Matrix2d lower = cholesky.matrixL();
   return lower.inverse().transpose();
 }
@@ -134,7 +139,7 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
     if (choice.position) {
       Reading reading{.sample = index, .channel = Channel::position, .value = sample.centre_m};
       if (sample.has_covariance())
-        reading.whitener = whitener_of(sample.covariance_m2);
+        reading.whitener = whitener_of(sample);
       else
         any_covariance_missing = true;
       arc.readings.push_back(reading);

@@ -72,6 +72,13 @@ TEST(Pieces, ASpinThatIsFreeFromTheFirstSampleOnIsTakenWhole) {
   EXPECT_EQ(released_at(pendulum, {0, 300}), 0);
 }
 
+TEST(Pieces, ATrackWithoutFrameNumbersIsRefusedWithoutThem) {
+  data::Track track = turning(51, [](double) { return 0.0; });
+  EXPECT_THAT(refusal(track, "1.5", ""), testing::HasSubstr("frames"));
+  for (data::TrackSample& sample : track.samples) sample.frame = -1;
+  EXPECT_THAT(refusal(track, "1.5", ""), testing::EndsWith("runs from 0 to 1 s"));
+}
+
 TEST(Pieces, WhyNoStartLedAnywhereIsTheCommonestReason) {
   Shortfalls none;
   EXPECT_THAT(none.words(), testing::HasSubstr("no start could be made from the track"));
