@@ -361,6 +361,7 @@ void Background::clear_of(const Ellipse& rim) {
   const auto fill = [&](cv::Mat& plane, double scale) {
     const cv::Mat body = covered(plane.size(), scale, kBlur_px);
     const cv::Mat beside = covered(plane.size(), scale, kBlur_px + kReach_px) & ~body;
+    plane = plane.clone();  // copies of the background keep theirs
     plane.setTo(cv::mean(plane, beside), body);
   };
   fill(plate_.luma, 1.0);

@@ -213,16 +213,22 @@ class Tracking {
   /// A body that turns in place about its own axis, with nothing but a mark that moves.
   bool follow_one_in_plate() {
     constexpr double kMost = 0.6;  // of what changes
-    const auto seed =
-        seed_in_plate(find_seed_turning(recording_.window(), background_, *make_rim_finder(false)));
-    if (!seed) return false;
-    Followed found = follow_from(*seed);
-    const cv::Mat& active = background_.active();
-    if (!moves(found.path) ||
-        changes_explained(found.path, active) < kMost * cv::countNonZero(active))
-      return false;
-    add(std::move(found));
-    return true;
+    const auto rim = find_seed_turning(recording_.window(), background_, *make_rim_finder(false));
+    if (!rim) return false;
+    const Background before = background_;
+    if (const auto seed = seed_in_plate(rim)) {
+      Followed found = follow_from(*seed);
+      const cv::Mat& active = background_.active();
+      if (moves(found.path) &&
+          changes_explained(found.path, active) >= kMost * cv::countNonZero(active)) {
+        add(std::move(found));
+        return true;
+      }
+    }
+    // Nothing but floor was there.
+    background_ = before;
+    in_plate_.pop_back();
+    return false;
   }
 
   /// A body whose outline never moves is in the plate itself. Once its rim is known, the floor is
