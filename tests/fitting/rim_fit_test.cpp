@@ -338,6 +338,32 @@ TEST(FastRimFit, StartsFromFewPicturesATurn) {
   EXPECT_LT(pull(fit, "air_linear_N_m_s[3]", 1.76e-5), kFar);
 }
 
+// Positions of a body in the scene's model, and the same with noise.
+constexpr double kBuriedSigma_m = 5e-4;
+
+Eigen::VectorXd path_of(const data::Scene& scene, const std::map<std::string, double>& truth,
+                        const std::vector<double>& t_s) {
+  const auto predictor = model::make_predictor(scene);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  return predictor->predict(fitting::values_with(*predictor, truth), request).values;
+}
+
+data::Track buried_in_noise(const Eigen::VectorXd& path, const std::vector<double>& t_s, int seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal(0.0, kBuriedSigma_m);
+  data::Track track;
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    data::TrackSample sample;
+    sample.t_s = t_s[i];
+    sample.centre_m = path.segment<2>(static_cast<Eigen::Index>(2 * i)) +
+                      Eigen::Vector2d(normal(generator), normal(generator));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kBuriedSigma_m * kBuriedSigma_m;
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
 // Half a millimetre of noise on as much motion: other motions come near enough to pass for right
 // ones, and only the best of all is the answer.
 TEST(BuriedRimFit, FindsTheBestMotionNotTheFirstThatPasses) {
@@ -350,30 +376,14 @@ TEST(BuriedRimFit, FindsTheBestMotionNotTheFirstThatPasses) {
   const std::map<std::string, double> truth{
       {"theta_rad", 0.15}, {"phi_rad", 0.3}, {"w1_rad_s", 0.0}, {"w2_rad_s", 7.5},
       {"w3_rad_s", 0.1},   {"x_m", 0.01},    {"y_m", -0.02}};
-  const auto predictor = model::make_predictor(scene);
-  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
-  constexpr int kSamples = 200;
-  constexpr double kSigma_m = 5e-4;
   std::vector<double> t_s;
-  for (int i = 0; i < kSamples; ++i) t_s.push_back(i / 200.0);
-  model::PredictRequest request;
-  request.t_s = t_s;
-  const Eigen::VectorXd path = predictor->predict(values, request).values;
+  for (int i = 0; i < 200; ++i) t_s.push_back(i / 200.0);
+  const Eigen::VectorXd path = path_of(scene, truth, t_s);
   FitOptions from_truth;
   from_truth.strategy = "single";
   from_truth.start = truth;
   for (int seed = 1; seed <= 5; ++seed) {
-    std::mt19937_64 generator(seed);
-    std::normal_distribution<double> normal(0.0, kSigma_m);
-    data::Track track;
-    for (int i = 0; i < kSamples; ++i) {
-      data::TrackSample sample;
-      sample.t_s = t_s[static_cast<std::size_t>(i)];
-      sample.centre_m =
-          path.segment<2>(2 * i) + Eigen::Vector2d(normal(generator), normal(generator));
-      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
-      track.samples.push_back(sample);
-    }
+    const data::Track track = buried_in_noise(path, t_s, seed);
     const data::Fit found = fitting::fit(std::span(&track, 1), scene);
     const data::Fit best = fitting::fit(std::span(&track, 1), scene, from_truth);
     EXPECT_LT(found.chi2, best.chi2 + 0.5) << "seed " << seed;
@@ -407,30 +417,14 @@ TEST(SlidingRimFit, TheErrorBarOfFrictionReachesItsFlatterSide) {
                                             {"friction", 0.309},
                                             {"rolling_friction_m", 3.3e-5},
                                             {"pivoting_friction_m", 4.2e-4}};
-  const auto predictor = model::make_predictor(scene);
-  constexpr int kSamples = 127;
-  constexpr double kSigma_m = 5e-4;
   std::vector<double> t_s;
-  for (int i = 0; i < kSamples; ++i) t_s.push_back(i / 60.0);
-  model::PredictRequest request;
-  request.t_s = t_s;
-  const Eigen::VectorXd path =
-      predictor->predict(fitting::values_with(*predictor, truth), request).values;
+  for (int i = 0; i < 127; ++i) t_s.push_back(i / 60.0);
+  const Eigen::VectorXd path = path_of(scene, truth, t_s);
   FitOptions from_truth;
   from_truth.strategy = "single";
   from_truth.start = truth;
   for (const int seed : {5, 6}) {
-    std::mt19937_64 generator(seed);
-    std::normal_distribution<double> normal(0.0, kSigma_m);
-    data::Track track;
-    for (int i = 0; i < kSamples; ++i) {
-      data::TrackSample sample;
-      sample.t_s = t_s[static_cast<std::size_t>(i)];
-      sample.centre_m =
-          path.segment<2>(2 * i) + Eigen::Vector2d(normal(generator), normal(generator));
-      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
-      track.samples.push_back(sample);
-    }
+    const data::Track track = buried_in_noise(path, t_s, seed);
     const data::Fit fit = fitting::fit(std::span(&track, 1), scene, from_truth);
     ASSERT_TRUE(fit.converged) << fit.reason;
     EXPECT_LT(pull(fit, "friction", truth.at("friction")), 2.0) << "seed " << seed;

@@ -344,18 +344,13 @@ void Background::clear_of(const Ellipse& rim) {
   constexpr double kBlur_px = 2.0;  // the rim's own
   constexpr int kReach_px = 6;
   const auto covered = [&](const cv::Size& size, double scale, double wider_px) {
+    const Eigen::Vector2f centre = (scale * rim.centre_px).cast<float>();
+    const auto width = static_cast<float>(2.0 * scale * (rim.semi_major_px() + wider_px));
+    const auto height = static_cast<float>(2.0 * scale * (rim.semi_minor_px() + wider_px));
+    const auto angle_deg = static_cast<float>(rim.angle_rad() * 180.0 / CV_PI);
     cv::Mat mask = cv::Mat::zeros(size, CV_8U);
-    const double grown = 1.0 + wider_px / rim.semi_minor_px();
-    std::vector<cv::Point> outline;
-    for (int k = 0; k < 64; ++k) {
-      const double angle = 2.0 * CV_PI * k / 64.0;
-      const Eigen::Vector2d p =
-          scale * (rim.centre_px +
-                   grown * rim.shape_px * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-      outline.emplace_back(static_cast<int>(std::lround(p.x())),
-                           static_cast<int>(std::lround(p.y())));
-    }
-    cv::fillPoly(mask, std::vector{outline}, 255);
+    cv::ellipse(mask, cv::RotatedRect({centre.x(), centre.y()}, {width, height}, angle_deg), 255,
+                cv::FILLED);
     return mask;
   };
   const auto fill = [&](cv::Mat& plane, double scale) {

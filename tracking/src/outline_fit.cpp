@@ -297,13 +297,6 @@ void fold(data::Pose<>& pose) {
   if (pose.theta_rad > 0.5 * std::numbers::pi) pose = turned_over(pose);
 }
 
-// A body held at its own middle has no end up: of two names of its attitude, the one with the axis
-// upwards.
-bool is_on_a_pin(const data::Body& body, const data::Support& support, const data::Pose<>& pose) {
-  return support.kind == data::SupportKind::pivot && support.pivot_m &&
-         (pose.centre_m - *support.pivot_m).norm() < body.half_thickness_m();
-}
-
 // Reads the marks; those of the other face show that a prediction had the body the wrong way up.
 std::optional<MarkReading> read_marks_of_either_face(const cv::Mat& luma, const data::Body& body,
                                                      const data::Camera& camera,
@@ -405,6 +398,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   find_uncertainty(scenery, *best);
   if (!believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
+  // A body on a pin has no end up: its axis is named upwards.
   if (alike || is_on_a_pin(body_, support_, m.pose)) fold(m.pose);
   const bool either = mirrors && !alike && body_.axle_above_m <= 0.0;
   if (const auto marks = either ? read_marks_of_either_face(evidence.luma, body_, camera_, m.pose)

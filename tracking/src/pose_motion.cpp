@@ -141,4 +141,9 @@ data::Pose<> PoseMotion::settled(data::Pose<> pose) const {
   return pose;
 }
 
+bool is_on_a_pin(const data::Body& body, const data::Support& support, const data::Pose<>& pose) {
+  return support.kind == data::SupportKind::pivot && support.pivot_m &&
+         (pose.centre_m - *support.pivot_m).norm() < body.half_thickness_m();
+}
+
 }  // namespace trochoid::tracking

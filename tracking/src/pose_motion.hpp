@@ -50,4 +50,9 @@ class PoseMotion {
 /// theta and phi of a direction; phi is kept where the axis is vertical.
 void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose);
 
+/// Whether a body is held at its own middle: its pivot lies within half its thickness of the centre
+/// of this pose [m].
+[[nodiscard]] bool is_on_a_pin(const data::Body& body, const data::Support& support,
+                               const data::Pose<>& pose);
+
 }  // namespace trochoid::tracking

@@ -13,6 +13,7 @@
 #include "neighbours.hpp"
 #include "path_motion.hpp"
 #include "path_outliers.hpp"
+#include "pose_motion.hpp"
 #include "recording.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
@@ -394,16 +395,13 @@ class Tracking {
         std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear")};
   }
 
-  /// Held at its own middle, as far as the path tells.
-  [[nodiscard]] bool is_on_a_pin(const BodyPath& path) const {
-    if (scene_.support.kind != data::SupportKind::pivot || !scene_.support.pivot_m || !scene_.body)
-      return false;
-    std::vector<double> distances_m;
+  /// In most of the frames that tell.
+  [[nodiscard]] bool stays_on_a_pin(const BodyPath& path) const {
+    int on = 0, off = 0;
     for (const auto& [index, at] : path.frames)
       if (at.seen.pose)
-        distances_m.push_back((at.seen.pose->pose.centre_m - *scene_.support.pivot_m).norm());
-    return !distances_m.empty() &&
-           data::median(std::move(distances_m)) < scene_.body->half_thickness_m();
+        ++(is_on_a_pin(*scene_.body, scene_.support, at.seen.pose->pose) ? on : off);
+    return on > off;
   }
 
   TrackResult result() {
@@ -422,7 +420,7 @@ class Tracking {
       const BodyPath& path = paths_[k];
       MetreRule rule;
       if (!(has_shape(scene_) && camera_)) rule = metre_rule(path, words);
-      how.on_pin = is_on_a_pin(path);
+      how.on_pin = stays_on_a_pin(path);
       result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), rule, how));
       const auto& samples = result.file.tracks.back().samples;
       const auto found = static_cast<std::int64_t>(samples.size());
