@@ -239,14 +239,21 @@ bool same(const std::map<std::string, Prior>& a, const std::map<std::string, Pri
   return a.empty() && b.empty();
 }
 
-// "key = value" lines of everything that differs from the default.
+// visit(key, value, constraint) for everything that differs from the default.
+template <class Object, class Keys, class Visit>
+void for_given(const Object& object, Keys keys, Visit visit) {
+  const Object standard{};
+  keys([&](const char* key, auto member, const auto& constraint) {
+    if (!same(object.*member, standard.*member)) visit(key, object.*member, constraint);
+  });
+}
+
+// The same as "key = value" lines.
 template <class Object, class Keys>
 std::string lines_of(const Object& object, Keys keys) {
-  const Object standard{};
   std::string text;
-  keys([&](const char* key, auto member, const auto& constraint) {
-    if (!same(object.*member, standard.*member))
-      text += fmt::format("{} = {}\n", key, toml_value(object.*member, constraint));
+  for_given(object, keys, [&](const char* key, const auto& value, const auto& constraint) {
+    text += fmt::format("{} = {}\n", key, toml_value(value, constraint));
   });
   return text;
 }
@@ -279,6 +286,19 @@ Scene read_scene(const std::filesystem::path& path) {
   if (!scene.camera.file.empty())
     scene.camera.file = (path.parent_path() / scene.camera.file).lexically_normal().string();
   return scene;
+}
+
+std::vector<std::string> given_keys(const Scene& scene) {
+  std::vector<std::string> names;
+  const auto add = [&](const char* table, const auto& object, auto keys) {
+    for_given(object, keys, [&](const char* key, const auto&, const auto&) {
+      names.push_back(fmt::format("{}.{}", table, key));
+    });
+  };
+  add("model", scene.model, [](auto&& v) { model_keys(v); });
+  add("start", scene.start, [](auto&& v) { start_keys(v); });
+  add("run", scene.run, [](auto&& v) { run_keys(v); });
+  return names;
 }
 
 std::string to_toml(const Scene& scene) {

@@ -18,6 +18,7 @@
 #include "starter.hpp"
 #include "statistics.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/model/idle_keys.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -217,6 +218,27 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
 }
 
+// A pivot is freed in vain where there is none.
+void heed_pivot(const Problem& problem, const data::Scene& scene, data::Fit& fit) {
+  const auto& infos = problem.predictor->parameters();
+  const bool has_pivot = std::any_of(infos.begin(), infos.end(),
+                                     [](const auto& info) { return info.name == "pivot_x_m"; });
+  if (scene.fit.free_pivot && !has_pivot)
+    fit.warnings.push_back(fmt::format(
+        "free_pivot: model '{}' has no pivot to fit, it counts for nothing", fit.model));
+}
+
+// Terms of other models; [start] is a hint for whichever wants it.
+void tell_idle_terms(const data::Scene& scene, data::Fit& fit) {
+  constexpr std::string_view kTerm = "model.";
+  for (const std::string& key : model::idle_keys(scene))
+    if (key.starts_with(kTerm))
+      fit.warnings.push_back(
+          fmt::format("[model] {}: model '{}' has no such term, it counts for "
+                      "nothing",
+                      key.substr(kTerm.size()), fit.model));
+}
+
 // A coefficient that is to be found needs no first value.
 void give_friction_a_start(data::Scene& scene) {
   constexpr double kTypical = 0.2;
@@ -260,6 +282,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   }
   heed_far_side(problem, solution, options, error, fit);
   heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
+  heed_pivot(problem, scene, fit);
   describe(problem, solution, error, scene, fit);
   judge(problem, solution, error, found.cut_short, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
@@ -294,7 +317,9 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scen
     plain.push_back({owned.model.get(), {}});
     for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
   }
-  return fit_with(tracks, *predictor, plain, scene, options);
+  data::Fit fit = fit_with(tracks, *predictor, plain, scene, options);
+  tell_idle_terms(scene, fit);
+  return fit;
 }
 
 }  // namespace trochoid::fitting

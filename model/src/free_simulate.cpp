@@ -23,11 +23,12 @@ Eigen::Vector3d moments_of(const data::Scene& scene) {
   Eigen::Vector3d moments;
   if (scene.start.moments_kg_m2) {
     moments = *scene.start.moments_kg_m2;
-  } else if (scene.body) {
+  } else if (scene.body && scene.body->kind != data::BodyKind::top) {
     const CentralInertia inertia = central_inertia(*scene.body);
     moments << inertia.transverse_kg_m2, inertia.transverse_kg_m2, inertia.axial_kg_m2;
   } else {
-    throw InputError("model \"free\" needs start.moments_kg_m2 or a [body] with a shape");
+    throw InputError(
+        "start.moments_kg_m2 is missing: model \"free\" needs it or the shape of a disc or ring");
   }
   const double sum = moments.sum();
   for (int i = 0; i < 3; ++i) {

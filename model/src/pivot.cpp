@@ -261,7 +261,7 @@ Trajectory simulate_pivot(const data::Scene& scene) {
   Trajectory run;
   run.model = "pivot";
   run.integrator = "dop853";
-  run.integrator_reason = "not stiff";
+  run.integrator_reason = "smooth up to the instant of rest";
   run.columns = euler_columns();
   if (!weighed) run.columns.pop_back();
   run.columns.emplace_back("w3_rad_s");

@@ -207,7 +207,10 @@ ContactChoice choose(const RimJob& job, const std::string& asked) {
       return {
           Method::cvode_bdf, "cvode-bdf",
           fmt::format("stiff friction: an explicit method would take about {:.0e} steps", steps)};
-    return {Method::dop853, "dop853", "not stiff, smooth between events"};
+    return {Method::dop853, "dop853",
+            job.eps_v() > 0.0
+                ? fmt::format("friction that is not stiff: about {:.0e} explicit steps", steps)
+                : "no friction law that could be stiff, smooth between events"};
   }
   if (asked == "taylor")
     throw InputError(

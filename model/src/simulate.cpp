@@ -52,12 +52,24 @@ double finer(double tolerance) {
   return std::max(0.01 * tolerance, 2e-15);
 }
 
+namespace {
+
+void check_integrator(const std::string& asked, const std::string& law) {
+  const bool has_one = law == "top-euler" || law == "puck" || law == "pivot";
+  if (has_one && asked != "auto" && asked != "dop853")
+    throw InputError(fmt::format(
+        "run.integrator = \"{}\": model \"{}\" runs with auto or dop853 alone", asked, law));
+}
+
+}  // namespace
+
 Trajectory simulate(const data::Scene& scene) {
   if (!(scene.run.tolerance > 0.0) || scene.run.tolerance > 0.1) {
     throw InputError(
         fmt::format("run.tolerance = {} must lie between 0 and 0.1", scene.run.tolerance));
   }
   const std::string name = law_of(scene);
+  check_integrator(scene.run.integrator, name);
   if (name == "free") return simulate_free(scene);
   if (name == "top") return simulate_top(scene);
   if (name == "top-euler") return simulate_top_euler(scene);

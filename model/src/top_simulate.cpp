@@ -223,8 +223,6 @@ Trajectory simulate_top(const data::Scene& scene) {
 
 Trajectory simulate_top_euler(const data::Scene& scene) {
   const TopSettings top = without_drag(top_for_simulation(scene));
-  if (scene.run.integrator != "auto" && scene.run.integrator != "dop853")
-    throw InputError("model \"top-euler\" runs with integrator = \"auto\" or \"dop853\"");
   const Choice choice{Method::dop853, "dop853", "the only one for the thesis' form"};
   return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
     return run_kernel(run_top_euler, top, t_s, tolerance);

@@ -195,6 +195,16 @@ TEST(SceneFile, WritesEveryKeyThatDiffersFromItsDefault) {
   EXPECT_EQ(to_toml(parse_scene(all, "all.toml")), all);
 }
 
+TEST(SceneFile, TellsWhatItSaysOfMotion) {
+  const Scene scene = parse_scene(
+      "[body]\nradius_m = 0.03\n[model]\nfriction = 0.3\ngravity_m_s2 = 9.81\n[start]\npsi_rad = "
+      "0\n[run]\nrate_hz = 50\n",
+      "test");
+  const std::vector<std::string> expected{"model.friction", "start.psi_rad", "run.rate_hz"};
+  EXPECT_EQ(given_keys(scene), expected);
+  EXPECT_TRUE(given_keys(Scene{}).empty());
+}
+
 TEST(SceneFile, MayBeEmptyOrHoldOnlyABody) {
   EXPECT_FALSE(parse_scene("", "s").body);
   EXPECT_EQ(to_toml(Scene{}), "");

@@ -203,11 +203,20 @@ TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   EXPECT_THAT(with.warnings, testing::Contains(testing::HasSubstr("error bars allow for mass_kg")));
 }
 
-TEST_F(RimFit, APriorThatMeansNothingIsSaidToMeanNothing) {
+TEST_F(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
+  using testing::Contains;
+  using testing::HasSubstr;
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  const auto idle = HasSubstr("counts for nothing");
+  EXPECT_THAT(fitting::fit(std::span(&c.track, 1), c.scene).warnings, Not(Contains(idle)));
   c.scene.fit.prior["mass_gk"] = {0.05, 0.001};
+  c.scene.fit.free_pivot = true;
+  c.scene.model.friction = 0.3;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
-  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("has no 'mass_gk'")));
+  EXPECT_THAT(fit.warnings, Contains(HasSubstr("has no 'mass_gk'")));
+  EXPECT_THAT(fit.warnings, Contains(HasSubstr("free_pivot: model 'rolling' has no pivot")));
+  EXPECT_THAT(fit.warnings, Contains(HasSubstr("[model] friction: model 'rolling'")));
+  EXPECT_THAT(fit.warnings, testing::Not(Contains(HasSubstr("theta_rad"))));  // a hint for others
 }
 
 TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {

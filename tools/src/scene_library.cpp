@@ -7,8 +7,10 @@
 #include <array>
 #include <filesystem>
 
+#include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/model/idle_keys.hpp"
 
 namespace trochoid::tools {
 
@@ -28,6 +30,13 @@ data::Scene load_scene(const std::string& file_or_name) {
   throw InputError(fmt::format(
       "{}: neither a scene file nor a bundled scene; `trochoid simulate --list` names those",
       file_or_name));
+}
+
+void tell_idle_keys(const std::string& scene_name, const data::Scene& scene) {
+  const std::vector<std::string> idle = model::idle_keys(scene);
+  if (idle.empty()) return;
+  note(fmt::format("{}: the model has no use for {}, which count{} for nothing", scene_name,
+                   fmt::join(idle, ", "), idle.size() == 1 ? "s" : ""));
 }
 
 std::string named_by_scene(const std::string& scene, const std::string& message) {

@@ -20,6 +20,9 @@ struct BundledScene {
 /// @throws InputError naming the nearest bundled name if it is neither.
 [[nodiscard]] data::Scene load_scene(const std::string& file_or_name);
 
+/// Says in one line on stderr which keys of the scene its model passes over, if any.
+void tell_idle_keys(const std::string& scene_name, const data::Scene& scene);
+
 /// The message with the scene's name before it where it speaks of one of a scene's keys.
 [[nodiscard]] std::string named_by_scene(const std::string& scene, const std::string& message);
 
