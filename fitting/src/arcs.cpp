@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 
 #include "trochoid/data/error.hpp"
 
@@ -34,14 +35,13 @@ double coordinate(const data::TrackSample& sample, const Bound& bound) {
 
 SampleRange chosen_range(const data::Track& track, const std::string& from, const std::string& to) {
   int first = 0, last = static_cast<int>(track.samples.size());
-  if (!from.empty()) {
-    const Bound bound = parse_bound(from, "from");
-    while (first < last && coordinate(track.samples[first], bound) < bound.value) ++first;
-  }
-  if (!to.empty()) {
-    const Bound bound = parse_bound(to, "to");
-    while (last > first && coordinate(track.samples[last - 1], bound) > bound.value) --last;
-  }
+  std::optional<Bound> low, high;
+  if (!from.empty()) low = parse_bound(from, "from");
+  if (!to.empty()) high = parse_bound(to, "to");
+  if (low && high && low->frame == high->frame && low->value > high->value)
+    throw InputError(fmt::format("--from {} lies after --to {}; exchange them", from, to));
+  while (low && first < last && coordinate(track.samples[first], *low) < low->value) ++first;
+  while (high && last > first && coordinate(track.samples[last - 1], *high) > high->value) --last;
   if (first >= last && track.samples.empty())
     throw InputError(fmt::format("object {} has no sample", track.object));
   if (first >= last) {

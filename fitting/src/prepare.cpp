@@ -153,9 +153,10 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   suit_to_data(problem, scene);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
-    throw InputError(fmt::format(
-        "{} measurements{} cannot determine {} parameters of model '{}'", problem.rows(),
-        problem.arcs.front().held ? " after the body is let go" : "", needed, model));
+    throw InputError(
+        fmt::format("the track's {} measurements{} cannot determine {} parameters of model '{}'",
+                    problem.rows(), problem.arcs.front().held ? " after the body is let go" : "",
+                    needed, model));
   start_decay_within_sight(problem);
   for (const auto& [name, value] : options.start)
     if (const int index = predictor.index_of(name); index >= 0)

@@ -71,10 +71,12 @@ data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& dire
     if (std::abs(direction[i]) < 0.25) continue;
     list += fmt::format("{}{} ({:+.2f})", list.empty() ? "" : ", ", name, direction[i]);
   }
-  vector.words = fmt::format(
-      "the data hardly see the direction {}: moved together they are uncertain by {:.3g} of their "
-      "size",
-      list, sd);
+  vector.words = std::isfinite(sd)
+                     ? fmt::format(
+                           "the data hardly see the direction {}: moved together they are "
+                           "uncertain by {:.3g} of their size",
+                           list, sd)
+                     : fmt::format("the data do not see the direction {}", list);
   return vector;
 }
 

@@ -44,10 +44,12 @@ TEST(Pieces, ABoundBeyondTheTrackIsRefusedWithWhatTheTrackHas) {
   const data::Track track = turning(51, [](double) { return 0.0; });
   EXPECT_EQ(chosen_range(track, "0.5", "f140"), SampleRange(25, 41));
   for (const auto& message : {refusal(track, "1.5", ""), refusal(track, "f151", ""),
-                              refusal(track, "", "f99"), refusal(track, "0.8", "0.2")}) {
+                              refusal(track, "", "f99"), refusal(track, "f130", "0.2")}) {
     EXPECT_THAT(message, testing::HasSubstr("runs from 0 to 1 s")) << message;
     EXPECT_THAT(message, testing::HasSubstr("frames 100 to 150")) << message;
   }
+  for (const auto& message : {refusal(track, "0.8", "0.2"), refusal(track, "f130", "f120")})
+    EXPECT_THAT(message, testing::HasSubstr("exchange them")) << message;
   EXPECT_THAT(refusal(track, "late", ""), testing::HasSubstr("--from late: give seconds"));
 }
 

@@ -74,6 +74,7 @@ TEST(Identifiable, IsWhatTheDataSeeAndNotTheTermsOfASum) {
   EXPECT_NEAR(unseen.at("left_m"), -unseen.at("right_m"), 1e-9) << "one up, the other down";
   EXPECT_NEAR(unseen.at("slope_m_s"), 0.0, 1e-9);
   EXPECT_THAT(error.null_vectors.front().words, testing::HasSubstr("left_m"));
+  EXPECT_THAT(error.null_vectors.front().words, testing::HasSubstr("do not see the direction"));
 }
 
 TEST(Identifiable, IsATermOnceTheOtherIsKnownBeforehand) {

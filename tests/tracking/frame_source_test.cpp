@@ -173,6 +173,9 @@ TEST_F(FrameSourceTest, AWindowKeepsIndexAndTimeOfTheWholeFile) {
   const auto seconds = open_video(clip, {.from = "0.5"});
   EXPECT_EQ(seconds->next()->index, 5);
   EXPECT_THAT(error_of(clip, {.from = "soon"}), HasSubstr("--from soon"));
+  for (const SourceOptions& reversed :
+       {SourceOptions{.from = "0.5", .to = "0.1"}, SourceOptions{.from = "f5", .to = "f1"}})
+    EXPECT_THAT(error_of(clip, reversed), HasSubstr("exchange them"));
 }
 
 TEST_F(FrameSourceTest, DecodingAheadChangesNothing) {

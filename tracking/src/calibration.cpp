@@ -171,7 +171,8 @@ Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_
     rms = cv::calibrateCamera(board, image, size_px, matrix, distortion, rotations, translations,
                               intrinsic_sd, extrinsic_sd, view_rms, cv::CALIB_FIX_K3);
   } catch (const cv::Exception& error) {
-    throw NumericalError(fmt::format("the views determine no camera ({})", error.err));
+    throw NumericalError(
+        fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
   }
   Calibration out;
   data::Camera& camera = out.camera;
@@ -193,8 +194,9 @@ Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_
   if (!std::isfinite(camera.fx) || !(camera.fx > 0.0 && camera.fy > 0.0) ||
       out.sigma_focal_px > kUseless * camera.fx)
     throw NumericalError(
-        "the views determine no camera; tilt the board by 20 to 40 degrees, in "
-        "different directions");
+        fmt::format("{} views of the board determine no camera; tilt it by 20 to 40 degrees, in "
+                    "different directions, in ten pictures or more",
+                    views.size()));
   return out;
 }
 

@@ -49,6 +49,14 @@ bool after(const Bound& bound, const Frame& frame) {
          (bound.t_s && frame.t_s > *bound.t_s + 1e-9);
 }
 
+void check_order(const Bound& from, const Bound& to, const SourceOptions& options) {
+  const bool reversed = (from.frame && to.frame && *from.frame > *to.frame) ||
+                        (from.t_s && to.t_s && *from.t_s > *to.t_s);
+  if (reversed)
+    throw InputError(
+        fmt::format("--from {} lies after --to {}; exchange them", options.from, options.to));
+}
+
 /// Counter-clockwise quarter turns that make the picture upright, 0..3.
 int quarter_turns(const AVStream& stream) {
   const auto* matrix = reinterpret_cast<const std::int32_t*>(
@@ -84,6 +92,7 @@ class LibavSource final : public FrameSource {
         options_(options),
         from_(parse_bound(options.from, "from")),
         to_(parse_bound(options.to, "to")) {
+    check_order(from_, to_, options);
     av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
     open_container(path);
     open_decoder();
