@@ -4,6 +4,7 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "campaign.hpp"
@@ -34,18 +35,25 @@ struct Part {
   [[nodiscard]] bool has(std::size_t index) const { return index % of == number - 1; }
 };
 
-Part parse_part(const std::string& text) {
+std::optional<Part> part_named(const std::string& text) {
   Part part;
   char rest = 0;
-  if (text.empty()) return part;
   if (std::sscanf(text.c_str(), "%zu/%zu%c", &part.number, &part.of, &rest) != 2 ||
       part.number < 1 || part.number > part.of || text.find('-') != std::string::npos)
-    throw InputError(fmt::format("--part {}: give K/N with K in 1..N, e.g. 3/10", text));
+    return std::nullopt;
   return part;
 }
 
+CLI::Validator part_name() {
+  return {[](const std::string& text) {
+            return part_named(text) ? std::string()
+                                    : "'" + text + "' is not K/N with K in 1..N, as in 3/10";
+          },
+          "K/N"};
+}
+
 std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Options& options) {
-  const Part part = parse_part(options.part);
+  const Part part = part_named(options.part).value_or(Part{});
   std::vector<const CampaignItem*> open;
   for (std::size_t i = 0; i < campaign.items.size(); ++i) {
     if (!part.has(i)) continue;
@@ -128,6 +136,7 @@ void add_campaign_command(CLI::App& app) {
   CLI::Option* part = command->add_option(
       "--part", options->part,
       "Only the K-th of N equal shares, K/N, and no summary: for a cluster's array");
+  part->check(part_name());
   command->add_flag("--summary", options->summary_only, "Run nothing, write the summary")
       ->excludes(part);
   add_json_flag(*command, options->json);

@@ -1,5 +1,8 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -57,7 +60,7 @@ void print(const data::Fit& fit) {
   for (const data::FitParameter& p : fit.parameters)
     fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
                word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
-  fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3f}, whiteness p {:.2g}\n",
+  fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3g}, whiteness p {:.2g}\n",
              fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
   fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
              fit.covariance_names.size(), fit.integration_error_sigma);
@@ -102,6 +105,16 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
   return tracks;
 }
 
+// What is wrong with a track is said with its file's name.
+std::string named_by_track(const std::vector<std::string>& paths, const std::string& message) {
+  constexpr std::array<std::string_view, 6> kBegin{"the track",  "track ",  "no track ",
+                                                   "no sample ", "object ", "the covariance "};
+  const bool of_a_track = std::any_of(kBegin.begin(), kBegin.end(), [&](std::string_view begin) {
+    return message.starts_with(begin);
+  });
+  return of_a_track ? fmt::format("{}: {}", fmt::join(paths, ", "), message) : message;
+}
+
 data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& tracks,
                  const data::Scene& scene) {
   fitting::FitOptions options = command.options;
@@ -110,7 +123,11 @@ data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& trac
     options.log = detail;
   else
     options.progress = [&progress](const std::string& stage) { progress.update(stage); };
-  return fit_job(tracks, scene, options, command.compare);
+  try {
+    return fit_job(tracks, scene, options, command.compare);
+  } catch (const InputError& error) {
+    throw InputError(named_by_track(command.tracks, error.what()));
+  }
 }
 
 void run(const FitCommand& command) {

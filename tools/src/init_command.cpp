@@ -201,11 +201,11 @@ void add_init_command(CLI::App& app) {
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
   command
       ->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known: 0.1 to 10000")
-      ->check(CLI::Range(0.1, 10000.0));
+      ->check(number_within(0.1, 10000.0));
   command
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz]: of slow motion, or of an image folder or series")
-      ->check(positive_number());
+      ->check(frame_rate());
   command->add_flag("--force", options->force, "Replace the scene if it exists");
   add_json_flag(*command, options->json);
   command->footer("Example: trochoid init ring.mp4 --radius-mm 30 -o ring.toml");

@@ -31,6 +31,24 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   }
 }
 
+void check_folder(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored)) return;
+  const std::string ending = folder.extension().string();
+  if (fs::exists(folder, ignored) || ending == ".svg" || ending == ".png" || ending == ".pdf")
+    throw InputError(fmt::format("{}: names a file; give a folder for the plots", folder.string()));
+}
+
+void check_length(const std::string& scene, double until_s, double rate_hz, double most,
+                  const std::string& rows) {
+  const double count = until_s * rate_hz;
+  if (count > most)
+    throw InputError(fmt::format(
+        "{}: {:g} s at {:g} Hz make {:.2g} {}, more than {:g}; lower run.rate_hz (--rate) or "
+        "run.until_s (--until)",
+        scene, until_s, rate_hz, count, rows, most));
+}
+
 #ifdef TROCHOID_HAS_TRACKING
 void check_written_video(const fs::path& written, std::int64_t frames, const fs::path& target) {
   std::int64_t promised = -1;

@@ -12,6 +12,15 @@ namespace trochoid::tools {
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);
 
+/// The same for a folder of pictures that is to be made: no file may be in its place, nor its name
+/// be a picture's. @throws InputError naming it.
+void check_folder(const std::filesystem::path& folder);
+
+/// A run has at most `most` rows (whatever `rows` calls them): more are a slip of the pen.
+/// @throws InputError naming the scene, and the keys and options that ask for more.
+void check_length(const std::string& scene, double until_s, double rate_hz, double most,
+                  const std::string& rows);
+
 /// A word as a shell would take it: with anything but plain characters it goes into quotes.
 [[nodiscard]] std::string shell_quoted(const std::string& word);
 

@@ -104,7 +104,7 @@ void add_overlay_command(CLI::App& app) {
   command
       ->add_option("--slow", options->slow,
                    "Play this many times slower (default: at most 60 frames/s)")
-      ->check(CLI::Range(0.01, 1000.0));
+      ->check(number_within(0.01, 1000.0));
   command
       ->add_option("--fit-track", options->fit_track,
                    "Place of this track among those fitted together (0 = first)")

@@ -271,9 +271,12 @@ void run(const Options& options) {
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
   const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : scene.run.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
+  constexpr double kMostFrames = 1e6;  // hours of drawing
+  check_length(options.scene, scene.run.until_s, rate_hz, kMostFrames, "frames");
   scene.run.rate_hz = kPerFrame * rate_hz;
   const model::Trajectory trajectory =
       in_scene(options.scene, [&] { return model::simulate(scene); });
+  tell_idle_keys(options.scene, scene);
   const Motion motion(trajectory, scene.run.rate_hz);
   data::Camera camera = camera_of(options, scene, motion);
   if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
@@ -327,22 +330,22 @@ void run(const Options& options) {
 void add_look_options(CLI::App& command, Options& options) {
   RenderStyle& style = options.style;
   command.add_option("--body", options.body, "Brightness of the body, 0..1")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_within(0.0, 1.0));
   command.add_option("--floor", options.floor, "Brightness of the floor, 0..1")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_within(0.0, 1.0));
   command.add_option("--texture", style.texture, "Of the floor, relative [0.05]")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_within(0.0, 1.0));
   command.add_option("--gloss", style.gloss, "Highlights on the body [0.1]")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(number_within(0.0, 10.0));
   command.add_flag("--no-shadow", options.no_shadow, "The body casts no shadow");
   command.add_option("--blur", style.blur_px, "Of the lens, standard deviation [px, 0.5]")
-      ->check(CLI::Range(0.0, 20.0));
+      ->check(number_within(0.0, 20.0));
   command.add_option("--noise", style.noise_levels, "Standard deviation [8-bit levels, 1]")
-      ->check(CLI::Range(0.0, 100.0));
+      ->check(number_within(0.0, 100.0));
   command.add_option("--exposure", style.exposure_fraction, "Share of the frame interval [0.25]")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_within(0.0, 1.0));
   command.add_option("--flicker", style.flicker, "Relative amplitude at 100 Hz [0]")
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(number_within(0.0, 0.9));
   command.add_option("--samples", style.samples, "Rays across a pixel on an edge [8]")
       ->check(CLI::Range(1, 64));
   command.add_option("--times", style.times, "Pictures averaged over the exposure [5]")
@@ -373,7 +376,7 @@ void add_render_command(CLI::App& app) {
       ->check(CLI::Range(32, 8192))
       ->excludes(camera);
   command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
-      ->check(positive_number());
+      ->check(frame_rate());
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
       ->check(CLI::Range(0, 51));

@@ -336,7 +336,7 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz]: of slow motion, or of an image folder or series")
-      ->check(positive_number());
+      ->check(frame_rate());
   add_effort(
       *command, options->effort,
       "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
@@ -345,7 +345,7 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--slow", options->slow,
                    "Overlay plays this many times slower (default: at most 60 frames/s)")
-      ->check(CLI::Range(0.01, 1000.0));
+      ->check(number_within(0.01, 1000.0));
   command->add_option("--seed", options->seed, "Seed of everything random");
   add_json_flag(*command, options->json);
   command->footer(

@@ -110,6 +110,7 @@ void tell(const Options& options, const model::Trajectory& run, const fs::path& 
   if (options.json)
     return print_json({{"trajectory", output.string()},
                        {"rows", run.values.rows()},
+                       {"status", model::name(run.outcome)},
                        {"outcome", outcome},
                        {"model", run.model},
                        {"integrator", run.integrator},
@@ -127,12 +128,23 @@ bool broke_off(const model::Trajectory& run) {
          run.outcome == Outcome::out_of_domain;
 }
 
+void check_rows(const std::string& scene, const data::RunSettings& run) {
+  constexpr double kMost = 1e7;  // a few GB
+  check_length(scene, run.until_s, run.rate_hz, kMost, "rows");
+  constexpr double kRounding = 1e-9;
+  if (run.until_s * run.rate_hz < 1.0 - kRounding)
+    throw InputError(fmt::format(
+        "{}: {:g} s at {:g} Hz leave no row but the start; raise run.rate_hz (--rate) to {:.3g}",
+        scene, run.until_s, run.rate_hz, 1.0 / run.until_s));
+}
+
 void simulate_scene(const Options& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
   const fs::path output =
       options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
   for (const fs::path& file : {output, options.animation}) check_output(file, {named});
+  if (!options.plots.empty()) check_folder(options.plots);
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) check_animation_name(options.animation);
 #endif
@@ -140,10 +152,12 @@ void simulate_scene(const Options& options) {
                                           : fitted_scene(data::read_fit(options.fit), options.arc);
   apply_overrides(options, scene);
   if (options.steady) return print_steady(scene, options.json);
+  check_rows(named.string(), scene.run);
   const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
   if (run.values.rows() == 0)
     throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
                                  options.scene, model::sentence(run.outcome)));
+  if (options.fit.empty()) tell_idle_keys(options.scene, scene);
   data::Table table = trajectory_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
@@ -188,7 +202,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(positive_number());
   command->add_option("--tolerance", options->tolerance, "Integration tolerance")
-      ->check(CLI::Range(1e-15, 0.1));
+      ->check(number_within(1e-15, 0.1));
   command->add_option("--model", options->model, "Model, instead of the scene's");
   command->add_option("--integrator", options->integrator,
                       "auto, dop853, taylor, cvode-adams, cvode-bdf or arkode");

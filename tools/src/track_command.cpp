@@ -158,7 +158,7 @@ void add_track_command(CLI::App& app) {
   track
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz]: of slow motion, or of an image folder or series")
-      ->check(positive_number());
+      ->check(frame_rate());
   add_effort(
       *track, options->effort,
       "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
