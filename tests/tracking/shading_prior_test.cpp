@@ -18,7 +18,7 @@ struct Drawn {
 };
 
 // Looks at one curve whose shading is drawn with this standard deviation, of its most.
-Drawn looks_beside(double shading_sd, unsigned seed) {
+Drawn looks_beside(double shading_sd, unsigned seed, double of_look = kInformation) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Drawn drawn;
@@ -26,7 +26,7 @@ Drawn looks_beside(double shading_sd, unsigned seed) {
     // Slopes and bends go together, as they do in profiles a few pixels long.
     ShadingMatrix information = ShadingMatrix::Identity();
     information(0, 2) = information(2, 0) = information(1, 3) = information(3, 1) = 0.7;
-    information *= kInformation;
+    information *= of_look;
     Shading truth, noise;
     for (int k = 0; k < kShading; ++k) truth[k] = shading_sd * normal(random);
     for (int k = 0; k < kShading; ++k) noise[k] = normal(random);
@@ -63,6 +63,22 @@ TEST(ShadingPrior, OnPlainSurfacesFreeShadingCostsLittle) {
                                   });
   // What is found of shading that is not there is a fraction of what single looks would find.
   EXPECT_LT(square, 0.35 * free);
+}
+
+constexpr double kClear = 400.0;  // information of one look at a picture with little noise
+
+TEST(ShadingPrior, ACurveThatShowsNoShadingAnywhereIsTakenAsPlain) {
+  const Drawn drawn = looks_beside(0.0, 6, kClear);
+  const double free = mean_variance(drawn, shadings_given(drawn.looks, 1.0));
+  EXPECT_LT(mean_variance(drawn, estimate_shadings(drawn.looks, {})), 0.3 * free);
+}
+
+TEST(ShadingPrior, WhereAPartOfACurveIsShadedNoneOfItIsTakenAsPlain) {
+  Drawn drawn = looks_beside(0.0, 7, kClear);
+  const Drawn shaded = looks_beside(0.8, 8, kClear);
+  for (size_t i = 0; i < kLooks / 6; ++i) drawn.looks[i] = shaded.looks[i];
+  const double free = shadings_given(drawn.looks, 1.0)[2 * kLooks / 3].covariance(0, 0);
+  EXPECT_GT(estimate_shadings(drawn.looks, {})[2 * kLooks / 3].covariance(0, 0), 0.8 * free);
 }
 
 TEST(ShadingPrior, BesideShadowsShadingIsAsFreeAsItIsLarge) {

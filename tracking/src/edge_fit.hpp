@@ -15,8 +15,9 @@ struct ProfileEdge {
   double mean_level = 0.0;  ///< of both levels at the edge
   double inner_slope = 0.0, outer_slope = 0.0;  ///< of the levels at the edge [1/px]
   double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
-  double gain = 0.0;      ///< log-likelihood over "no edge here", of one line
-  int lines = 1;          ///< side by side that were looked at together
+  double wider_variance_px2 = 0.0;  ///< of that, from the noise of the samples
+  double gain = 0.0;                ///< log-likelihood over "no edge here", of one line
+  int lines = 1;                    ///< side by side that were looked at together
 };
 
 /// Fits one level on either side (outside a multiple of the background plate, if `plate`) and the

@@ -481,9 +481,10 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
   const double usual = blur_step(all);
   for (size_t i = 0; i < profiles.size(); ++i) {
     constexpr double kScatter_px = 0.1;
-    const double seen =
-        1.0 / (1.0 + 1.0 / (kScatter_px * kScatter_px * std::max(all[i].blur_information, 1e-9)));
+    const double variance = 1.0 / std::max(all[i].blur_information, 1e-9);
+    const double seen = 1.0 / (1.0 + variance / (kScatter_px * kScatter_px));
     profiles[i].edge.wider_px = seen * (all[i].blur_step - usual);
+    profiles[i].edge.wider_variance_px2 = seen * seen * variance;
   }
   return out;
 }

@@ -104,7 +104,8 @@ std::vector<Surroundings> surroundings_of(const std::vector<StretchProfile>& loo
   const int n = static_cast<int>(looks.size());
   std::vector<Surroundings> out(looks.size());
   for (int i = 0; i < n; ++i) {
-    double inner = 0.0, outer = 0.0, contrast = 1e-3, wider = 0.0, count = 1e-3;
+    double inner = 0.0, outer = 0.0, contrast = 1e-3;
+    double wider = 0.0, wider_variance = 0.0, count = 1e-3;
     for (int j = std::max(0, i - kNeighbours); j <= std::min(n - 1, i + kNeighbours); ++j) {
       const StretchProfile& look = looks[static_cast<size_t>(j)];
       if (!look.found || look.curve != looks[static_cast<size_t>(i)].curve) continue;
@@ -113,10 +114,11 @@ std::vector<Surroundings> surroundings_of(const std::vector<StretchProfile>& loo
       inner += weight * e.inner_slope;
       outer += weight * e.outer_slope;
       contrast += weight * e.contrast;
-      wider += e.wider_px, count += 1.0;
+      wider += e.wider_px, wider_variance += e.wider_variance_px2, count += 1.0;
     }
+    const double wider2 = std::max(0.0, wider * wider - wider_variance);  // beyond the noise
     out[static_cast<size_t>(i)] = {(std::abs(inner) + std::abs(outer)) / std::abs(contrast),
-                                   std::abs(wider) / count, contrast > 0.0,
+                                   std::sqrt(wider2) / count, contrast > 0.0,
                                    std::max(0.0, outer / contrast)};
   }
   return out;

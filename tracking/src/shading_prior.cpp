@@ -9,8 +9,9 @@ namespace trochoid::tracking {
 namespace {
 
 // The least allows for what the model of an edge leaves that is no shading: pixels, compression.
-// Less would suit plain pictures, and misleads where contrast is low or the floor has a pattern.
-constexpr double kLeastVariance = 0.03, kMostVariance = 1.0;
+// Less suits plain pictures, and misleads where contrast is low or the floor has a pattern: it is
+// for curves all of whose looks together show so little.
+constexpr double kPlainVariance = 3e-4, kLeastVariance = 0.03, kMostVariance = 1.0;
 
 // Minimises x^T A x / 2 - b^T x over 0 <= x <= kMostVariance, A positive semidefinite, one
 // coordinate at a time, from x.
@@ -53,12 +54,29 @@ struct Moments {
   [[nodiscard]] Shading variances(const Shading& nearby) const {
     return least_within_bounds(squares, excess, nearby);
   }
+  // From nothing.
+  [[nodiscard]] Shading variances() const {
+    constexpr int kRounds = 4;
+    Shading found = Shading::Zero();
+    for (int round = 0; round < kRounds; ++round) found = variances(found);
+    return found;
+  }
 };
+
+// What a look's slopes and bends may vary by at least, from the sums over its whole curve: as much
+// as these show of any of them, and a standard deviation more (r_k^2 of noise alone has the
+// variance 2 N_kk^2).
+double least_variance(const Moments& curve) {
+  const Eigen::Array<double, kShading, 1> sd =
+      (2.0 / curve.squares.diagonal().array().max(1e-9)).sqrt();
+  const Shading most = curve.variances() + sd.matrix();
+  return std::clamp(most.head<kShading - 1>().maxCoeff(), kPlainVariance, kLeastVariance);
+}
 
 // A strip along the edge, the wall of the body mostly, is lit like nothing else.
 ShadingEstimate estimate(const ShadingEvidence& look, const Shading& expected,
-                         const Shading& seen_variance) {
-  Shading variance = seen_variance.cwiseMax(kLeastVariance);
+                         const Shading& seen_variance, double least_variance) {
+  Shading variance = seen_variance.cwiseMax(least_variance);
   variance[kShading - 1] = kMostVariance;
   ShadingMatrix information = look.normal;
   information.diagonal() += variance.cwiseInverse();
@@ -79,8 +97,9 @@ double sectors_round(double direction_rad, int sectors) {
 std::vector<ShadingEstimate> shadings_given(const std::vector<ShadingEvidence>& looks,
                                             double variance) {
   std::vector<ShadingEstimate> out(looks.size());
+  const Shading given = Shading::Constant(variance);
   for (std::size_t i = 0; i < looks.size(); ++i)
-    if (looks[i].usable) out[i] = estimate(looks[i], Shading::Zero(), Shading::Constant(variance));
+    if (looks[i].usable) out[i] = estimate(looks[i], Shading::Zero(), given, kLeastVariance);
   return out;
 }
 
@@ -98,19 +117,19 @@ std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence
     while (end < looks.size() && looks[end].curve == looks[first].curve) ++end;
     const auto share = static_cast<std::size_t>(kShare * static_cast<double>(end - first));
     const std::size_t reach = std::max(kLeastReach, share);
-    Moments around;
-    const auto add = [&](std::size_t i, double sign) {
-      if (looks[i].usable) around.add(looks[i], rest[i], sign);
+    const auto add = [&](std::size_t i, double sign, Moments& sums) {
+      if (looks[i].usable) sums.add(looks[i], rest[i], sign);
     };
-    for (std::size_t i = first; i < std::min(end, first + reach); ++i) add(i, 1.0);
-    constexpr int kFirstRounds = 4;
-    Shading variances = Shading::Zero();
-    for (int round = 0; round < kFirstRounds; ++round) variances = around.variances(variances);
+    Moments whole, around;
+    for (std::size_t i = first; i < end; ++i) add(i, 1.0, whole);
+    const double least = least_variance(whole);
+    for (std::size_t i = first; i < std::min(end, first + reach); ++i) add(i, 1.0, around);
+    Shading variances = around.variances();
     for (std::size_t i = first; i < end; ++i) {
-      if (i + reach < end) add(i + reach, 1.0);
-      if (i > first + reach) add(i - reach - 1, -1.0);
+      if (i + reach < end) add(i + reach, 1.0, around);
+      if (i > first + reach) add(i - reach - 1, -1.0, around);
       variances = around.variances(variances);
-      if (looks[i].usable) out[i] = estimate(looks[i], expected[i], variances);
+      if (looks[i].usable) out[i] = estimate(looks[i], expected[i], variances, least);
     }
   }
   return out;
