@@ -159,6 +159,20 @@ TEST(Calibration, ReadsACharucoBoardAlsoWhenPartOfItIsHidden) {
   }
 }
 
+// A board that is always square to the camera has the same picture at any focal length.
+TEST(Calibration, RefusesBoardsThatAreNeverTilted) {
+  std::vector<BoardView> views(4);
+  for (std::size_t k = 0; k < views.size(); ++k)
+    for (int row = 0; row < kRows; ++row)
+      for (int column = 0; column < kColumns; ++column) {
+        const Eigen::Vector2d corner(column, row);
+        const auto shift = static_cast<double>(k);
+        views[k].board_m.push_back(kSquare_m * corner);
+        views[k].image_px.push_back(40.0 * corner + Eigen::Vector2d(100.0 + 20.0 * shift, 110.0));
+      }
+  EXPECT_THROW((void)calibrate(views, {640, 480}), NumericalError);
+}
+
 TEST(Calibration, RefusesTooLittle) {
   EXPECT_FALSE(find_board(cv::Mat(240, 320, CV_8UC1, cv::Scalar(128)), {}, "grey"));
   EXPECT_THROW((void)calibrate({}, {640, 480}), InputError);

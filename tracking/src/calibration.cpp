@@ -191,8 +191,10 @@ Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_
   out.sigma_centre_px = std::max(intrinsic_sd.at<double>(2), intrinsic_sd.at<double>(3));
   out.sigma_k1 = intrinsic_sd.at<double>(4);
   constexpr double kUseless = 0.2;
-  if (!std::isfinite(camera.fx) || !(camera.fx > 0.0 && camera.fy > 0.0) ||
-      out.sigma_focal_px > kUseless * camera.fx)
+  // Boards that are never tilted let the focal length run away, with an error bar that is none.
+  constexpr double kLongestLens = 1000.0;  // in pictures' widths: 0.06 degrees from side to side
+  if (!(camera.fx > 0.0 && camera.fy > 0.0) || !(out.sigma_focal_px <= kUseless * camera.fx) ||
+      !(std::max(camera.fx, camera.fy) < kLongestLens * size_px.width))
     throw NumericalError(
         fmt::format("{} views of the board determine no camera; tilt it by 20 to 40 degrees, in "
                     "different directions, in ten pictures or more",
