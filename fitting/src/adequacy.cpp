@@ -197,14 +197,16 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
   fit.verdict_words = fit.reason;
 }
 
-void accept(const Solution& solution, const Uncertainty& error, const Misfit& worst,
-            data::Fit& fit) {
+void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
+            const Misfit& worst, data::Fit& fit) {
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
   const bool doubtful = worst.times > kDoubtful;
+  const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
+                                   [](const ArcData& arc) { return arc.sigma_unknown; });
   std::string words = "the model explains the track";
   if (doubtful)
     words = fmt::format(
@@ -214,12 +216,13 @@ void accept(const Solution& solution, const Uncertainty& error, const Misfit& wo
         kChannelWords[static_cast<int>(worst.channel)], worst.times);
   else if (correlated)
     words += fmt::format(
-        " to {:.2g} times its stated noise; what is left hangs together over {:.2g} s, and the "
-        "error bars are widened {:.2g} times for that",
-        fit.noise_scale, error.whiteness.correlation_time_s, widened);
+        "{}; what is left hangs together over {:.2g} s, and the error bars are widened {:.2g} "
+        "times for that",
+        stated ? fmt::format(" to {:.2g} times its stated noise", fit.noise_scale) : "",
+        error.whiteness.correlation_time_s, widened);
   else
-    words += fmt::format(", and what is left looks like noise ({:.2g} times the stated)",
-                         fit.noise_scale);
+    words += fmt::format(", and what is left looks like noise{}",
+                         stated ? fmt::format(" ({:.2g} times the stated)", fit.noise_scale) : "");
   const std::vector<std::string> open = undetermined(fit);
   fit.verdict = doubtful        ? "doubtful"
                 : !open.empty() ? "weak"
@@ -261,7 +264,7 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                               "model '{}', whose parameters mean nothing here",
                               kPolynomials[degree], fit.model),
                   fit);
-  accept(solution, error, worst, fit);
+  accept(problem, solution, error, worst, fit);
 }
 
 double straying_m(std::span<const data::Track> tracks) {

@@ -107,6 +107,7 @@ TEST(TopFit, NeedsNeitherCovarianceNorSceneNorAFirstTimeOfZero) {
   EXPECT_LT(pull(result, "l_m", 0.1), 4.0);
   EXPECT_LT(result.find("l_m")->sigma, 0.02 * 0.1);
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("no covariances")));
+  EXPECT_THAT(result.verdict_words, testing::Not(testing::HasSubstr("stated")));
 }
 
 TEST(TopFit, FollowsAClockwiseSpinAndAxesBelowTheHorizon) {
