@@ -98,12 +98,15 @@ Views look_at_inputs(const Options& options, const tracking::BoardPattern& patte
       look_through_video(path, pattern, views);
     progress.update(++done, static_cast<std::int64_t>(options.inputs.size()));
   }
-  if (views.found.size() < 3)
-    throw InputError(fmt::format(
-        "the board ({} of {:g} mm) is whole in {} of {} pictures; three are needed. Is --pattern "
-        "the number of {}?",
-        options.pattern, options.square_mm, views.found.size(), views.looked_at,
-        pattern.marker_m ? "squares" : "inner corners"));
+  if (views.found.size() < 3) {
+    const bool in_all = static_cast<int>(views.found.size()) == views.looked_at;
+    throw InputError(
+        fmt::format("the board ({} of {:g} mm) is whole in {} of {} pictures; three are needed{}",
+                    options.pattern, options.square_mm, views.found.size(), views.looked_at,
+                    in_all             ? ", tilted in different directions"
+                    : pattern.marker_m ? ". Is --pattern the number of squares?"
+                                       : ". Is --pattern the number of inner corners?"));
+  }
   return views;
 }
 
@@ -234,17 +237,24 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--marker-mm", options->marker_mm,
                    "Side of a marker [mm]: the board is a ChArUco board")
       ->check(positive_number());
-  command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]");
+  command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]")
+      ->needs("--marker-mm");
   command->add_option("--floor", options->floor,
                       "Picture in which the board lies on the floor [the first]");
   command->add_option("--floor-height-mm", options->floor_height_mm,
                       "Height of that board, of the points or of the circle above the floor [0]");
-  command->add_option("--floor-points", options->floor_points,
-                      "CSV with x_px, y_px, x_m, y_m of four or more points of the floor");
-  command->add_option("--circle-points", options->circle_points,
-                      "CSV with x_px, y_px of points on the rim of a body at rest on its face");
+  command
+      ->add_option("--floor-points", options->floor_points,
+                   "CSV with x_px, y_px, x_m, y_m of four or more points of the floor")
+      ->excludes("--floor");
+  command
+      ->add_option("--circle-points", options->circle_points,
+                   "CSV with x_px, y_px of points on the rim of a body at rest on its face")
+      ->excludes("--floor")
+      ->excludes("--floor-points");
   command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
-      ->check(positive_number());
+      ->check(positive_number())
+      ->needs("--circle-points");
   command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   add_json_flag(*command, options->json);

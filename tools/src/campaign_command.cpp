@@ -140,7 +140,7 @@ void add_campaign_command(CLI::App& app) {
   command->add_flag("--summary", options->summary_only, "Run nothing, write the summary")
       ->excludes(part);
   add_json_flag(*command, options->json);
-  command->add_flag("--again", options->again, "Run also what is done");
+  command->add_flag("--again", options->again, "Run also what is done")->excludes("--summary");
   command->footer(
       "Example:\n  trochoid campaign lab.toml\nwrites lab.campaign/: open summary.html");
   command->callback([options] { run(*options); });

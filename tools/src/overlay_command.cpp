@@ -104,11 +104,13 @@ void add_overlay_command(CLI::App& app) {
   command
       ->add_option("--slow", options->slow,
                    "Play this many times slower (default: at most 60 frames/s)")
-      ->check(number_within(0.01, 1000.0));
+      ->check(number_within(0.01, 1000.0))
+      ->needs("--output");
   command
       ->add_option("--fit-track", options->fit_track,
                    "Place of this track among those fitted together (0 = first)")
-      ->check(non_negative_number());
+      ->check(non_negative_number())
+      ->needs("--fit");
   add_json_flag(*command, options->json);
   command->footer(
       "Example:\n  trochoid overlay ring.mp4 --track ring.track.csv --fit ring.fit.json "

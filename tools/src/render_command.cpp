@@ -380,7 +380,8 @@ void add_render_command(CLI::App& app) {
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
       ->check(CLI::Range(0, 51));
-  command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)");
+  command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)")
+      ->excludes("--crf");
   add_look_options(*command, *options);
   add_json_flag(*command, options->json);
   command->footer(

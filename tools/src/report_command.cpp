@@ -62,7 +62,7 @@ void add_report_command(CLI::App& app) {
       "report", "Write one HTML page that shows a run and opens without a network");
   command->add_option("folder", options->folder, "Folder a run has made");
   command->add_option("--track", options->track, "Track CSV, instead of a folder");
-  command->add_option("--fit", options->fit, "Fit JSON made from that track");
+  command->add_option("--fit", options->fit, "Fit JSON made from that track")->needs("--track");
   command->add_option("-o,--output", options->output, "Page to write, .html")->required();
   command->add_option("--path-svg", options->path_svg,
                       "Also write the path as a picture for papers");

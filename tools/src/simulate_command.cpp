@@ -197,7 +197,8 @@ void add_simulate_command(CLI::App& app) {
   command->add_option(
       "--fit", options->fit,
       "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
-  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0");
+  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0")
+      ->needs("--fit");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(positive_number());
@@ -214,8 +215,11 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--animate", options->animation,
                       "Write a clip of the path being drawn (.mp4)");
 #endif
-  command->add_flag("--steady", options->steady,
-                    "List the steady motions of the scene's body instead of running it");
+  command
+      ->add_flag("--steady", options->steady,
+                 "List the steady motions of the scene's body instead of running it")
+      ->excludes("--output")
+      ->excludes("--plots");
   command->add_flag("--list", options->list, "List the bundled scenes");
   add_json_flag(*command, options->json);
   command->footer("Example: trochoid simulate --scene thesis-base -o base.csv --plots plots/");
