@@ -2,6 +2,7 @@
 
 #include "scene_reader.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
 
 // Scene TOML: docs/formats.md. The keys are listed in scene_keys.hpp.

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "factories.hpp"
-#include "trochoid/data/io.hpp"
+#include "trochoid/data/given_keys.hpp"
 
 namespace trochoid::model {
 namespace {

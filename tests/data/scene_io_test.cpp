@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "files_for_tests.hpp"
+#include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
 
 namespace trochoid::data {

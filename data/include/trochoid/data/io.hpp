@@ -20,9 +20,6 @@ void write_track(const TrackFile& file, const std::filesystem::path& path);
 /// Parses TOML text; `where` stands for the file in messages.
 [[nodiscard]] Scene parse_scene(const std::string& toml, const std::string& where);
 [[nodiscard]] std::string to_toml(const Scene& scene);
-/// What a scene says of motion: the keys of [model], [start] and [run] that differ from their
-/// defaults, as "model.friction".
-[[nodiscard]] std::vector<std::string> given_keys(const Scene& scene);
 
 [[nodiscard]] Fit read_fit(const std::filesystem::path& path);
 /// The text of a fit file, ending in a newline.
