@@ -82,6 +82,22 @@ class Errors(unittest.TestCase):
         with self.assertRaises(trochoid.InputError):
             trochoid.fit(17, model="top")
 
+    def test_a_wrong_kind_of_value_is_named_in_one_line(self):
+        track, fit = noisy_track(), trochoid.fit
+        wrong = [lambda: fit(track, TOP, model=None), lambda: fit(track, TOP, compare="yes"),
+                 lambda: fit(track, TOP, bootstrap=1.5), lambda: fit(track, TOP, threads=-1),
+                 lambda: fit(track, TOP, seed=None), lambda: fit(track, TOP, start={"l_m": "long"}),
+                 lambda: fit(track, TOP, from_=[1.0]), lambda: fit(track, TOP, output=3),
+                 lambda: fit(trochoid.Track(track.t_s, track.centre_m, object=None), TOP),
+                 lambda: fit(trochoid.Track(track.t_s, track.centre_m * 1j), TOP),
+                 lambda: trochoid.TrackFile([track], source=None).write("never.csv"),
+                 lambda: trochoid.read_track(None), lambda: trochoid.predict(None, track),
+                 lambda: trochoid.simulate(TOP, model=None), lambda: trochoid.simulate(TOP, until_s="1")]
+        for number, call in enumerate(wrong):
+            with self.subTest(number), self.assertRaises(trochoid.InputError) as raised:
+                call()
+            self.assertNotIn("\n", str(raised.exception))
+
     def test_everything_public_is_documented(self):
         for name in trochoid.__all__:
             self.assertTrue(inspect.getdoc(getattr(trochoid, name)), name)
@@ -191,6 +207,14 @@ class Recording(unittest.TestCase):
             with self.assertRaises(trochoid.InputError):
                 trochoid.track(SAMPLE / "video.mp4", to="f5", smooth=SAMPLE / "video.mp4")
             self.assertEqual((SAMPLE / "video.mp4").read_bytes(), before)
+            copy = pathlib.Path(folder) / "copy.mp4"
+            copy.write_bytes(before)
+            with self.assertRaisesRegex(trochoid.InputError, "name another output"):
+                trochoid.overlay(copy, file, scene=SAMPLE / "scene.toml", output=copy)
+            self.assertEqual(copy.read_bytes(), before)
+        for wrong in ({"effort": None}, {"objects": 1.5}, {"at_px": 3}, {"rate_hz": "fast"}):
+            with self.assertRaisesRegex(trochoid.InputError, next(iter(wrong))):
+                trochoid.track(SAMPLE / "video.mp4", **wrong)
         with self.assertRaisesRegex(trochoid.InputError, "quick, normal or exact"):
             trochoid.track(SAMPLE / "video.mp4", effort="hasty")
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "trochoid/data/error.hpp"
 
@@ -29,15 +30,22 @@ std::string words_of(const std::vector<py::ssize_t>& shape) {
   return fmt::format("({})", fmt::join(shape, ", "));
 }
 
+/// Empty where numpy would have to make numbers of something else: of complex ones, of dates.
+Values numbers_of(const py::object& given) {
+  const py::array array = py::array::ensure(given);
+  constexpr std::string_view kOtherKinds = "cmM";
+  const bool other = array && kOtherKinds.find(array.dtype().kind()) != std::string_view::npos;
+  Values values = array && !other ? Values::ensure(array) : py::reinterpret_steal<Values>(nullptr);
+  PyErr_Clear();
+  return values;
+}
+
 /// The array of that name with the shape asked for, or nothing if it is None or absent.
 std::optional<Values> values_of(const py::dict& arrays, const char* name,
                                 const std::vector<py::ssize_t>& shape, const std::string& where) {
   if (!arrays.contains(name) || arrays[name].is_none()) return std::nullopt;
-  const Values values = Values::ensure(arrays[name]);
-  if (!values) {
-    PyErr_Clear();
-    throw InputError(fmt::format("{}: {} is not an array of numbers", where, name));
-  }
+  const Values values = numbers_of(arrays[name]);
+  if (!values) throw InputError(fmt::format("{}: {} is not an array of numbers", where, name));
   const std::vector<py::ssize_t> got(values.shape(), values.shape() + values.ndim());
   if (got != shape)
     throw InputError(fmt::format("{}: {} has the shape {}, expected {}", where, name, words_of(got),
@@ -121,11 +129,9 @@ py::dict arrays_of(const data::Track& track) {
 
 data::Track track_of(const py::dict& arrays, const std::string& where) {
   if (!arrays.contains("t_s")) throw InputError(where + ": t_s is missing");
-  const Values t_s = Values::ensure(arrays["t_s"]);
-  if (!t_s || t_s.ndim() != 1) {
-    PyErr_Clear();
+  const Values t_s = numbers_of(arrays["t_s"]);
+  if (!t_s || t_s.ndim() != 1)
     throw InputError(where + ": t_s is not a one-dimensional array of numbers");
-  }
   const py::ssize_t n = t_s.shape(0);
   const auto frame = values_of(arrays, "frame", {n}, where);
   const auto centre_m = values_of(arrays, "centre_m", {n, 2}, where);
@@ -174,9 +180,9 @@ data::TrackFile file_of(const py::dict& dict) {
   file.made_by = dict["made_by"].cast<std::string>();
   file.angles_folded = dict["angles_folded"].cast<bool>();
   file.notes = dict["notes"].cast<std::vector<std::string>>();
-  int number = 0;
+  int number = 0;  // counted as fits count them
   for (const py::handle track : dict["tracks"])
-    file.tracks.push_back(track_of(track.cast<py::dict>(), fmt::format("track {}", number++)));
+    file.tracks.push_back(track_of(track.cast<py::dict>(), fmt::format("track {}", ++number)));
   if (file.tracks.empty()) throw InputError("there is no track; give at least one");
   return file;
 }

@@ -7,6 +7,7 @@
 #include "arrays.hpp"
 #include "fit_job.hpp"
 #include "interruptible.hpp"
+#include "outputs.hpp"
 #include "prediction.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
@@ -15,7 +16,6 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
 #ifdef TROCHOID_HAS_TRACKING
-#include "outputs.hpp"
 #include "overlay.hpp"
 #include "run_folder.hpp"
 #include "track_options.hpp"
@@ -43,7 +43,8 @@ data::Scene checked(const data::Scene& scene) {
 std::vector<data::Track> tracks_of(const py::list& list) {
   std::vector<data::Track> tracks;
   for (const py::handle track : list)
-    tracks.push_back(track_of(track.cast<py::dict>(), "track " + std::to_string(tracks.size())));
+    tracks.push_back(
+        track_of(track.cast<py::dict>(), "track " + std::to_string(tracks.size() + 1)));
   return tracks;
 }
 
@@ -143,9 +144,6 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   how.from = options["from"].cast<std::string>();
   how.to = options["to"].cast<std::string>();
   how.effort = tools::effort_named(options["effort"].cast<std::string>());
-  for (const char* target : {"edges", "smooth"})
-    if (!options[target].is_none())
-      tools::check_output(options[target].cast<fs::path>(), {video, camera_file.value_or("")});
   if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {
@@ -318,6 +316,7 @@ PYBIND11_MODULE(_core, module) {
     data::write_track(file_of(file), path);
   });
   module.def("sha256_of_file", &data::sha256_of_file);
+  module.def("check_output", &tools::check_output);
   module.def("simulate", &simulate);
   module.def("fit", &fit);
   module.def("predict", &predict);

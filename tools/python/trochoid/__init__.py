@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Mapping, Optional, Sequence, Union
+import reprlib
+from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -37,9 +38,60 @@ Path = Union[str, "os.PathLike[str]"]
 Moment = Union[None, str, float, int]
 
 
+def _wrong(name: str, value: Any, right: str) -> InputError:
+    return InputError(f"{name} = {reprlib.repr(value)} must be {right}")
+
+
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise _wrong(name, value, "a text (str)")
+    return value
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise _wrong(name, value, "True or False")
+    return bool(value)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise _wrong(name, value, "a number")
+    return float(value)
+
+
+def _whole(name: str, value: Any, most: int = 2**31 - 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= value <= most:
+        raise _wrong(name, value, f"a whole number in 0..{most}")
+    return int(value)
+
+
+def _path(name: str, value: Any) -> str:
+    if not isinstance(value, (str, bytes, os.PathLike)):
+        raise _wrong(name, value, "a path")
+    return os.fsdecode(value)
+
+
+def _optional(check: Callable[..., Any], name: str, value: Any) -> Any:
+    return None if value is None else check(name, value)
+
+
+def _output(name: str, value: Optional[Path], *inputs: Any) -> Optional[str]:
+    """Before the work, so that a wrong name costs no time and none of the files that are read."""
+    if value is None:
+        return None
+    _core.check_output(_path(name, value), [os.fsdecode(i) for i in inputs
+                                            if isinstance(i, (str, bytes, os.PathLike))])
+    return os.fsdecode(value)
+
+
 def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_)):
         return "true" if value else "false"
+    if isinstance(value, os.PathLike):
+        value = os.fsdecode(value)
     if isinstance(value, str):
         return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
     if isinstance(value, Mapping):
@@ -77,13 +129,13 @@ class Scene:
         elif isinstance(scene, Mapping):
             self._value = _core.SceneValue.parse(_toml(scene))
         else:
-            self._value = _core.SceneValue.load(os.fspath(scene))
+            self._value = _core.SceneValue.load(_path("scene", scene))
 
     @classmethod
     def from_toml(cls, text: str) -> "Scene":
         """A scene from the text of a scene file."""
         scene = cls()
-        scene._value = _core.SceneValue.parse(text)
+        scene._value = _core.SceneValue.parse(_text("text", text))
         return scene
 
     @property
@@ -140,13 +192,24 @@ class TrackFile:
 
     def write(self, path: Path) -> None:
         """Writes the track file (CSV), whole or not at all."""
-        _core.write_track(_file_dict(self), path)
+        _core.write_track(_file_dict(self), _path("path", path))
+
+
+def _track_dict(track: Track) -> dict[str, Any]:
+    if not isinstance(track, Track):
+        raise _wrong("track", track, "a Track")
+    return {**vars(track), "object": _whole("object", track.object)}
 
 
 def _file_dict(file: TrackFile) -> dict[str, Any]:
-    fields = {name: getattr(file, name) for name in
-              ("source", "source_sha256", "camera", "made_by", "angles_folded", "notes")}
-    return {**fields, "tracks": [vars(track) for track in file.tracks]}
+    fields: dict[str, Any] = {name: _text(name, getattr(file, name)) for name in
+                              ("source", "source_sha256", "camera", "made_by")}
+    fields["angles_folded"] = _flag("angles_folded", file.angles_folded)
+    for name in ("notes", "tracks"):
+        if not isinstance(getattr(file, name), (list, tuple)):
+            raise _wrong(name, getattr(file, name), "a list")
+    fields["notes"] = [_text("notes", note) for note in file.notes]
+    return {**fields, "tracks": [_track_dict(track) for track in file.tracks]}
 
 
 def _file(values: dict[str, Any], summary: Optional[dict[str, Any]] = None) -> TrackFile:
@@ -156,11 +219,13 @@ def _file(values: dict[str, Any], summary: Optional[dict[str, Any]] = None) -> T
 
 def read_track(path: Path) -> TrackFile:
     """Reads a track CSV; a bare ``t_s,x_m,y_m`` will do."""
-    return _file(_core.read_track(path))
+    return _file(_core.read_track(_path("path", path)))
 
 
-def _moment(value: Moment) -> str:
-    return "" if value is None else str(value)
+def _moment(name: str, value: Moment) -> str:
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else str(_number(name, value))
 
 
 def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
@@ -182,9 +247,19 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
     smooth   write smoothed positions and velocities [m, m/s] into this CSV; never fit these
     output   write the track into this CSV
     """
-    options = {"objects": objects, "from": _moment(from_), "to": _moment(to), "at_px": at_px,
-               "rate_hz": rate_hz, "effort": effort, "edges": edges, "smooth": smooth}
-    values, summary = _core.track(video, Scene(scene)._value, camera, options)
+    if at_px is not None:
+        if not isinstance(at_px, (Sequence, np.ndarray)) or len(at_px) != 2:
+            raise _wrong("at_px", at_px, "a point (x, y)")
+        at_px = (_number("at_px", at_px[0]), _number("at_px", at_px[1]))
+    inputs = video, scene, camera
+    options = {"objects": _optional(_whole, "objects", objects), "from": _moment("from_", from_),
+               "to": _moment("to", to), "at_px": at_px,
+               "rate_hz": _optional(_number, "rate_hz", rate_hz), "effort": _text("effort", effort),
+               "edges": _output("edges", edges, *inputs, output),
+               "smooth": _output("smooth", smooth, *inputs, output, edges)}
+    output = _output("output", output, *inputs)
+    values, summary = _core.track(_path("video", video), Scene(scene)._value,
+                                  _optional(_path, "camera", camera), options)
     file = _file(values, summary)
     if output is not None:
         file.write(output)
@@ -250,12 +325,16 @@ class Fit:
 
     def write(self, path: Path) -> None:
         """Writes the fit file (JSON), whole or not at all."""
-        _core.write_fit(self._value, path)
+        _core.write_fit(self._value, _path("path", path))
 
 
 def read_fit(path: Path) -> Fit:
     """Reads a fit JSON."""
-    return Fit(_core.read_fit(path))
+    return Fit(_core.read_fit(_path("path", path)))
+
+
+def _fit(given: Union[Path, Fit]) -> Fit:
+    return given if isinstance(given, Fit) else Fit(_core.read_fit(_path("fit", given)))
 
 
 def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, model: str = "",
@@ -280,10 +359,19 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
         raise InputError("fit: give a scene, or model='top' (the only one that needs no body)")
     if isinstance(scene, (str, os.PathLike)) and os.path.isfile(scene):
         inputs[os.path.basename(os.fspath(scene))] = _core.sha256_of_file(scene)
-    options = {"model": model, "from": _moment(from_), "to": _moment(to), "free_pivot": free_pivot,
-               "profile": profile, "bootstrap": bootstrap, "threads": threads, "seed": seed,
-               "start": dict(start or {})}
-    result = Fit(_core.fit([vars(t) for t in values], Scene(scene)._value, compare, options, inputs))
+    if not isinstance(start, (type(None), Mapping)):
+        raise _wrong("start", start, "a dict of numbers by parameter name")
+    first_guess = {_text("start", name): _number(f"start[{name!r}]", value)
+                   for name, value in (start or {}).items()}
+    options = {"model": _text("model", model), "from": _moment("from_", from_),
+               "to": _moment("to", to), "free_pivot": _flag("free_pivot", free_pivot),
+               "profile": _flag("profile", profile), "bootstrap": _whole("bootstrap", bootstrap),
+               "threads": _whole("threads", threads), "seed": _whole("seed", seed, most=2**64 - 1),
+               "start": first_guess}
+    files = [tracks, *tracks] if isinstance(tracks, (list, tuple)) else [tracks]
+    output = _output("output", output, scene, *files)
+    result = Fit(_core.fit([_track_dict(t) for t in values], Scene(scene)._value,
+                           _flag("compare", compare), options, inputs))
     if output is not None:
         result.write(output)
     return result
@@ -300,11 +388,11 @@ class PredictedArc:
     ended: str              #: why it stops before the arc does, else empty
 
 
-def predict(fit: Fit, tracks: Union[Path, Track, TrackFile], *,
+def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
             fit_track: int = 0) -> list[PredictedArc]:
     """Replays a fit over the track it was made from; ``fit_track`` counts tracks fitted together."""
     file = TrackFile(_all_tracks(tracks)[0])
-    arcs = _core.predict(fit._value, _file_dict(file), fit_track)
+    arcs = _core.predict(_fit(fit)._value, _file_dict(file), _whole("fit_track", fit_track))
     return [PredictedArc(**arc) for arc in arcs]
 
 
@@ -318,7 +406,7 @@ class OverlayFrames:
     t_s: np.ndarray        #: (k,) [s]
 
 
-def overlay(video: Path, track: Union[Path, TrackFile], fit: Union[None, Path, Fit] = None, *,
+def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, Path, Fit] = None, *,
             scene: Union[None, Path, Mapping, Scene] = None, camera: Optional[Path] = None,
             output: Optional[Path] = None, still: Optional[Path] = None, from_: Moment = None,
             to: Moment = None, slow: float = 0.0, fit_track: int = 0) -> OverlayFrames:
@@ -331,13 +419,19 @@ def overlay(video: Path, track: Union[Path, TrackFile], fit: Union[None, Path, F
     """
     if output is None and still is None:
         raise InputError("overlay: nothing to write; give output='overlay.mp4', still='path.png' or both")
-    file = track if isinstance(track, TrackFile) else read_track(track)
-    if fit is not None and not isinstance(fit, Fit):
-        fit = read_fit(fit)
-    options = {"output": output or "", "still": still or "", "from": _moment(from_),
-               "to": _moment(to), "slow": slow, "fit_track": fit_track}
-    frames = _core.overlay(video, _file_dict(file), fit._value if fit is not None else None,
-                           Scene(scene)._value if scene is not None else None, camera, options)
+    inputs = video, track, fit, scene, camera
+    if _number("slow", slow) != 0.0 and not 0.01 <= slow <= 1000.0:
+        raise _wrong("slow", slow, "0 or a number in 0.01..1000")
+    options = {"output": _output("output", output, *inputs) or "",
+               "still": _output("still", still, *inputs, output) or "",
+               "from": _moment("from_", from_), "to": _moment("to", to),
+               "slow": float(slow),
+               "fit_track": _whole("fit_track", fit_track)}
+    file = track if isinstance(track, TrackFile) else TrackFile(_all_tracks(track)[0])
+    frames = _core.overlay(_path("video", video), _file_dict(file),
+                           _fit(fit)._value if fit is not None else None,
+                           Scene(scene)._value if scene is not None else None,
+                           _optional(_path, "camera", camera), options)
     return OverlayFrames(**frames)
 
 
@@ -376,5 +470,8 @@ def simulate(scene: Union[Path, Mapping, Scene], *, until_s: Optional[float] = N
     integrator        auto, dop853, taylor, cvode-adams, cvode-bdf or arkode
     output            write the trajectory into this CSV
     """
-    value = Scene(scene)._value.with_run(until_s, rate_hz, tolerance, model, integrator)
-    return Trajectory(**_core.simulate(value, output or ""))
+    value = Scene(scene)._value.with_run(
+        _optional(_number, "until_s", until_s), _optional(_number, "rate_hz", rate_hz),
+        _optional(_number, "tolerance", tolerance), _text("model", model),
+        _text("integrator", integrator))
+    return Trajectory(**_core.simulate(value, _output("output", output, scene) or ""))
