@@ -129,6 +129,10 @@ void fit(Run& run, const Options& options) {
     // The quick way takes the model the support suggests, the others compare what could apply.
     if (named || options.effort == tracking::Effort::quick) {
       run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
+      if (!named && !run.fit->converged)
+        run.fit->warnings.emplace_back(
+            "a quick run fits one model, without losses the scene does not list; without --effort "
+            "quick the models that make sense are compared");
     } else {
       fitting::Comparison comparison = fitting::compare(run.tracked.file.tracks, run.scene, how);
       run.fit = std::move(comparison.fit);
