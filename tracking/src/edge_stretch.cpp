@@ -16,10 +16,27 @@ constexpr double kLeastNoise2 = 0.05;  // [8-bit levels squared]
 // inside and outside, by how much a strip at the edge differs from the rest of the body; blur.
 constexpr int kOwn = 3, kAll = kOwn + kShading + 1;
 
+using ShadingF = Eigen::Matrix<float, kShading, 1>;
+
+// Of each sample: how much of it lies outside of an edge that sweeps and how fast that grows, and
+// the same of a slope and a bend there. Shading goes along with the edge, as a shadow does: a slope
+// taken for one that stays where it is would shift the edge by the sweep's square times the slope
+// over twelve times the contrast.
 struct Columns {
-  std::array<float, Profile::kMost> share, density, ground, strip;
-  std::array<float, Profile::kMost>
-      widening;  // of the share: derivative by the logarithm of the blur
+  using Samples = std::array<float, Profile::kMost>;
+  Samples share, sloping, bending;
+  Samples density, sloping_density, bending_density;
+  Samples ground, strip;
+  float sharp_px = 1.0f;  // blur of each step
+  float square = 0.0f;    // mean one of the steps' distances from the middle of the sweep [px^2]
+
+  // Of unit slopes and bends inside and outside and of a strip.
+  [[nodiscard]] ShadingF shading_columns(size_t k, float s) const {
+    return {s - sloping[k], sloping[k] * ground[k], s * s + square - bending[k],
+            bending[k] * ground[k], strip[k]};
+  }
+  // By how much more light comes as the blur grows [1/px], per contrast.
+  [[nodiscard]] float widening(size_t k) const { return sloping_density[k] / sharp_px; }
 };
 
 // Sums of squared residuals and their degrees of freedom beside the edge, inside and outside, and
@@ -62,10 +79,11 @@ struct Working {
   Noise noise;
 };
 
-// The mean of the steps of a profile at s, its derivative by s, and that by the logarithm of the
-// blur.
+// The means over the steps of a profile at s: of the step, times the distance from it and times its
+// square, and of the derivative by s alike.
 struct Ramp {
-  float share = 0.0f, density = 0.0f, widening = 0.0f;
+  float share = 0.0f, sloping = 0.0f, bending = 0.0f;
+  float density = 0.0f, sloping_density = 0.0f, bending_density = 0.0f;
 };
 
 Ramp ramp_at(const StretchProfile& p, float s) {
@@ -73,17 +91,26 @@ Ramp ramp_at(const StretchProfile& p, float s) {
   Ramp ramp;
   const bool swept = p.steps > 0;
   const int count = swept ? p.steps : 1;
+  const float part = 1.0f / static_cast<float>(count);
   const float inverse = 1.0f / static_cast<float>(swept ? p.sharp_px : p.blur_px);
   for (int k = 0; k < count; ++k) {
-    const float x = (swept ? s - p.step_at_px[static_cast<size_t>(k)] : s) * inverse;
-    const auto step = table.at(x);
-    ramp.share += step.share, ramp.density += step.density, ramp.widening += step.density * x;
+    const float off = swept ? s - p.step_at_px[static_cast<size_t>(k)] : s;
+    const auto step = table.at(off * inverse);
+    const float share = part * step.share, density = part * inverse * step.density;
+    ramp.share += share, ramp.sloping += off * share, ramp.bending += off * off * share;
+    ramp.density += density, ramp.sloping_density += off * density;
+    ramp.bending_density += off * off * density;
   }
-  const float part = 1.0f / static_cast<float>(count);
-  return {part * ramp.share, part * inverse * ramp.density, part * inverse * ramp.widening};
+  return ramp;
 }
 
 void columns_of(const StretchProfile& p, Columns& c) {
+  c.sharp_px = static_cast<float>(p.steps > 0 ? p.sharp_px : p.blur_px);
+  c.square = 0.0f;
+  for (int k = 0; k < p.steps; ++k) {
+    const float at = p.step_at_px[static_cast<size_t>(k)];
+    c.square += at * at / static_cast<float>(p.steps);
+  }
   const auto strip = static_cast<float>(p.strip_px);
   float mean = 0.0f;
   for (int j = 0; j < p.profile.count; ++j) mean += p.profile.background[static_cast<size_t>(j)];
@@ -92,9 +119,9 @@ void columns_of(const StretchProfile& p, Columns& c) {
   for (int j = 0; j < p.profile.count; ++j) {
     const auto k = static_cast<size_t>(j);
     const Ramp ramp = ramp_at(p, p.profile.s_px[k]);
-    c.share[k] = ramp.share;
-    c.density[k] = ramp.density;
-    c.widening[k] = ramp.widening;
+    c.share[k] = ramp.share, c.sloping[k] = ramp.sloping, c.bending[k] = ramp.bending;
+    c.density[k] = ramp.density, c.sloping_density[k] = ramp.sloping_density;
+    c.bending_density[k] = ramp.bending_density;
     c.strip[k] = p.strip_px > 0.0 ? ramp_at(p, p.profile.s_px[k] + strip).share - ramp.share : 0.0f;
     c.ground[k] = p.plate ? scale * p.profile.background[k] : 1.0f;
   }
@@ -125,10 +152,9 @@ void accumulate(const StretchProfile& p, const Columns& c, const Variances& nois
     const float s = p.profile.s_px[k], ground = c.ground[k];
     const float a = 1.0f - c.share[k], b = c.share[k] * ground;
     const float contrast = w.inner - w.outer * ground, d = contrast * c.density[k];
-    const float sa = s * a, sb = s * b;
     rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
-    rows(j, 3) = sa, rows(j, 4) = sb, rows(j, 5) = s * sa, rows(j, 6) = s * sb;
-    rows(j, 7) = c.strip[k], rows(j, 8) = contrast * c.widening[k];
+    rows.row(j).segment<kShading>(kOwn) = c.shading_columns(k, s).transpose();
+    rows(j, kAll - 1) = contrast * c.widening(k);
     rows(j, kAll) = p.profile.light[k] - w.inner * a - w.outer * b;
     rows.row(j) *= 1.0f / std::sqrt(variance_at(noise, c.share[k]));
   }
@@ -329,7 +355,7 @@ void find_noise(const StretchProfile& p, const Columns& c, const Variances& assu
   const Eigen::Matrix3d inverse = m.inverse();
   const Eigen::Vector3f own = (inverse * r).cast<float>();
   const Eigen::Matrix3f leverage = inverse.cast<float>();
-  const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
+  const ShadingF v = w.shading.cast<float>();
   const float inner = w.inner + own[0], outer = w.outer + own[1];
   const double own_share = 1.0 / p.profile.shared;
   w.noise = {};
@@ -337,8 +363,8 @@ void find_noise(const StretchProfile& p, const Columns& c, const Variances& assu
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px[k], a = 1.0f - c.share[k], b = c.share[k] * c.ground[k];
     const float d = (w.inner - w.outer * c.ground[k]) * c.density[k];
-    const float rest = p.profile.light[k] - shaded(inner, v[0], v[2], s) * a -
-                       shaded(outer, v[1], v[3], s) * b - v[4] * c.strip[k] - own[2] * d;
+    const float rest =
+        p.profile.light[k] - inner * a - outer * b - c.shading_columns(k, s).dot(v) - own[2] * d;
     const Eigen::Vector3f row(a, b, d);
     const double free =
         own_share - static_cast<double>(row.dot(leverage * row) / variance_at(assumed, c.share[k]));
@@ -375,9 +401,30 @@ std::vector<Variances> noise_of_neighbours(const std::vector<Working>& all,
   return out;
 }
 
+// The light beside an edge that was found, and how much speaks for it.
+void describe_edge(StretchProfile& p, const Columns& c, const Working& w, float beside) {
+  ProfileEdge& e = p.edge;
+  const ShadingF v = w.shading.cast<float>();
+  const auto s = static_cast<float>(e.offset_px);
+  const float ground = c.ground[p.profile.nearest(e.offset_px)];
+  const double inner = shaded(w.inner, v[0], v[2], s) + beside;
+  e.contrast = shaded(w.outer, v[1], v[3], s) * ground - inner;
+  e.mean_level = inner + 0.5 * e.contrast;
+  e.inner_slope = v[0] + 2.0f * s * v[2];
+  e.outer_slope = (v[1] + 2.0f * s * v[3]) * ground;
+  const double square = w.noise.square.sum();
+  const double freedom = std::max(1.0, w.noise.freedom.sum());
+  constexpr double kLeastGainNoise2 = 0.1;
+  e.lines = p.profile.lines;
+  e.gain = 0.5 * freedom / p.profile.lines *
+           std::log((square_without_edge(p.profile, p.plate) / p.profile.shared +
+                     freedom * kLeastGainNoise2) /
+                    (square + freedom * kLeastGainNoise2));
+}
+
 // The offset with slopes given, samples weighed by their noise.
 void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, const Working& w) {
-  const Eigen::Matrix<float, kShading, 1> v = w.shading.cast<float>();
+  const ShadingF v = w.shading.cast<float>();
   const float beside = p.strip_px > 0.0 ? v[4] : 0.0f;  // of the edge the strip's level counts
   // a, b, d and the residual, the first three with their weights beside; then the shading.
   Eigen::Matrix<float, Profile::kMost, 4 + kOwn + kShading> rows;
@@ -386,15 +433,14 @@ void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, con
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px[k], ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
-    const float inner = shaded(w.inner, v[0], v[2], s), outer = shaded(w.outer, v[1], v[3], s);
     const float weight = 1.0f / variance_at(noise, share);
-    const float d = (inner + beside - outer * ground) * c.density[k];
-    const float sa = s * a, sb = s * b;
+    const float d = (w.inner + beside - w.outer * ground) * c.density[k] +
+                    (v[0] - v[1] * ground) * c.sloping_density[k] +
+                    (v[2] - v[3] * ground) * c.bending_density[k];
     rows(j, 0) = a, rows(j, 1) = b, rows(j, 2) = d;
-    rows(j, 3) = p.profile.light[k] - inner * a - outer * b - v[4] * c.strip[k];
+    rows(j, 3) = p.profile.light[k] - w.inner * a - w.outer * b - c.shading_columns(k, s).dot(v);
     rows(j, 4) = weight * a, rows(j, 5) = weight * b, rows(j, 6) = weight * d;
-    rows(j, 7) = sa, rows(j, 8) = sb, rows(j, 9) = s * sa, rows(j, 10) = s * sb;
-    rows(j, 11) = c.strip[k];
+    rows.row(j).tail<kShading>() = c.shading_columns(k, s).transpose();
   }
   rows.middleRows(count, whole - count).setZero();
   const auto sum = [&](int m, int l) {
@@ -425,21 +471,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, con
   const double strip_prior2 = std::pow(w.light * largest_shading()[kStrip], 2);
   e.strip_variance_px2 =
       std::pow(pull[kStrip] * w.shading_covariance(kStrip, kStrip), 2) / strip_prior2;
-  const auto s = static_cast<float>(offset);
-  const float ground = c.ground[p.profile.nearest(offset)];
-  const double inner = shaded(w.inner, v[0], v[2], s) + beside;
-  e.contrast = shaded(w.outer, v[1], v[3], s) * ground - inner;
-  e.mean_level = inner + 0.5 * e.contrast;
-  e.inner_slope = v[0] + 2.0f * s * v[2];
-  e.outer_slope = (v[1] + 2.0f * s * v[3]) * ground;
-  const double square = w.noise.square.sum();
-  const double freedom = std::max(1.0, w.noise.freedom.sum());
-  constexpr double kLeastGainNoise2 = 0.1;
-  e.lines = p.profile.lines;
-  e.gain = 0.5 * freedom / p.profile.lines *
-           std::log((square_without_edge(p.profile, p.plate) / p.profile.shared +
-                     freedom * kLeastGainNoise2) /
-                    (square + freedom * kLeastGainNoise2));
+  describe_edge(p, c, w, beside);
   p.found = true;
 }
 

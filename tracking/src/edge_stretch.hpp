@@ -35,9 +35,9 @@ struct StretchFit {
 
 /// Fits the profiles of an outline, linearly about s = 0: the best estimate for averaging, however
 /// noisy. Each has its own levels, which may change along the normal, linearly and with a bend, by
-/// a few per cent of the light (shading, soft shadows); how noisy either side is, is common to
-/// neighbours: the relief of a coin and the floor are not equally noisy, and a single profile has
-/// too few degrees of freedom to know its own.
+/// a few per cent of the light (shading, soft shadows; along with an edge that moves); how noisy
+/// either side is, is common to neighbours: the relief of a coin and the floor are not equally
+/// noisy, and a single profile has too few degrees of freedom to know its own.
 /// @param known what other frames show of the light beside these curves.
 /// @param weighed light and blur too, by how noisy samples inside, outside and on the edge are, in
 /// a second pass over what a first one leaves; without, only the offsets.
