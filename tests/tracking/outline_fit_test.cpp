@@ -171,6 +171,55 @@ TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSay) {
   EXPECT_NEAR(mean_square_pull(profiles), 1.0, kPullTolerance);
 }
 
+// A black edge on white with noise that is even in the levels of a picture, as a camera's is after
+// its transfer curve: in the light it is many times larger on the bright side than on the dark one.
+std::vector<StretchProfile> profiles_of_a_camera(bool curved) {
+  constexpr double kBlur_px = 0.7, kBody = 0.04, kFloor = 0.85, kNoise_levels = 2.0,
+                   kReach_px = 4.0;
+  const auto level_of = [](double light) {
+    return 255.0 * (1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
+  };
+  const auto light_of = [](double level) { return std::pow((level / 255.0 + 0.055) / 1.055, 2.4); };
+  std::mt19937 random(9);
+  std::normal_distribution<double> noise(0.0, kNoise_levels);
+  std::uniform_real_distribution<double> phase(0.0, 1.0);
+  std::vector<StretchProfile> profiles;
+  for (int i = 0; i < kMany; ++i) {
+    StretchProfile p;
+    p.profile.count = static_cast<int>(2.0 * kReach_px);
+    p.profile.shared = 1.0;
+    p.blur_px = kBlur_px;
+    p.curved = curved;
+    const double first_px = phase(random) - kReach_px;
+    for (int j = 0; j < p.profile.count; ++j) {
+      const auto k = static_cast<size_t>(j);
+      const double s = first_px + j;
+      const double share = 0.5 * std::erfc(-s / (kBlur_px * std::numbers::sqrt2));
+      const double level = level_of(kBody + (kFloor - kBody) * share) + noise(random);
+      p.profile.s_px[k] = static_cast<float>(s);
+      p.profile.light[k] = static_cast<float>(255.0 * light_of(level));
+      p.profile.background[k] = 0.0f;
+    }
+    profiles.push_back(p);
+  }
+  return profiles;
+}
+
+TEST(EdgeStretch, TheDarkSideOfAnEdgeCountsForMoreWherePicturesAreBrightByACurve) {
+  const auto mean_square_px2 = [](const std::vector<StretchProfile>& profiles) {
+    double sum = 0.0;
+    for (const StretchProfile& p : profiles) sum += p.edge.offset_px * p.edge.offset_px;
+    return sum / static_cast<double>(profiles.size());
+  };
+  std::vector<StretchProfile> curved = profiles_of_a_camera(true),
+                              straight = profiles_of_a_camera(false);  // of the same noise
+  fit_stretches(curved);
+  fit_stretches(straight);
+  EXPECT_NEAR(mean_square_pull(curved), 1.0, kPullTolerance);
+  // Weights by side alone lose a sixth of what is to be known at these levels.
+  EXPECT_LT(mean_square_px2(curved), 0.9 * mean_square_px2(straight));
+}
+
 // Coding leaves more noise where a picture changes than beside it. Taken for the noise of either
 // side it would be shared with pixels that have none of it, and offsets claim too little.
 TEST(EdgeStretch, OffsetsScatterAsTheirVariancesSayWherePixelsOnTheEdgeAreTheNoisiest) {

@@ -27,6 +27,7 @@ struct Columns {
   Samples share, sloping, bending;
   Samples density, sloping_density, bending_density;
   Samples ground, strip;
+  Samples gain;           // of the light, over the levels of the picture, in which noise is even
   float sharp_px = 1.0f;  // blur of each step
   float square = 0.0f;    // mean one of the steps' distances from the middle of the sweep [px^2]
 
@@ -42,6 +43,7 @@ struct Columns {
 // Sums of squared residuals and their degrees of freedom beside the edge, inside and outside, and
 // on it: pixels that an edge crosses are noisier than either side (coding, sampling of the scene).
 struct Noise {
+  double light_square = 0.0;  // of all samples, in levels of light
   Eigen::Array3d square = Eigen::Array3d::Zero(), freedom = Eigen::Array3d::Zero();
 };
 
@@ -54,9 +56,35 @@ Variances parts_of(float share) {
   return {beside * (1.0f - share), beside * share, on};
 }
 
-float variance_at(const Variances& noise, float share) {
+// Of a sample's light: noise of the picture's levels, of which it gives so many each.
+float variance_at(const Variances& noise, float share, float gain) {
   const Variances part = parts_of(share);
-  return part[0] * noise[0] + part[1] * noise[1] + part[2] * noise[2];
+  return gain * gain * (part[0] * noise[0] + part[1] * noise[1] + part[2] * noise[2]);
+}
+
+// Levels of light per level of the picture, by the light (sRGB, to its straight beginning).
+const std::array<float, 256>& gains_of_light() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (size_t i = 0; i < t.size(); ++i) {
+      const double light = std::max(static_cast<double>(i) / 255.0, 0.0031308);
+      t[i] = static_cast<float>(2.4 / 1.055 * std::pow(light, 1.4 / 2.4));
+    }
+    return t;
+  }();
+  return table;
+}
+
+void set_gain(const StretchProfile& p, float inner, float outer, Columns& c) {
+  if (!p.curved) {
+    std::fill_n(c.gain.begin(), p.profile.count, 1.0f);
+    return;
+  }
+  const auto& table = gains_of_light();
+  for (size_t k = 0; k < static_cast<size_t>(p.profile.count); ++k) {
+    const float light = inner * (1.0f - c.share[k]) + outer * c.ground[k] * c.share[k];
+    c.gain[k] = table[static_cast<size_t>(std::clamp(light, 0.0f, 255.0f))];
+  }
 }
 
 // One profile with the sums over its model columns and what they say.
@@ -156,7 +184,7 @@ void accumulate(const StretchProfile& p, const Columns& c, const Variances& nois
     rows.row(j).segment<kShading>(kOwn) = c.shading_columns(k, s).transpose();
     rows(j, kAll - 1) = contrast * c.widening(k);
     rows(j, kAll) = p.profile.light[k] - w.inner * a - w.outer * b;
-    rows.row(j) *= 1.0f / std::sqrt(variance_at(noise, c.share[k]));
+    rows.row(j) *= 1.0f / std::sqrt(variance_at(noise, c.share[k], c.gain[k]));
   }
   rows.middleRows(count, whole - count).setZero();
   const auto sum = [&](int m, int n) {
@@ -367,10 +395,13 @@ void find_noise(const StretchProfile& p, const Columns& c, const Variances& assu
         p.profile.light[k] - inner * a - outer * b - c.shading_columns(k, s).dot(v) - own[2] * d;
     const Eigen::Vector3f row(a, b, d);
     const double free =
-        own_share - static_cast<double>(row.dot(leverage * row) / variance_at(assumed, c.share[k]));
+        own_share -
+        static_cast<double>(row.dot(leverage * row) / variance_at(assumed, c.share[k], c.gain[k]));
     const Variances part = parts_of(c.share[k]);
     const Eigen::Array3d parts(part[0], part[1], part[2]);
-    w.noise.square += own_share * static_cast<double>(rest * rest) * parts;
+    const float levels = rest / c.gain[k];
+    w.noise.light_square += own_share * static_cast<double>(rest * rest);
+    w.noise.square += own_share * static_cast<double>(levels * levels) * parts;
     w.noise.freedom += free * parts;
   }
   w.inner = inner, w.outer = outer;
@@ -412,7 +443,7 @@ void describe_edge(StretchProfile& p, const Columns& c, const Working& w, float 
   e.mean_level = inner + 0.5 * e.contrast;
   e.inner_slope = v[0] + 2.0f * s * v[2];
   e.outer_slope = (v[1] + 2.0f * s * v[3]) * ground;
-  const double square = w.noise.square.sum();
+  const double square = w.noise.light_square;
   const double freedom = std::max(1.0, w.noise.freedom.sum());
   constexpr double kLeastGainNoise2 = 0.1;
   e.lines = p.profile.lines;
@@ -433,7 +464,7 @@ void fit_offset(StretchProfile& p, const Columns& c, const Variances& noise, con
     const auto k = static_cast<size_t>(j);
     const float s = p.profile.s_px[k], ground = c.ground[k], share = c.share[k];
     const float a = 1.0f - share, b = share * ground;
-    const float weight = 1.0f / variance_at(noise, share);
+    const float weight = 1.0f / variance_at(noise, share, c.gain[k]);
     const float d = (w.inner + beside - w.outer * ground) * c.density[k] +
                     (v[0] - v[1] * ground) * c.sloping_density[k] +
                     (v[2] - v[3] * ground) * c.bending_density[k];
@@ -487,6 +518,7 @@ StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMem
     columns_of(profiles[i], columns[i]);
     all[i].usable = plain_levels(profiles[i], columns[i], all[i]);
     if (!all[i].usable) continue;
+    set_gain(profiles[i], all[i].inner, all[i].outer, columns[i]);
     accumulate(profiles[i], columns[i], kEqual, all[i]);
     reduce(profiles[i], all[i]);
   }

@@ -17,8 +17,9 @@ struct StretchProfile {
   int steps = 0;
   std::array<float, kMostSteps> step_at_px{};
   double sharp_px = 0.7;
-  bool plate = false;          ///< the outer level is a multiple of the background plate
-  int curve = 0;               ///< neighbours are profiles of the same curve
+  bool curved = false;  ///< light out of levels by the usual transfer curve: noise is even in these
+  bool plate = false;   ///< the outer level is a multiple of the background plate
+  int curve = 0;        ///< neighbours are profiles of the same curve
   double direction_rad = 0.0;  ///< of the normal, in the picture
   /// Distance inwards to an edge of the body itself, too near to look between: a strip of unknown
   /// level; 0: none.

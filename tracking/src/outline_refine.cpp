@@ -86,6 +86,7 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8) + (colour ? 16 : 0);
   look.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
+  look.curved = !colour && scenery.camera.transfer != data::Transfer::linear;
   look.plate = plate_explains(look.profile, std::max(1.5 * look.blur_px, half_range));
   return true;
 }
