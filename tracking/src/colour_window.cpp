@@ -9,6 +9,7 @@
 
 #include "outline_samples.hpp"
 #include "pose_motion.hpp"
+#include "transfer_curve.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -69,16 +70,6 @@ bool luma_on_circles(const cv::Mat& luma, const data::Body& body, const data::Ca
   if (levels.size() < kFewestPoints) return false;
   level = data::median(levels);
   return true;
-}
-
-double light_of(double level) {
-  const double v = std::clamp(level / 255.0, 0.0, 1.0);
-  return 255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
-}
-
-double level_of(double light) {
-  const double v = std::max(0.0, light / 255.0);
-  return 255.0 * (v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055);
 }
 
 // Light of the three primaries of a surface with this luma, by BT.601.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "transfer_curve.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
@@ -11,15 +13,10 @@ constexpr size_t at(int i) {
   return static_cast<size_t>(i);
 }
 
-// Inverse of the transfer curve cameras apply (sRGB; BT.709 differs by less than 2 levels).
 const std::array<float, 256>& light_of_luma() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
-    for (int i = 0; i < 256; ++i) {
-      const double v = i / 255.0;
-      t[static_cast<size_t>(i)] = static_cast<float>(
-          255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4)));
-    }
+    for (int i = 0; i < 256; ++i) t[at(i)] = static_cast<float>(light_of(i));
     return t;
   }();
   return table;

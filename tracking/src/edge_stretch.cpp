@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "normal_table.hpp"
+#include "transfer_curve.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -62,14 +63,11 @@ float variance_at(const Variances& noise, float share, float gain) {
   return gain * gain * (part[0] * noise[0] + part[1] * noise[1] + part[2] * noise[2]);
 }
 
-// Levels of light per level of the picture, by the light (sRGB, to its straight beginning).
 const std::array<float, 256>& gains_of_light() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
-    for (size_t i = 0; i < t.size(); ++i) {
-      const double light = std::max(static_cast<double>(i) / 255.0, 0.0031308);
-      t[i] = static_cast<float>(2.4 / 1.055 * std::pow(light, 1.4 / 2.4));
-    }
+    for (size_t i = 0; i < t.size(); ++i)
+      t[i] = static_cast<float>(light_per_level(static_cast<double>(i)));
     return t;
   }();
   return table;

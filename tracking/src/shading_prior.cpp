@@ -75,8 +75,8 @@ double least_variance(const Moments& curve) {
 
 // A strip along the edge, the wall of the body mostly, is lit like nothing else.
 ShadingEstimate estimate(const ShadingEvidence& look, const Shading& expected,
-                         const Shading& seen_variance, double least_variance) {
-  Shading variance = seen_variance.cwiseMax(least_variance);
+                         const Shading& seen_variance, double least) {
+  Shading variance = seen_variance.cwiseMax(least);
   variance[kShading - 1] = kMostVariance;
   ShadingMatrix information = look.normal;
   information.diagonal() += variance.cwiseInverse();

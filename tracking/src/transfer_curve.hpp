@@ -1,0 +1,28 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+
+namespace trochoid::tracking {
+
+// The transfer curve that cameras apply to light, sRGB (IEC 61966-2-1; BT.709 differs by less than
+// two levels): levels of the picture and linear light, both 0..255.
+
+/// The light of a level, which may lie outside 0..255.
+inline double light_of(double level) {
+  const double v = std::clamp(level / 255.0, 0.0, 1.0);
+  return 255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+/// The level of light; without light 0.
+inline double level_of(double light) {
+  const double v = std::max(0.0, light / 255.0);
+  return 255.0 * (v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055);
+}
+
+/// By how much the light grows per level where there is so much of it.
+inline double light_per_level(double light) {
+  const double v = std::max(0.0, light / 255.0);
+  return v <= 0.0031308 ? 1.0 / 12.92 : 2.4 / 1.055 * std::pow(v, 1.4 / 2.4);
+}
+
+}  // namespace trochoid::tracking
