@@ -36,6 +36,7 @@ class Follower {
                                                 double reach_px);
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
+  [[nodiscard]] Sighting as_it_moves(const Frame& frame, const Sighting& found) const;
   [[nodiscard]] double wholeness(const Sighting& seen) const;
   [[nodiscard]] bool misgiving(const Sighting& seen) const;
   [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,

@@ -211,6 +211,22 @@ std::vector<Sighting> Forecast::alternatives(double t_s) const {
   return guesses;
 }
 
+std::optional<Sighting> Forecast::one_frame_before(const Sighting& seen) const {
+  constexpr double kSuccessive = 1.5;
+  if (past_.size() < 2 || !seen.pose) return std::nullopt;
+  const Moment &last = past_.back(), &before = past_[past_.size() - 2];
+  if (!last.seen.pose || !before.seen.pose) return std::nullopt;
+  if (std::abs(last.t_s - before.t_s) > kSuccessive * frame_s_) return std::nullopt;
+  const Pose &from = before.seen.pose->pose, &to = last.seen.pose->pose;
+  Sighting earlier = seen;
+  Pose& pose = earlier.pose->pose;
+  pose.phi_rad -= std::remainder(to.phi_rad - from.phi_rad, kTurn);
+  pose.theta_rad -= to.theta_rad - from.theta_rad;
+  pose.centre_m -= to.centre_m - from.centre_m;
+  finder_.place(earlier);
+  return earlier;
+}
+
 void Forecast::add(double t_s, const Sighting& seen, bool lasting) {
   const double step_s = std::abs(t_s - past_.back().t_s);
   if (frame_s_ <= 0.0) frame_s_ = step_s;

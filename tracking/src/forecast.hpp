@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "body_finder.hpp"
@@ -24,6 +25,9 @@ class Forecast {
   [[nodiscard]] Sighting at(double t_s) const;
   /// The other guesses, most trusted first, those that say the same left out.
   [[nodiscard]] std::vector<Sighting> alternatives(double t_s) const;
+  /// A sighting as it would have been one frame before, had it moved as between the last two;
+  /// nothing if these are not in successive frames.
+  [[nodiscard]] std::optional<Sighting> one_frame_before(const Sighting& seen) const;
   /// Running size of what the trusted guess misses: of the centre, and of the rim as the axis
   /// turns [px].
   [[nodiscard]] double surprise_px() const { return missed_px_[trusted()]; }
