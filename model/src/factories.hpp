@@ -1,6 +1,7 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -35,6 +36,12 @@ Trajectory simulate_pivot(const data::Scene& scene);
 /// times ascending from start_s. @throws InputError.
 void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::VectorXd>& values,
                    const PredictRequest& request);
+
+/// The times asked for, counted from the start [s].
+[[nodiscard]] std::vector<double> since_start_s(const PredictRequest& request);
+
+/// An answer of the size asked for in which nothing is known yet: NaN throughout.
+[[nodiscard]] Prediction unknown_prediction(const PredictRequest& request);
 
 /// The output times of a scene's [run]: 0, 1/rate, ... up to until_s. @throws InputError.
 [[nodiscard]] std::vector<double> output_times_s(const data::RunSettings& run);

@@ -220,13 +220,8 @@ void PivotPredictor::fill(const PivotPath<S>& path, const PredictRequest& reques
 Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
                                    const PredictRequest& request) const {
   check_request(*this, values, request);
-  std::vector<double> t_s;
-  for (const double t : request.t_s) t_s.push_back(t - request.start_s);
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
-  Prediction out;
-  out.values.setConstant(rows, kNan);
-  out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
+  const std::vector<double> t_s = since_start_s(request);
+  Prediction out = unknown_prediction(request);
   if (request.derivatives.empty()) {
     double p[kParameters] = {};
     for (std::size_t i = 0; i < kinds_.size(); ++i)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "factories.hpp"
@@ -48,6 +49,21 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
     if (std::count(request.derivatives.begin(), request.derivatives.end(), index) > 1)
       throw InputError(fmt::format("derivative by parameter {} is asked for twice", index));
   }
+}
+
+std::vector<double> since_start_s(const PredictRequest& request) {
+  std::vector<double> t_s;
+  for (const double t : request.t_s) t_s.push_back(t - request.start_s);
+  return t_s;
+}
+
+Prediction unknown_prediction(const PredictRequest& request) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
+  Prediction out;
+  out.values.setConstant(rows, kNan);
+  out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
+  return out;
 }
 
 std::string law_of(const data::Scene& scene) {

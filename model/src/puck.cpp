@@ -94,7 +94,8 @@ std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
                     puck.value[kDrag], true, "air force on the centre of mass"});
   // Only a spin that is seen tells how far out the face rests on the floor.
   list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kInfinity, true,
-                  puck.value[kContact], false, "radius of the contact, as of an evenly pressed disc"});
+                  puck.value[kContact], false,
+                  "radius of the contact, as of an evenly pressed disc"});
   return list;
 }
 
@@ -220,13 +221,8 @@ void PuckPredictor::fill(const PuckPath<S>& path, const S& contact_radius_m,
 Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
                                   const PredictRequest& request) const {
   check_request(*this, values, request);
-  std::vector<double> t_s;
-  for (const double t : request.t_s) t_s.push_back(t - request.start_s);
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
-  Prediction out;
-  out.values.setConstant(rows, kNan);
-  out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
+  const std::vector<double> t_s = since_start_s(request);
+  Prediction out = unknown_prediction(request);
   const auto given = [&](auto& p) {
     for (int kind = 0; kind < kAll; ++kind) p[kind] = scene_.value[kind];
     for (std::size_t i = 0; i < kinds_.size(); ++i)

@@ -273,8 +273,7 @@ unsigned components_of(const PredictRequest& request) {
 Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
                                  const PredictRequest& request) const {
   check_request(*this, values, request);
-  Call call{values, request, {}, {}, {}};
-  for (const double t : request.t_s) call.t_s.push_back(t - request.start_s);
+  Call call{values, request, since_start_s(request), {}, {}};
   call.options.tolerance = request.tolerance;
   call.options.end_s = call.t_s.empty() ? 0.0 : call.t_s.back();
   call.options.impact_at_rim = impact_;
@@ -286,13 +285,8 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   constexpr double kFinest = 1e-7;
   call.options.stick_factor = std::max(1.0, request.tolerance / kFinest);
 
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  const auto rows = static_cast<Eigen::Index>(request.t_s.size() * request.observables.size());
-  const auto width = static_cast<Eigen::Index>(request.derivatives.size());
-  Prediction out;
-  out.values.setConstant(rows, kNan);
-  out.jacobian.setConstant(rows, width, kNan);
-  if (request.want_end_state) out.end_state_jacobian.resize(initial_count(), width);
+  Prediction out = unknown_prediction(request);
+  if (request.want_end_state) out.end_state_jacobian.resize(initial_count(), out.jacobian.cols());
   std::vector<int> active;  // columns that need a lane
   for (std::size_t c = 0; c < request.derivatives.size(); ++c)
     if (!cyclic(request.derivatives[c])) active.push_back(static_cast<int>(c));
