@@ -4,6 +4,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
 
 // Scene TOML: docs/formats.md. The keys are listed in scene_keys.hpp.
 namespace trochoid::data {
@@ -116,6 +117,12 @@ void check_run(const TableReader& reader, const RunSettings& run) {
                             run.rate_hz, kMaxRows));
 }
 
+void check_tracking(const TableReader& reader, const TrackingSettings& tracking) {
+  if (Window{parse_moment(tracking.from), parse_moment(tracking.to)}.reversed())
+    reader.fail("from", fmt::format("[tracking] from = {} lies after to = {}; exchange them",
+                                    tracking.from, tracking.to));
+}
+
 Scene scene_of(const toml::table& root, const std::string& where) {
   TableReader top(&root, "a scene's tables", where);
   const auto section = [&](const char* name) {
@@ -141,7 +148,8 @@ Scene scene_of(const toml::table& root, const std::string& where) {
       "camera", scene.camera, [](auto&& v) { camera_keys(v); },
       [&](const TableReader& r) { check_camera(r, scene.camera); });
   read(
-      "tracking", scene.tracking, [](auto&& v) { tracking_keys(v); }, unchecked);
+      "tracking", scene.tracking, [](auto&& v) { tracking_keys(v); },
+      [&](const TableReader& r) { check_tracking(r, scene.tracking); });
   read(
       "model", scene.model, [](auto&& v) { model_keys(v); }, unchecked);
   read(

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "time_text.hpp"
+#include "trochoid/data/moment.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::data {
@@ -187,7 +187,8 @@ void TableReader::read(const char* key, std::string& value, TimeOrFrame) {
     return;
   }
   const std::string text = node->is_string() ? node->value<std::string>().value() : std::string();
-  if (!is_time_or_frame(text))
+  const auto moment = parse_moment(text);
+  if (!moment || moment->t_s.value_or(0.0) < 0.0)
     fail_at(*node, fmt::format("{} = {} must be seconds (1.5) or a frame (\"f120\")", key,
                                in_quotes(text)));
   value = text;

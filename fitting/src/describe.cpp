@@ -75,7 +75,7 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   for (const ArcData& arc : problem.arcs)
     if (arc.held)
       fit.warnings.push_back(fmt::format(
-          "track {} begins at rest: fitted from {:.4g} s, where the body is let go; --from sets "
+          "track {} begins at rest: fitted from {:.4g} s, where the body is let go; from sets "
           "another start",
           arc.track + 1, arc.t_s.front()));
   if (error.whiteness.inflation > 1.0)

@@ -54,7 +54,7 @@ void number_rows(ArcData& arc) {
 Eigen::Matrix2d whitener_of(const data::TrackSample& sample) {
   const Eigen::LLT<Eigen::Matrix2d> cholesky(sample.covariance_m2);
   if (cholesky.info() != Eigen::Success)
-    throw InputError(
+    throw TrackError(
         fmt::format("the covariance of the sample at t = {:g} s is not positive definite; give "
                     "sxx_m2, syy_m2 > 0",
                     sample.t_s));

@@ -44,7 +44,7 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
       arc.held =
           model == "pivot" && first > chosen_range(tracks[i], options.from, options.to).first;
       if (arc.readings.empty())
-        throw InputError(fmt::format("track {}: no sample has {}", i + 1,
+        throw TrackError(fmt::format("track {}: no sample has {}", i + 1,
                                      model == "pivot"
                                          ? "a spin angle psi_rad, which the pivot model is fitted "
                                            "to; name the mark under [body] and track again"
@@ -54,7 +54,7 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
     }
   }
   if (arcs.empty())
-    throw InputError(
+    throw TrackError(
         "no track has a stretch in which the puck slides freely, slowing down; are the positions "
         "in metres, and does it move?");
   return arcs;
@@ -153,7 +153,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   suit_to_data(problem, scene);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
-    throw InputError(
+    throw TrackError(
         fmt::format("the track's {} measurements{} cannot determine {} parameters of model '{}'",
                     problem.rows(), problem.arcs.front().held ? " after the body is let go" : "",
                     needed, model));

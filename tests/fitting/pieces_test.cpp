@@ -50,7 +50,7 @@ TEST(Pieces, ABoundBeyondTheTrackIsRefusedWithWhatTheTrackHas) {
   }
   for (const auto& message : {refusal(track, "0.8", "0.2"), refusal(track, "f130", "f120")})
     EXPECT_THAT(message, testing::HasSubstr("exchange them")) << message;
-  EXPECT_THAT(refusal(track, "late", ""), testing::HasSubstr("--from late: give seconds"));
+  EXPECT_THAT(refusal(track, "late", ""), testing::HasSubstr("from = 'late': give seconds"));
 }
 
 // Held for a second, pushed for half a second to 20 rad/s, then free.

@@ -172,7 +172,7 @@ TEST_F(FrameSourceTest, AWindowKeepsIndexAndTimeOfTheWholeFile) {
   EXPECT_FALSE(frames->next());
   const auto seconds = open_video(clip, {.from = "0.5"});
   EXPECT_EQ(seconds->next()->index, 5);
-  EXPECT_THAT(error_of(clip, {.from = "soon"}), HasSubstr("--from soon"));
+  EXPECT_THAT(error_of(clip, {.from = "soon"}), HasSubstr("from = 'soon': give seconds"));
   for (const SourceOptions& reversed :
        {SourceOptions{.from = "0.5", .to = "0.1"}, SourceOptions{.from = "f5", .to = "f1"}})
     EXPECT_THAT(error_of(clip, reversed), HasSubstr("exchange them"));

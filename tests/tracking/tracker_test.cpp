@@ -312,7 +312,7 @@ TEST(TrackVideo, APointOutsideThePictureIsSaidToBe) {
     (void)track_video(folder / "clip.mkv", scene, std::nullopt);
     FAIL() << "tracked what nobody can see";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("5000,3 (--at, at_px) is outside the picture"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("the point at 5000,3 px is outside the picture"));
   }
 }
 

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -17,6 +16,7 @@
 #include "scene_library.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "validators.hpp"
 
@@ -105,16 +105,6 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
   return tracks;
 }
 
-// What is wrong with a track is said with its file's name.
-std::string named_by_track(const std::vector<std::string>& paths, const std::string& message) {
-  constexpr std::array<std::string_view, 6> kBegin{"the track",  "track ",  "no track ",
-                                                   "no sample ", "object ", "the covariance "};
-  const bool of_a_track = std::any_of(kBegin.begin(), kBegin.end(), [&](std::string_view begin) {
-    return message.starts_with(begin);
-  });
-  return of_a_track ? fmt::format("{}: {}", fmt::join(paths, ", "), message) : message;
-}
-
 data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& tracks,
                  const data::Scene& scene) {
   fitting::FitOptions options = command.options;
@@ -124,9 +114,10 @@ data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& trac
   else
     options.progress = [&progress](const std::string& stage) { progress.update(stage); };
   try {
-    return fit_job(tracks, scene, options, command.compare);
-  } catch (const InputError& error) {
-    throw InputError(named_by_track(command.tracks, error.what()));
+    return in_scene(command.scene,
+                    [&] { return fit_job(tracks, scene, options, command.compare); });
+  } catch (const TrackError& error) {
+    throw InputError(fmt::format("{}: {}", fmt::join(command.tracks, ", "), error.what()));
   }
 }
 
@@ -134,6 +125,7 @@ void run(const FitCommand& command) {
   std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
   inputs.emplace_back(command.scene);
   check_output(command.output, inputs);
+  static_cast<void>(data::parse_window(command.options.from, command.options.to));
   data::Fit provenance;
   const std::vector<data::Track> tracks = read_tracks(command, provenance);
   data::Scene scene;
@@ -143,7 +135,7 @@ void run(const FitCommand& command) {
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
-  data::Fit fit = in_scene(command.scene, [&] { return fitted(command, tracks, scene); });
+  data::Fit fit = fitted(command, tracks, scene);
   fit.inputs = provenance.inputs;
   if (!command.output.empty()) data::write_fit(fit, command.output);
   if (command.json)

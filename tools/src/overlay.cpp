@@ -224,7 +224,7 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   }
   writer.release();
   if (written.frame.empty())
-    throw InputError(fmt::format("{}: no frame between --from and --to", input.video.string()));
+    throw InputError(fmt::format("{}: no frame between from and to", input.video.string()));
   check_written_video(pending.path(), static_cast<std::int64_t>(written.frame.size()), path);
   pending.commit();
   return written;

@@ -15,6 +15,7 @@
 #include "report.hpp"
 #include "report_parts.hpp"
 #include "run_folder.hpp"
+#include "scene_library.hpp"
 #include "track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -301,7 +302,7 @@ void run(const Options& options) {
   Run run = prepared(options);
   PendingFolder pending(folder_of(options));
   run.timed("track", [&] { track(run, options); });
-  run.timed("fit", [&] { fit(run, options); });
+  run.timed("fit", [&] { in_scene(options.scene, [&] { fit(run, options); }); });
   const Verdict verdict =
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 
 #include "progress.hpp"
@@ -37,15 +36,6 @@ void tell_idle_keys(const std::string& scene_name, const data::Scene& scene) {
   if (idle.empty()) return;
   note(fmt::format("{}: the model has no use for {}, which count{} for nothing", scene_name,
                    fmt::join(idle, ", "), idle.size() == 1 ? "s" : ""));
-}
-
-std::string named_by_scene(const std::string& scene, const std::string& message) {
-  constexpr std::array<std::string_view, 9> kPlaces{
-      "[", "body.", "support.", "camera.", "tracking.", "model.", "start.", "run.", "fit."};
-  const bool of_a_key = std::any_of(kPlaces.begin(), kPlaces.end(), [&](std::string_view place) {
-    return message.starts_with(place);
-  });
-  return of_a_key && !scene.empty() ? fmt::format("{}: {}", scene, message) : message;
 }
 
 }  // namespace trochoid::tools

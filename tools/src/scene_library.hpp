@@ -23,16 +23,17 @@ struct BundledScene {
 /// Says in one line on stderr which keys of the scene its model passes over, if any.
 void tell_idle_keys(const std::string& scene_name, const data::Scene& scene);
 
-/// The message with the scene's name before it where it speaks of one of a scene's keys.
-[[nodiscard]] std::string named_by_scene(const std::string& scene, const std::string& message);
-
-/// Runs `use`; what it finds wrong with a key of the scene is said with the scene's name.
+/// Runs `use`, which is given nothing but the scene and tracks: what it finds wrong is the scene's,
+/// and is said with the scene's name (if it has one), unless it says that it is a track's.
 template <class Use>
 auto in_scene(const std::string& scene, const Use& use) {
   try {
     return use();
+  } catch (const TrackError&) {
+    throw;
   } catch (const InputError& error) {
-    throw InputError(named_by_scene(scene, error.what()));
+    if (scene.empty()) throw;
+    throw InputError(scene + ": " + error.what());
   }
 }
 

@@ -87,7 +87,7 @@ cv::Mat first_tracked_frame(const OverlayInput& input, const OverlayOptions& opt
     if (frame->index >= wanted) break;
   }
   if (picture.empty())
-    throw InputError(fmt::format("{}: no frame between --from and --to", input.video.string()));
+    throw InputError(fmt::format("{}: no frame between from and to", input.video.string()));
   return picture;
 }
 

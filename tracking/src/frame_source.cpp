@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -13,48 +12,21 @@
 #include "luma.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// One end of a time window: a frame index, a time, or neither.
-struct Bound {
-  std::optional<std::int64_t> frame;
-  std::optional<double> t_s;
-};
-
-Bound parse_bound(const std::string& text, const char* option) {
-  if (text.empty()) return {};
-  const bool is_frame = text.front() == 'f';
-  const char* begin = text.data() + (is_frame ? 1 : 0);
-  const char* end = text.data() + text.size();
-  double value = 0.0;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc{} || stop != end || !std::isfinite(value) || value < 0.0 ||
-      (is_frame && value != std::floor(value)))
-    throw InputError(fmt::format("--{} {}: give seconds (1.5) or a frame (f120)", option, text));
-  if (is_frame) return {static_cast<std::int64_t>(value), {}};
-  return {{}, value};
+bool before(const std::optional<data::Moment>& from, const Frame& frame) {
+  return from && ((from->frame && frame.index < *from->frame) ||
+                  (from->t_s && frame.t_s < *from->t_s - 1e-9));
 }
 
-bool before(const Bound& bound, const Frame& frame) {
-  return (bound.frame && frame.index < *bound.frame) ||
-         (bound.t_s && frame.t_s < *bound.t_s - 1e-9);
-}
-
-bool after(const Bound& bound, const Frame& frame) {
-  return (bound.frame && frame.index > *bound.frame) ||
-         (bound.t_s && frame.t_s > *bound.t_s + 1e-9);
-}
-
-void check_order(const Bound& from, const Bound& to, const SourceOptions& options) {
-  const bool reversed = (from.frame && to.frame && *from.frame > *to.frame) ||
-                        (from.t_s && to.t_s && *from.t_s > *to.t_s);
-  if (reversed)
-    throw InputError(
-        fmt::format("--from {} lies after --to {}; exchange them", options.from, options.to));
+bool after(const std::optional<data::Moment>& to, const Frame& frame) {
+  return to &&
+         ((to->frame && frame.index > *to->frame) || (to->t_s && frame.t_s > *to->t_s + 1e-9));
 }
 
 /// Counter-clockwise quarter turns that make the picture upright, 0..3.
@@ -90,9 +62,7 @@ class LibavSource final : public FrameSource {
   LibavSource(const fs::path& path, const SourceOptions& options)
       : name_(path.string()),
         options_(options),
-        from_(parse_bound(options.from, "from")),
-        to_(parse_bound(options.to, "to")) {
-    check_order(from_, to_, options);
+        window_(data::parse_window(options.from, options.to)) {
     av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
     open_container(path);
     open_decoder();
@@ -106,11 +76,11 @@ class LibavSource final : public FrameSource {
       if (!decode_one()) break;
       Frame frame{.luma = {}, .bgr = {}, .index = frames_read_++, .t_s = 0.0, .damaged = false};
       frame.t_s = presentation_time_s(frame.index);
-      if (after(to_, frame)) {
+      if (after(window_.to, frame)) {
         finished_ = true;
         return std::nullopt;
       }
-      if (before(from_, frame)) continue;
+      if (before(window_.from, frame)) continue;
       convert(frame);
       return frame;
     }
@@ -130,7 +100,7 @@ class LibavSource final : public FrameSource {
       if (!fs::exists(path)) fail("no such file");
       if (fs::is_regular_file(path) && fs::file_size(path) == 0) fail("the file is empty");
     } else if (!options_.frame_rate_hz) {
-      fail("an image sequence carries no times; give its rate (--rate, or camera.frame_rate_hz)");
+      fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
     }
     container_ = open_input(sequence, options_.frame_rate_hz, name_);
     if (const int status = avformat_find_stream_info(container_.get(), nullptr); status < 0)
@@ -215,7 +185,7 @@ class LibavSource final : public FrameSource {
     std::int64_t stamp = picture_->best_effort_timestamp;
     if (stamp == AV_NOPTS_VALUE) {
       if (!(info_.frame_rate_hz > 0.0))
-        fail("carries no time stamps; give its rate (--rate, or camera.frame_rate_hz)");
+        fail("carries no time stamps; give its rate (rate, or camera.frame_rate_hz)");
       return static_cast<double>(index) / info_.frame_rate_hz;
     }
     if (first_stamp_ == AV_NOPTS_VALUE) first_stamp_ = stamp;
@@ -247,7 +217,7 @@ class LibavSource final : public FrameSource {
     const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
     if (cut || (!read_error_.empty() && missing > 0))
       fail(fmt::format(
-          "breaks off after frame {} of {}{}; copy the whole file, or stop earlier with --to",
+          "breaks off after frame {} of {}{}; copy the whole file, or stop earlier (to)",
           frames_read_ - 1, info_.frames, read_error_.empty() ? "" : " (" + read_error_ + ")"));
     check_length();
   }
@@ -266,13 +236,13 @@ class LibavSource final : public FrameSource {
     const double forgiven_s = std::max(3.0 / info_.frame_rate_hz, 0.02 * length_s);
     if (length_s - read_s > forgiven_s)
       fail(fmt::format(
-          "breaks off at {:.3f} s of {:.3f} s; copy the whole file, or stop earlier with --to",
-          read_s, length_s));
+          "breaks off at {:.3f} s of {:.3f} s; copy the whole file, or stop earlier (to)", read_s,
+          length_s));
   }
 
   std::string name_;
   SourceOptions options_;
-  Bound from_, to_;
+  data::Window window_;
   InputHandle container_;
   DecoderHandle decoder_;
   PacketHandle packet_;

@@ -58,7 +58,7 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
     window_.push_back(std::move(*frame));
   }
   if (window_.empty())
-    throw InputError(fmt::format("{}: no frame between --from and --to", path_.string()));
+    throw InputError(fmt::format("{}: no frame between from and to", path_.string()));
   return fresh > 0;
 }
 

@@ -117,10 +117,10 @@ class Tracking {
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
                       "changes: put it on a stand, or track a "
-                      "part where it is still with --from and --to",
+                      "part where it is still (from, to)",
                       video_.string()));
     throw InputError(
-        fmt::format("{}: no moving body found; point at it: --at x,y, or at_px under "
+        fmt::format("{}: no moving body found; point at it: at x,y, or at_px under "
                     "[tracking] in the scene",
                     video_.string()));
   }
@@ -247,7 +247,7 @@ class Tracking {
     const VideoInfo& video = recording_.info();
     if (!(at_px.minCoeff() >= 0.0 && at_px.x() < video.width_px && at_px.y() < video.height_px))
       throw InputError(
-          fmt::format("{}: the point {:g},{:g} (--at, at_px) is outside the picture of "
+          fmt::format("{}: the point at {:g},{:g} px is outside the picture of "
                       "{} x {} pixels",
                       video_.string(), at_px.x(), at_px.y(), video.width_px, video.height_px));
     auto seed = find_seed_at(window, background_, *finder_, at_px);
@@ -258,8 +258,8 @@ class Tracking {
     else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
       seed = seed_in_plate(seed);
     if (!seed)
-      throw InputError(
-          fmt::format("{}: no rim found around the point given with --at", video_.string()));
+      throw InputError(fmt::format("{}: no rim found around the point at {:g},{:g} px",
+                                   video_.string(), at_px.x(), at_px.y()));
     return *seed;
   }
 

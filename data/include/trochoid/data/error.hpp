@@ -17,6 +17,13 @@ class InputError : public Error {
   using Error::Error;
 };
 
+/// What is wrong with a track that is already in memory. The message cannot say which file the track
+/// was read from; whoever read it can.
+class TrackError : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// A computation that cannot deliver what was asked (not an unwelcome answer: those are outcomes).
 class NumericalError : public Error {
  public:
