@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "adequacy.hpp"
+#include "first_guess.hpp"
 #include "ladder.hpp"
 #include "rung.hpp"
 #include "rung_words.hpp"
@@ -193,6 +194,14 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   return rungs;
 }
 
+std::set<std::string> parameters_of_any(const Ladder& ladder) {
+  std::set<std::string> names = parameters_of(ladder.plain);
+  if (ladder.frictionless) names.merge(parameters_of(*ladder.frictionless));
+  for (int term = 0; term < static_cast<int>(ladder.terms.size()); ++term)
+    names.merge(parameters_of(rung_with(ladder, {term}).scene));
+  return names;
+}
+
 data::ModelScore table_row(const Rung& rung, bool recommended) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (!rung.fitted) return {rung.name, kNone, kNone, kNone, kNone, kNone, 0, false, rung.reason};
@@ -217,6 +226,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
   if (open && leaves_pivot(tracks, named)) named.model.name = "top";
   const Ladder ladder = ladder_of(named);
+  if (!options.start.empty())
+    check_first_guess(options.start, "the models compared have", parameters_of_any(ladder));
   const std::vector<Rung> rungs = climb(ladder, tracks, options);
   const Rung* chosen = simplest_sufficient(rungs);
   if (chosen == nullptr) {
@@ -231,7 +242,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     again.start = values_of(chosen->fit);
     if (!again.start.empty()) again.strategy = "single";
     try {
-      result.fit = fit(tracks, chosen->scene, again);
+      result.fit = fit_one_of_several(tracks, chosen->scene, again);
     } catch (const NumericalError& error) {
       result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
     }

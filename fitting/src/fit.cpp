@@ -1,6 +1,7 @@
 #include "trochoid/fitting/fit.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "bootstrap.hpp"
 #include "describe.hpp"
 #include "find.hpp"
+#include "first_guess.hpp"
 #include "observed.hpp"
 #include "prepare.hpp"
 #include "profile.hpp"
@@ -193,7 +195,7 @@ void heed_far_side(const Problem& problem, const Solution& solution, const FitOp
   if (times > kWorthWords)
     fit.warnings.push_back(fmt::format(
         "chi-square is lopsided in {}: its error bar is that of the flatter side, {:.2g} "
-        "times what the curvature says (--profile shows both sides)",
+        "times what the curvature says (the profile shows both sides)",
         problem.name(far->index), times));
 }
 
@@ -251,7 +253,7 @@ void give_friction_a_start(data::Scene& scene) {
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
                    const std::vector<Relative>& relatives, const data::Scene& given_scene,
                    const FitOptions& options) {
-  if (tracks.empty()) throw InputError("no track to fit");
+  if (tracks.empty()) throw TrackError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
   const auto wrapped = observed(plain, scene, frame_time_s(tracks));
@@ -297,29 +299,76 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   return fit;
 }
 
-}  // namespace
-
-data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
-              const data::Scene& scene, const FitOptions& options) {
-  return fit_with(tracks, predictor, {}, scene, options);
-}
-
-data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given_scene,
-              const FitOptions& options) {
-  data::Scene scene = given_scene;
+// The scene as its model takes it.
+data::Scene completed(const data::Scene& given, const FitOptions& options) {
+  data::Scene scene = given;
   if (!options.model.empty()) scene.model.name = options.model;
   give_friction_a_start(scene);
   take_priors_for_given(scene);
-  const auto predictor = model::make_predictor(scene);
+  return scene;
+}
+
+std::set<std::string> names_in(const model::Predictor& plain, data::Scene scene) {
+  const auto wrapped = observed(plain, scene, 0.0);
+  std::set<std::string> names;
+  for (const model::ParameterInfo& info : (wrapped ? *wrapped : plain).parameters())
+    names.insert(info.name);
+  return names;
+}
+
+void check_given_start(const FitOptions& options, const model::Predictor& predictor,
+                       const data::Scene& scene) {
+  if (options.start.empty()) return;
+  check_first_guess(options.start, fmt::format("model '{}' has", predictor.model_name()),
+                    names_in(predictor, scene));
+}
+
+data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predictor& predictor,
+                        const data::Scene& scene, const FitOptions& options) {
   const auto relatives = relatives_of(scene);
   std::vector<Relative> plain;
   for (const OwnedRelative& owned : relatives) {
     plain.push_back({owned.model.get(), {}});
     for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
   }
-  data::Fit fit = fit_with(tracks, *predictor, plain, scene, options);
+  data::Fit fit = fit_with(tracks, predictor, plain, scene, options);
   tell_idle_terms(scene, fit);
   return fit;
+}
+
+}  // namespace
+
+std::set<std::string> parameters_of(const data::Scene& given) {
+  const data::Scene scene = completed(given, {});
+  return names_in(*model::make_predictor(scene), scene);
+}
+
+void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
+                       const std::set<std::string>& known) {
+  for (const auto& [name, value] : guess)
+    if (!known.contains(name))
+      throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
+                                   fmt::join(known, ", ")));
+}
+
+data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
+              const data::Scene& scene, const FitOptions& options) {
+  check_given_start(options, predictor, scene);
+  return fit_with(tracks, predictor, {}, scene, options);
+}
+
+data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
+              const FitOptions& options) {
+  const data::Scene scene = completed(given, options);
+  const auto predictor = model::make_predictor(scene);
+  check_given_start(options, *predictor, scene);
+  return fit_completed(tracks, *predictor, scene, options);
+}
+
+data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
+                             const FitOptions& options) {
+  const data::Scene scene = completed(given, options);
+  return fit_completed(tracks, *model::make_predictor(scene), scene, options);
 }
 
 }  // namespace trochoid::fitting

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "arcs.hpp"
+#include "first_guess.hpp"
 #include "observed.hpp"
 #include "softness.hpp"
 #include "timing.hpp"
@@ -130,7 +131,7 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
     options.progress = [say = options.progress](const std::string& stage) {
       say(fmt::format("without the last third, {}", stage));
     };
-  const data::Fit early = fit(tracks, rung.scene, options);
+  const data::Fit early = fit_one_of_several(tracks, rung.scene, options);
   if (!usable(early)) return kInfinity;
   Squares seen, unseen;
   bool sigma_known = true;
@@ -196,7 +197,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     if (extends) {
       own.start = extended_start(*below, rung);
       own.strategy = "single";
-      rung.fit = fit(tracks, rung.scene, own);
+      rung.fit = fit_one_of_several(tracks, rung.scene, own);
     }
     // Near a solution that explains nothing there is nothing to be found.
     const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
@@ -209,7 +210,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
       else
-        keep_better(fit(tracks, rung.scene, own), rung);
+        keep_better(fit_one_of_several(tracks, rung.scene, own), rung);
     }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
@@ -233,7 +234,7 @@ void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
       fit_softly(tracks, own, rung, &above);
     } else {
       rung.scene.model.slip_regularisation_m_s = above.scene.model.slip_regularisation_m_s;
-      rung.fit = fit(tracks, rung.scene, own);
+      rung.fit = fit_one_of_several(tracks, rung.scene, own);
     }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)

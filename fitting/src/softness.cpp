@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "first_guess.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -35,7 +36,7 @@ std::optional<data::Fit> fit_with(std::span<const data::Track> tracks, const Fit
   if (options.log) own.log = [&](const std::string& line) { options.log(law + line); };
   if (from != nullptr) own.start = values_of(*from);
   try {
-    data::Fit result = fit(tracks, scene, own);
+    data::Fit result = fit_one_of_several(tracks, scene, own);
     if (usable(result)) return result;
   } catch (const NumericalError&) {
   }
@@ -122,7 +123,7 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
   auto first =
       fit_with(tracks, options, rung, gentle_m_s, above != nullptr ? &above->fit : nullptr);
   if (!first) {
-    rung.fit = fit(tracks, rung.scene, options);
+    rung.fit = fit_one_of_several(tracks, rung.scene, options);
     return;
   }
   if (!first->converged) {  // a path that is not the body's has no softness

@@ -209,6 +209,27 @@ TEST(TopFit, RefusesUnknownParameterNames) {
   EXPECT_THROW((void)fit_one(track_of({}), scene), InputError);
 }
 
+TEST(TopFit, RefusesAFirstGuessForWhatTheModelDoesNotHave) {
+  FitOptions options;
+  options.start = {{"theta_rad", 1.0}, {"length_m", 0.1}};
+  try {
+    (void)fit(std::vector{track_of({})}, top_scene(), options);
+    ADD_FAILURE() << "no refusal";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("'length_m'; model 'top' has"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("l_m, "));
+  }
+}
+
+TEST(TopFit, SaysOfATrackThatItIsTheTrack) {
+  data::Track track = track_of({});
+  track.samples.resize(2);
+  EXPECT_THROW((void)fit(std::vector{track}, top_scene()), TrackError);
+  FitOptions options;
+  options.from = "1e6";
+  EXPECT_THROW((void)fit(std::vector{track_of({})}, top_scene(), options), TrackError);
+}
+
 // Without nutation the path is a circle whatever a, b and l are.
 TEST(TopFit, AdmitsThatSteadyPrecessionHidesTheTop) {
   Planted planted;

@@ -98,6 +98,21 @@ class Errors(unittest.TestCase):
                 call()
             self.assertNotIn("\n", str(raised.exception))
 
+    def test_an_unknown_name_in_a_first_guess_is_told_with_those_there_are(self):
+        for compare, whose in ((False, "model 'top' has .*l_m"), (True, "the models compared have .*l_m")):
+            with self.subTest(compare), self.assertRaisesRegex(
+                    trochoid.InputError, "start: no parameter is called 'lm'; " + whose):
+                trochoid.fit(noisy_track(), TOP, compare=compare, start={"lm": 0.1})
+
+    def test_what_is_wrong_with_a_moment_is_told_without_options_of_the_program(self):
+        track = noisy_track()
+        for moments in ({"from_": 0.5, "to": 0.1}, {"from_": "soon"}, {"to": "f1.5"}, {"from_": 1e6}):
+            with self.subTest(moments), self.assertRaisesRegex(trochoid.InputError, "from|to") as raised:
+                trochoid.fit(track, TOP, **moments)
+            self.assertNotIn("--", str(raised.exception))
+        with self.assertRaisesRegex(trochoid.InputError, r"\[tracking\] from = 2 lies after to = 1"):
+            trochoid.Scene({"tracking": {"from": 2, "to": 1}})
+
     def test_everything_public_is_documented(self):
         for name in trochoid.__all__:
             self.assertTrue(inspect.getdoc(getattr(trochoid, name)), name)

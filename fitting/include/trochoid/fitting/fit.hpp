@@ -35,7 +35,8 @@ struct FitOptions {
 
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
 /// An unwelcome answer (no convergence, not identifiable, too short) is an outcome in the Fit.
-/// @throws InputError if the scene lacks what the model needs or a track is unusable.
+/// @throws InputError if the scene lacks what the model needs, or the given start names a parameter
+///         that the model does not have; TrackError if a track is unusable.
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
                             const FitOptions& options = {});
 

@@ -1,0 +1,24 @@
+#pragma once
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// Parameters a first guess for a fit of this scene may name.
+[[nodiscard]] std::set<std::string> parameters_of(const data::Scene& scene);
+
+/// @param whose  the model or models meant, as in "model 'top' has".
+/// @throws InputError naming a parameter of the guess that is not `known`, and those that are.
+void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
+                       const std::set<std::string>& known);
+
+/// fit() for one of several models that share a first guess: of what is not this model's the guess
+/// is silently ignored.
+[[nodiscard]] data::Fit fit_one_of_several(std::span<const data::Track> tracks,
+                                           const data::Scene& scene, const FitOptions& options);
+
+}  // namespace trochoid::fitting
