@@ -61,7 +61,9 @@ void check_written_video(const fs::path& written, std::int64_t frames, const fs:
   }
   if (promised != frames)
     throw InputError(
-        fmt::format("{}: cannot be written whole (is the disk full?)", target.string()));
+        fmt::format("{}: cannot be written whole: {} (is the disk full?)", target.string(),
+                    promised < 0 ? "what the encoder left holds no video"
+                                 : fmt::format("{} of {} pictures are in it", promised, frames)));
 }
 #endif
 

@@ -6,9 +6,11 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <utility>
 
 #include "commands.hpp"
 #include "json_summary.hpp"
@@ -39,7 +41,7 @@ struct Options {
 // Poses of a run at any time, between samples by cubics through four of them.
 class Motion {
  public:
-  Motion(const model::Trajectory& run, double rate_hz) : rate_hz_(rate_hz) {
+  Motion(const model::Trajectory& run, double rate_hz) : model_(run.model), rate_hz_(rate_hz) {
     for (const char* name : {"x_m", "y_m", "z_m", "theta_rad", "phi_rad", "psi_rad"}) {
       const auto at = std::find(run.columns.begin(), run.columns.end(), name);
       if (at == run.columns.end())
@@ -49,6 +51,7 @@ class Motion {
       columns_.emplace_back(run.values.col(at - run.columns.begin()));
     }
   }
+  [[nodiscard]] const std::string& model() const { return model_; }
   [[nodiscard]] double end_s() const {
     return static_cast<double>(columns_.front().size() - 1) / rate_hz_;
   }
@@ -79,6 +82,7 @@ class Motion {
   }
 
  private:
+  std::string model_;
   double rate_hz_;
   std::vector<Eigen::VectorXd> columns_;
 };
@@ -142,24 +146,20 @@ class Encoder {
   /// Writes into `file`; messages name `target`, which it is to become.
   Encoder(const fs::path& file, const fs::path& target, const data::Camera& camera, double rate_hz,
           int quality, bool lossless)
-      : target_(target.string()) {
-    std::string quoted;
-    for (const char c : file.string())
-      quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+      : target_(target.string()), log_(file.string() + ".log") {
     const std::string coding = lossless
                                    ? "-c:v ffv1 -pix_fmt bgr0"
                                    : fmt::format("-c:v libx264 -crf {} -pix_fmt yuv420p", quality);
     const std::string command = fmt::format(
-        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt bgr24 -s {}x{} -r {:.9g} -i - {} '{}' "
-        "2>/dev/null",
-        camera.width_px, camera.height_px, rate_hz, coding, quoted);
+        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt bgr24 -s {}x{} -r {:.9g} -i - {} {} "
+        "2>{}",
+        camera.width_px, camera.height_px, rate_hz, coding, shell_quoted(file.string()),
+        shell_quoted(log_.string()));
     std::signal(SIGPIPE, SIG_IGN);  // a missing encoder is told by write()
     pipe_ = popen(command.c_str(), "w");
     if (pipe_ == nullptr) fail();
   }
-  ~Encoder() {
-    if (pipe_ != nullptr) pclose(pipe_);
-  }
+  ~Encoder() { close(); }
   Encoder(const Encoder&) = delete;
   Encoder& operator=(const Encoder&) = delete;
   void write(const cv::Mat& picture) {
@@ -167,19 +167,26 @@ class Encoder {
     if (std::fwrite(picture.data, 1, size, pipe_) != size) fail();
   }
   void finish() {
-    const int status = pclose(pipe_);
-    pipe_ = nullptr;
-    if (status != 0) fail();
+    if (close() != 0) fail();
   }
 
  private:
-  [[noreturn]] void fail() const {
+  int close() {
+    FILE* pipe = std::exchange(pipe_, nullptr);
+    return pipe != nullptr ? pclose(pipe) : 0;
+  }
+  /// With what the encoder itself has to say, which it has said when it has ended.
+  [[noreturn]] void fail() {
+    close();
+    std::ifstream log(log_);
+    std::string words;
+    std::getline(log, words);
     throw InputError(fmt::format(
-        "{}: cannot be encoded; is the disk full? ffmpeg must be installed and the ending one it "
-        "knows (.mp4, .mkv)",
-        target_));
+        "{}: cannot be encoded: {}", target_,
+        words.empty() ? "ffmpeg does not say why; is the disk full?" : "ffmpeg: " + words));
   }
   std::string target_;
+  fs::path log_;
   FILE* pipe_ = nullptr;
 };
 
@@ -244,11 +251,9 @@ Targets targets_of(const fs::path& output, bool lossless) {
     throw InputError(fmt::format("{}: name {}", output.string(),
                                  lossless ? "a folder or, as it is to be lossless, a .mkv file"
                                           : "a folder, an .mp4 or an .mkv file"));
-  if (output.extension().empty()) {
-    fs::create_directories(output);
+  if (output.extension().empty())
     return {output / ("video" + ending), output / "truth.csv", output / "camera.json",
             output / "object.json"};
-  }
   const auto beside = [&](const char* name) {
     fs::path path = output;
     return path.replace_extension(name);
@@ -264,67 +269,116 @@ RenderStyle style_of(const Options& options) {
   return style;
 }
 
-void run(const Options& options) {
-  constexpr int kPerFrame = 16;  // samples of the motion per frame
+// Containers keep times as whole ticks: frames that come faster share one, or are slowed down.
+void check_rate(const std::string& scene, double rate_hz, const fs::path& video) {
+  constexpr double kSlowest_Hz = 1e-3, kMp4Ticks_Hz = 1e6, kMatroskaTicks_Hz = 1e3;
+  const std::string ending = video.extension().string();
+  const double fastest_Hz = ending == ".mkv" ? kMatroskaTicks_Hz : kMp4Ticks_Hz;
+  if (rate_hz < kSlowest_Hz || rate_hz > fastest_Hz)
+    throw InputError(fmt::format(
+        "{}: run.rate_hz (--rate) = {:g} frames per second do not go into an {} file; from {:g} to "
+        "{:g} do",
+        scene, rate_hz, ending, kSlowest_Hz, fastest_Hz));
+}
+
+// The scene with what the options set in it; run.rate_hz is the video's.
+data::Scene scene_to_draw(const Options& options, const Targets& targets) {
   data::Scene scene = load_scene(options.scene);
   if (!scene.body || !(scene.body->radius_m > 0.0))
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
-  const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : scene.run.rate_hz;
+  if (options.rate_hz > 0.0) scene.run.rate_hz = options.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
   constexpr double kMostFrames = 1e6;  // hours of drawing
-  check_length(options.scene, scene.run.until_s, rate_hz, kMostFrames, "frames");
-  scene.run.rate_hz = kPerFrame * rate_hz;
-  const model::Trajectory trajectory =
-      in_scene(options.scene, [&] { return model::simulate(scene); });
-  tell_idle_keys(options.scene, scene);
-  const Motion motion(trajectory, scene.run.rate_hz);
+  check_rate(options.scene, scene.run.rate_hz, targets.video);
+  check_length(options.scene, scene.run.until_s, scene.run.rate_hz, kMostFrames, "frames");
+  return scene;
+}
+
+Motion simulated(const std::string& scene_name, data::Scene scene) {
+  constexpr int kPerFrame = 16;  // samples of the motion per frame
+  scene.run.rate_hz *= kPerFrame;
+  const model::Trajectory run = in_scene(scene_name, [&] { return model::simulate(scene); });
+  tell_idle_keys(scene_name, scene);
+  return {run, scene.run.rate_hz};
+}
+
+data::Camera recording_camera(const Options& options, const data::Scene& scene,
+                              const Motion& motion) {
   data::Camera camera = camera_of(options, scene, motion);
   if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
     throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
                                  camera.width_px, camera.height_px));
-  const RenderStyle style = style_of(options);
-  camera.frame_rate_hz = rate_hz;
-  camera.exposure_fraction = style.exposure_fraction;
+  camera.frame_rate_hz = scene.run.rate_hz;
+  camera.exposure_fraction = options.style.exposure_fraction;
   if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
+  return camera;
+}
+
+// Poses spread over the time the shutter is open around t_s.
+std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double rate_hz,
+                                        const RenderStyle& style) {
+  std::vector<data::Pose<>> poses;
+  for (int i = 0; i < style.times; ++i)
+    poses.push_back(
+        motion.at(t_s + ((i + 0.5) / style.times - 0.5) * style.exposure_fraction / rate_hz));
+  return poses;
+}
+
+// Draws every frame. @returns the table of the truth.
+std::string draw(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
+                 const RenderStyle& style, int frames, Encoder& encoder) {
+  const double rate_hz = scene.run.rate_hz;
   const PictureRenderer renderer(*scene.body, camera, style);
-  const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
-  const Targets targets = targets_of(options.output, options.lossless);
-  data::PendingFile video(targets.video);
-  const Workshop workshop(targets.video);
-  const fs::path encoded = workshop.file(targets.video.filename());
-  Encoder encoder(encoded, targets.video, camera, rate_hz, options.quality, options.lossless);
   std::string truth =
       "frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac\n";
   Progress progress("render");
   for (int frame = 0; frame < frames; ++frame) {
     const double t_s = frame / rate_hz;
-    std::vector<data::Pose<>> poses;
-    for (int i = 0; i < style.times; ++i)
-      poses.push_back(
-          motion.at(t_s + ((i + 0.5) / style.times - 0.5) * style.exposure_fraction / rate_hz));
     const double brightness = 1.0 + style.flicker * std::sin(2.0 * std::numbers::pi * 100.0 * t_s);
+    const auto poses = exposed_poses(motion, t_s, rate_hz, style);
     encoder.write(renderer.picture(renderer.light(poses), frame, brightness));
     truth += truth_row(frame, t_s, motion.at(t_s), camera);
     progress.update(frame + 1, frames);
   }
-  encoder.finish();
-  check_written_video(encoded, frames, targets.video);
-  fs::rename(encoded, video.path());
-  data::write_text(truth, targets.truth);
-  data::write_camera(camera, targets.camera);
-  data::write_text(object_of(scene, trajectory.model).dump(1) + "\n", targets.object);
-  video.commit();
+  return truth;
+}
+
+void tell(const Options& options, const Targets& targets, const data::Camera& camera, int frames) {
   if (options.json)
     return print_json({{"video", targets.video.string()},
                        {"truth", targets.truth.string()},
                        {"camera", targets.camera.string()},
                        {"object", targets.object.string()},
                        {"frames", frames},
-                       {"frame_rate_hz", rate_hz},
+                       {"frame_rate_hz", *camera.frame_rate_hz},
                        {"width_px", camera.width_px},
                        {"height_px", camera.height_px}});
   fmt::print("{}: {} frames of {} x {} at {:.6g} Hz, truth in {}\n", targets.video.string(), frames,
-             camera.width_px, camera.height_px, rate_hz, targets.truth.string());
+             camera.width_px, camera.height_px, *camera.frame_rate_hz, targets.truth.string());
+}
+
+void run(const Options& options) {
+  const Targets targets = targets_of(options.output, options.lossless);
+  const data::Scene scene = scene_to_draw(options, targets);
+  const Motion motion = simulated(options.scene, scene);
+  const data::Camera camera = recording_camera(options, scene, motion);
+  const double rate_hz = scene.run.rate_hz;
+  const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
+
+  if (options.output.extension().empty()) fs::create_directories(options.output);
+  data::PendingFile video(targets.video);
+  const Workshop workshop(targets.video);
+  const fs::path encoded = workshop.file(targets.video.filename());
+  Encoder encoder(encoded, targets.video, camera, rate_hz, options.quality, options.lossless);
+  const std::string truth = draw(motion, scene, camera, style_of(options), frames, encoder);
+  encoder.finish();
+  check_written_video(encoded, frames, targets.video);
+  fs::rename(encoded, video.path());
+  data::write_text(truth, targets.truth);
+  data::write_camera(camera, targets.camera);
+  data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);
+  video.commit();
+  tell(options, targets, camera, frames);
 }
 
 void add_look_options(CLI::App& command, Options& options) {
