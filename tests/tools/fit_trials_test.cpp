@@ -22,6 +22,18 @@ TEST(MadeTracks, FollowTheThesisCaseForAMinute) {
   EXPECT_NEAR(made.track.samples.back().centre_m.y() / 0.1, 0.2342951380256336, kAllowed);
 }
 
+TEST(MadeTracks, BeginWhereTheirTruthSays) {
+  for (const char* model : {"top", "thesis", "rolling", "puck"}) {
+    std::mt19937_64 generator(1);
+    constexpr double kNoise = 1e-9;  // of a body's length, which is below a metre
+    const MadeTrack made = make_track({.model = model, .noise = kNoise}, generator);
+    ASSERT_GE(made.track.samples.size(), 30U) << model;
+    if (!made.truth.contains("x_m")) continue;  // a top's place follows from its angles
+    EXPECT_NEAR(made.track.samples[0].centre_m.x(), made.truth.at("x_m"), 6.0 * kNoise) << model;
+    EXPECT_NEAR(made.track.samples[0].centre_m.y(), made.truth.at("y_m"), 6.0 * kNoise) << model;
+  }
+}
+
 TEST(MadeTracks, RefuseAModelTheyDoNotKnow) {
   std::mt19937_64 generator(1);
   EXPECT_THROW((void)make_track({.model = "yoyo"}, generator), InputError);
