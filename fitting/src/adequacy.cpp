@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,25 @@
 #include "strategy.hpp"
 
 namespace trochoid::fitting {
+
+namespace {
+
+// Positions as predicted, given whitened residuals.
+Eigen::MatrixX2d predicted_m(const ArcData& data, const Eigen::VectorXd& residuals) {
+  Eigen::MatrixX2d xy = data.positions_m();
+  for (const Reading& reading : data.readings)
+    if (reading.channel == Channel::position) {
+      const Eigen::Matrix2d wt = reading.whitener.transpose();
+      xy.row(reading.sample) += (wt.inverse() * residuals.segment<2>(reading.row)).transpose();
+    }
+  return xy;
+}
+
+// Where the prediction, which has no noise, scatters about a smooth curve as the samples do, frames
+// are too few to tell noise from motion: then it is at most so many times the stated.
+constexpr double kMisjudged = 2.0, kMostlyMotion = 0.5;
+
+}  // namespace
 
 Squares squares(const Problem& problem, const Solution& solution) {
   Squares sum;
@@ -24,12 +44,16 @@ Squares squares(const Problem& problem, const Solution& solution) {
     const Eigen::MatrixX2d xy = data.positions_m();
     const Eigen::RowVector2d mean = xy.colwise().mean();
     const double noise_m = noise_about_smooth_curve(data.t_s, xy);
+    const bool motion =
+        !data.sigma_unknown &&
+        noise_about_smooth_curve(data.t_s, predicted_m(data, r)) > kMostlyMotion * noise_m;
     for (const Reading& reading : data.readings) {
       if (reading.channel != Channel::position) continue;
       const Eigen::Matrix2d wt = reading.whitener.transpose();
       sum.residual += r.segment<2>(reading.row).squaredNorm();
       sum.motion += (wt * (reading.value - mean.transpose())).squaredNorm();
-      sum.scatter += wt.squaredNorm() * noise_m * noise_m;
+      const double scatter = wt.squaredNorm() * noise_m * noise_m;
+      sum.scatter += motion ? std::min(scatter, 2.0 * kMisjudged * kMisjudged) : scatter;
     }
   }
   return sum;

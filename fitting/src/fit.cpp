@@ -134,6 +134,13 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
   solution = settle_weights(problem, std::move(solution), options.tolerance);
   solution = recall_vanished(problem, std::move(solution));
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);
+  constexpr double kHeard = 0.1;
+  if (fit.integration_error_sigma > kHeard)
+    fit.warnings.push_back(fmt::format(
+        "integrated more finely, the path differs by up to {:.2g} of the track's sigmas: "
+        "there the motion hangs on what is far below them (an impact, the fall onto a "
+        "face), and the error bars do not know of it",
+        fit.integration_error_sigma));
   problem.set_base(solution.u);
   name_attitudes(problem);
   solution.u = problem.start();
