@@ -41,6 +41,15 @@ TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
   for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
 }
 
+// Doubtful or not, of two the likelier is taken.
+TEST_F(AttitudeSequence, WhatHardlyTellsStillChooses) {
+  const Oracle oracle([](int) { return 1.0; });
+  auto glimpses = tracked(oracle, [](int) { return true; });
+  decide_attitudes(background_, oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+  for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
+}
+
 // At the height of the wrong reading the rim looks too large or too small, now this, now that.
 TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatKeepsTheSizeOfTheBodyIsRight) {
   const Oracle oracle([](int) { return -1.0; }, [](int i) { return 0.4 * std::sin(0.2 * i); });

@@ -70,8 +70,10 @@ class Chain {
     weigh(in_doubt());
     compare_sizes();
     solve();
+    const std::vector<double> chosen = margin_;
     discount();
     solve();
+    keep_to(chosen);
     apply();
   }
 
@@ -205,6 +207,17 @@ class Chain {
       }
     const double trust = std::clamp((speaks / wall - kShared) / (kSure - kShared), 0.0, 1.0);
     for (Node& node : nodes_) node.speaks *= trust;
+  }
+
+  /// What is too little to be sure of is still the best there is to choose by: the choice of before
+  /// stands, no surer than it is now.
+  void keep_to(const std::vector<double>& chosen) {
+    constexpr double kUnsure = 1e-9;
+    for (std::size_t i = 0; i < margin_.size(); ++i) {
+      const bool agree = margin_[i] * chosen[i] > 0.0;
+      margin_[i] = std::copysign(
+          agree ? std::min(std::abs(margin_[i]), std::abs(chosen[i])) : kUnsure, chosen[i]);
+    }
   }
 
   /// Where the body was one frame from node i, in the reading that takes less of a turn.
