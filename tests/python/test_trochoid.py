@@ -2,6 +2,7 @@
 
 import _thread
 import inspect
+import json
 import os
 import pathlib
 import signal
@@ -132,6 +133,42 @@ class Fit(unittest.TestCase):
         l = fit["l_m"]
         self.assertLess(abs(l.value - 0.03), 4.0 * l.sigma)  # 4 sigma: once in 16,000 seeds
         self.assertEqual(fit.covariance.shape, 2 * (len(fit.covariance_names),))
+
+    def test_every_key_of_the_file_is_an_attribute(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "fit.json"
+            fit = trochoid.fit(noisy_track(), model="top", profile=True, bootstrap=8, output=path)
+            keys = json.loads(path.read_text())
+        version = keys.pop("trochoid_fit")
+        self.assertEqual(version, 1)
+        for key, value in keys.items():
+            self.assertTrue(hasattr(fit, key), key)
+            if isinstance(value, (str, bool, int, float)):
+                self.assertEqual(getattr(fit, key), value, key)
+        for name in ("profiles", "null_vectors", "comparison", "arcs"):
+            of_file = [one.keys() for one in keys[name]]
+            self.assertEqual(len(getattr(fit, name)), len(of_file), name)
+            for one, its_keys in zip(getattr(fit, name), of_file):
+                self.assertLessEqual(set(its_keys), set(dir(one)), name)
+        self.assertEqual([p.parameter for p in fit.profiles], [p["parameter"] for p in keys["profiles"]])
+        np.testing.assert_array_equal(fit.profiles[0].delta_chi2, keys["profiles"][0]["delta_chi2"])
+        self.assertEqual(fit.bootstrap.draws, 8)
+        self.assertEqual([b.sigma for b in fit.bootstrap.parameters],
+                         [b["sigma"] for b in keys["bootstrap"]["parameters"]])
+
+    def test_what_a_fit_is_worth_is_seen_where_it_is_printed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "fit.json"
+            trochoid.fit(noisy_track(), model="top", output=path)
+            keys = json.loads(path.read_text())
+            for verdict, shown in (("good", "good"), ("weak", "weak"), ("", "converged")):
+                path.write_text(json.dumps({**keys, "verdict": verdict}))
+                with self.subTest(verdict):
+                    self.assertIn(f"<Fit of top: {shown}, ", repr(trochoid.read_fit(path)))
+
+    def test_a_parameter_that_is_not_there_is_told_with_those_there_are(self):
+        with self.assertRaisesRegex(KeyError, "nope; there are .*l_m"):
+            trochoid.fit(noisy_track(), model="top")["nope"]
 
     def test_the_answer_does_not_depend_on_threads_and_survives_its_file(self):
         track = noisy_track()

@@ -206,6 +206,7 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
 #endif
 
 void add_fit_values(py::module_& module) {
+  using data::Bootstrap, data::BootstrapSpread, data::NullVector, data::Profile;
   using data::Fit, data::FitParameter, data::FitArc, data::ModelScore;
   py::class_<FitParameter>(module, "Parameter", "One parameter of a fit.")
       .def_readonly("name", &FitParameter::name)
@@ -240,11 +241,34 @@ void add_fit_values(py::module_& module) {
       .def_readonly("parameters", &ModelScore::parameters)
       .def_readonly("recommended", &ModelScore::recommended)
       .def_readonly("reason", &ModelScore::reason);
+  py::class_<NullVector>(module, "NullVector",
+                         "A direction of parameter space the data do not see.")
+      .def_readonly("components", &NullVector::components, "Weight by parameter name, unit length.")
+      .def_readonly("words", &NullVector::words);
+  py::class_<Profile>(module, "Profile", "How well the fit holds at fixed values of a parameter.")
+      .def_readonly("parameter", &Profile::parameter)
+      .def_readonly("verdict", &Profile::verdict, "bounded, one-sided or flat")
+      .def_readonly("lower_95", &Profile::lower_95)
+      .def_readonly("upper_95", &Profile::upper_95)
+      .def_property_readonly("values", [](const Profile& p) { return array_of(p.values); })
+      .def_property_readonly("delta_chi2", [](const Profile& p) { return array_of(p.delta_chi2); });
+  py::class_<BootstrapSpread>(module, "BootstrapSpread", "Spread of a parameter over the draws.")
+      .def_readonly("parameter", &BootstrapSpread::parameter)
+      .def_readonly("sigma", &BootstrapSpread::sigma)
+      .def_readonly("lower_95", &BootstrapSpread::lower_95)
+      .def_readonly("upper_95", &BootstrapSpread::upper_95);
+  py::class_<Bootstrap>(module, "Bootstrap", "Error bars from fits to resampled residuals.")
+      .def_readonly("draws", &Bootstrap::draws, "0: not asked for")
+      .def_readonly("failed", &Bootstrap::failed)
+      .def_readonly("block_s", &Bootstrap::block_s)
+      .def_readonly("parameters", &Bootstrap::parameters);
   py::class_<Fit>(module, "FitValue")
       .def_readonly("model", &Fit::model)
       .def_readonly("converged", &Fit::converged)
       .def_readonly("outcome", &Fit::outcome)
       .def_readonly("reason", &Fit::reason)
+      .def_readonly("verdict", &Fit::verdict)
+      .def_readonly("verdict_words", &Fit::verdict_words)
       .def_readonly("start_path", &Fit::start_path)
       .def_readonly("parameters", &Fit::parameters)
       .def_readonly("covariance_names", &Fit::covariance_names)
@@ -255,10 +279,17 @@ void add_fit_values(py::module_& module) {
       .def_readonly("aicc", &Fit::aicc)
       .def_readonly("bic", &Fit::bic)
       .def_readonly("whiteness_p", &Fit::whiteness_p)
+      .def_readonly("correlation_time_s", &Fit::correlation_time_s)
       .def_readonly("rank", &Fit::rank)
+      .def_readonly("condition", &Fit::condition)
+      .def_readonly("null_vectors", &Fit::null_vectors)
+      .def_readonly("integration_error_sigma", &Fit::integration_error_sigma)
+      .def_readonly("time_origin_s", &Fit::time_origin_s)
       .def_readonly("arcs", &Fit::arcs)
       .def_readonly("comparison", &Fit::comparison)
       .def_readonly("recommendation", &Fit::recommendation)
+      .def_readonly("profiles", &Fit::profiles)
+      .def_readonly("bootstrap", &Fit::bootstrap)
       .def_readonly("warnings", &Fit::warnings)
       .def_readonly("inputs", &Fit::inputs)
       .def_readonly("versions", &Fit::versions)

@@ -27,12 +27,14 @@ from typing import Any, Callable, Mapping, Optional, Sequence, Union
 import numpy as np
 
 from . import _core
-from ._core import Arc, Error, InputError, ModelScore, NumericalError, Parameter
+from ._core import (Arc, Bootstrap, BootstrapSpread, Error, InputError, ModelScore, NullVector,
+                    NumericalError, Parameter, Profile)
 
 __version__ = _core.__version__
 __all__ = ["track", "fit", "overlay", "simulate", "predict", "scenes", "read_track", "read_fit",
            "Scene", "Track", "TrackFile", "Trajectory", "Fit", "PredictedArc", "OverlayFrames",
-           "Parameter", "Arc", "ModelScore", "Error", "InputError", "NumericalError"]
+           "Parameter", "Arc", "ModelScore", "NullVector", "Profile", "Bootstrap", "BootstrapSpread",
+           "Error", "InputError", "NumericalError"]
 
 Path = Union[str, "os.PathLike[str]"]
 Moment = Union[None, str, float, int]
@@ -292,8 +294,12 @@ class Fit:
     """Parameters of a model with error bars, as `fit` finds and ``read_fit`` reads them.
 
     ``fit["radius_m"]`` is a ``Parameter`` (value, sigma, unit, status, identifiable, note); the other
-    attributes are those of the JSON file: model, converged, outcome, reason, chi2, dof, noise_scale,
-    aicc, bic, whiteness_p, rank, arcs, comparison, recommendation, warnings, seed, scene_toml.
+    attributes are those of the JSON file (docs/formats.md): model, converged, outcome, reason, verdict,
+    verdict_words, start_path, chi2, dof, noise_scale, aicc, bic, whiteness_p, correlation_time_s, rank,
+    condition, null_vectors, integration_error_sigma, time_origin_s, arcs, comparison, recommendation,
+    profiles, bootstrap, warnings, inputs, versions, seed, scene_toml.
+
+    ``verdict`` is what the fit is worth: good, good_correlated, weak, doubtful, no_feature or unexplained.
     """
 
     def __init__(self, value: "_core.FitValue"):
@@ -310,7 +316,11 @@ class Fit:
         return self._value.covariance
 
     def __getitem__(self, name: str) -> Parameter:
-        return self.parameters[name]
+        parameters = self.parameters
+        try:
+            return parameters[name]
+        except KeyError:
+            raise KeyError(f"{name}; there are {', '.join(parameters)}") from None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -321,7 +331,8 @@ class Fit:
         return sorted({*super().__dir__(), *(n for n in dir(self._value) if not n.startswith("_"))})
 
     def __repr__(self) -> str:
-        return f"<Fit of {self.model}: {self.outcome}, chi2 {self.chi2:.6g} for {self.dof}>"
+        worth = self.verdict or self.outcome  # another tool's file may lack the verdict
+        return f"<Fit of {self.model}: {worth}, chi2 {self.chi2:.6g} for {self.dof}>"
 
     def write(self, path: Path) -> None:
         """Writes the fit file (JSON), whole or not at all."""
@@ -345,14 +356,17 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
 
     tracks     a path, Track or TrackFile, or a list of them (several recordings of one body)
     model      top, rolling, sliding, puck, pivot or auto; overrides the scene's
+    from_, to  first and last sample: seconds (1.5) or a frame ("f120")
+    free_pivot fit the pivot's x and y (top); else it is where the scene says, or at 0, 0
     compare    try the models that make sense, fit the simplest that suffices
     profile    profile likelihood of the body's and the table's parameters
     bootstrap  number of fits to resampled residuals, 0: none
     threads    at most so many, 0: all cores; the answer does not depend on it
+    seed       of the draws of the bootstrap
     start      a first guess by parameter name; seldom needed
     output     write the fit into this JSON
 
-    An unwelcome answer is not an exception: look at ``converged``, ``outcome`` and ``warnings``.
+    An unwelcome answer is not an exception: look at ``converged``, ``verdict`` and ``warnings``.
     """
     values, inputs = _all_tracks(tracks)
     if scene is None and not model:
