@@ -151,7 +151,9 @@ double polynomial_chi2(const Problem& problem, int arc, int degree) {
     right.segment<2>(2 * i) = wt * reading.value;
   }
   const Eigen::VectorXd c = basis.colPivHouseholderQr().solve(right);
-  return (right - basis * c).squaredNorm();
+  constexpr double kRounding = 1e-13;
+  const double left = (right - basis * c).norm();
+  return left > kRounding * right.norm() ? left * left : 0.0;
 }
 
 // The least degree of polynomials that explain the positions as well as the model does, by BIC; -1

@@ -176,6 +176,20 @@ TEST(Verdict, FindsNothingOfATopInAStraightLine) {
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("a straight line in time"));
 }
 
+// Without a trace of noise, and so of what its size could be compared with.
+TEST(Verdict, FindsNothingInABodyThatStandsStill) {
+  data::Track track;
+  for (int i = 0; i < kSamples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = i / kRate_Hz;
+    sample.centre_m = Eigen::Vector2d(0.1, 0.2);
+    track.samples.push_back(sample);
+  }
+  const data::Fit fit = fit_of(track, rolling_disc());
+  EXPECT_FALSE(fit.converged);
+  EXPECT_EQ(fit.verdict, "no_feature") << fit.verdict_words;
+}
+
 TEST(Verdict, FindsNothingInWhiteNoise) {
   const auto nowhere = [](double) { return Eigen::Vector2d(0.0, 0.0); };
   const data::Track track = track_of(nowhere, white(kSigma_m, 4));

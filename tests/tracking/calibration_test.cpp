@@ -173,6 +173,16 @@ TEST(Calibration, RefusesBoardsThatAreNeverTilted) {
   EXPECT_THROW((void)calibrate(views, {640, 480}), NumericalError);
 }
 
+TEST(Calibration, RefusesOneTiltHoweverOftenItIsSeen) {
+  for (const auto& [distance, about_x, about_y] : kLooks) {
+    const auto view = find_board(draw_chessboard(looking(distance, about_x, about_y)),
+                                 {kColumns, kRows, kSquare_m, {}, {}}, "drawn");
+    ASSERT_TRUE(view);
+    EXPECT_THROW((void)calibrate(std::vector<BoardView>(8, *view), {640, 480}), NumericalError)
+        << about_x << ", " << about_y;
+  }
+}
+
 TEST(Calibration, RefusesTooLittle) {
   EXPECT_FALSE(find_board(cv::Mat(240, 320, CV_8UC1, cv::Scalar(128)), {}, "grey"));
   EXPECT_THROW((void)calibrate({}, {640, 480}), InputError);

@@ -11,6 +11,7 @@
 #include "canvas.hpp"
 #include "commands.hpp"
 #include "json_summary.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -204,7 +205,17 @@ void tell(const Options& options, const Views& views, const tracking::Calibratio
   fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
 }
 
+void check_outputs(const Options& options) {
+  std::vector<fs::path> inputs = options.inputs;
+  inputs.push_back(options.floor_points);
+  inputs.push_back(options.circle_points);
+  check_output(options.picture, inputs);
+  inputs.push_back(options.picture);
+  check_output(options.output, inputs);
+}
+
 void run(const Options& options) {
+  check_outputs(options);
   const tracking::BoardPattern pattern = pattern_of(options);
   const Views views = look_at_inputs(options, pattern);
   tracking::Calibration result = tracking::calibrate(views.found, views.size);

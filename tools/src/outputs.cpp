@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
 #ifdef TROCHOID_HAS_TRACKING
 #include "trochoid/tracking/frame_source.hpp"
 #endif
@@ -10,6 +11,35 @@
 namespace trochoid::tools {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+fs::path plain(const fs::path& path) {
+  std::error_code ignored;
+  return fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+}
+
+// A scene is read with the camera it names. What is wrong with it is told when it is read.
+fs::path camera_of(const fs::path& input) {
+  if (input.extension() != ".toml") return {};
+  try {
+    return data::read_scene(input).camera.file;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void check_apart(const fs::path& output, const fs::path& input) {
+  if (input.empty()) return;
+  std::error_code ignored;
+  if (fs::equivalent(output, input, ignored))
+    throw InputError(fmt::format(
+        "{}: is read or written by this command already; name another output", output.string()));
+  if (plain(output) == plain(input))
+    throw InputError(fmt::format("{}: is named for two outputs; name two files", output.string()));
+}
+
+}  // namespace
 
 void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (output.empty()) return;
@@ -21,13 +51,8 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (fs::is_directory(output, ignored))
     throw InputError(fmt::format("{}: is a folder, name a file to write", output.string()));
   for (const fs::path& input : inputs) {
-    if (input.empty()) continue;
-    if (fs::equivalent(output, input, ignored))
-      throw InputError(fmt::format(
-          "{}: is read or written by this command already; name another output", output.string()));
-    if (fs::weakly_canonical(output, ignored) == fs::weakly_canonical(input, ignored))
-      throw InputError(
-          fmt::format("{}: is named for two outputs; name two files", output.string()));
+    check_apart(output, input);
+    check_apart(output, camera_of(input));
   }
 }
 

@@ -7,7 +7,8 @@
 namespace trochoid::tools {
 
 /// Called before the work, so that a wrong name costs no time and no recording: `output` must lie
-/// in a folder that exists and be none of the files the command reads. Empty paths are skipped.
+/// in a folder that exists and be none of the files the command reads, nor another output among
+/// them; a scene (.toml) is read with the camera file it names. Empty paths are skipped.
 /// @throws InputError naming the output.
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);

@@ -103,6 +103,24 @@ std::optional<BoardView> find_charuco(const cv::Mat& luma, const BoardPattern& p
   return view;
 }
 
+/// Boards in parallel planes say the same about a camera, however often they are filmed
+/// [Zhang2000].
+std::size_t different_tilts(const std::vector<cv::Mat>& rotations) {
+  constexpr double kApart_rad = 0.07;
+  std::vector<Eigen::Vector3d> normals;
+  for (const cv::Mat& rotation : rotations) {
+    cv::Mat attitude;
+    cv::Rodrigues(rotation, attitude);
+    const Eigen::Vector3d normal(attitude.at<double>(0, 2), attitude.at<double>(1, 2),
+                                 attitude.at<double>(2, 2));
+    if (std::all_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& other) {
+          return normal.cross(other).norm() > kApart_rad;
+        }))
+      normals.push_back(normal);
+  }
+  return normals.size();
+}
+
 cv::Mat matrix_of(const data::Camera& camera) {
   return (cv::Mat_<double>(3, 3) << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0,
           1.0);
@@ -174,6 +192,11 @@ Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_
     throw NumericalError(
         fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
   }
+  if (const std::size_t different = different_tilts(rotations); different < kFewest)
+    throw NumericalError(fmt::format(
+        "{} views of the board are tilted in {} direction{} only and determine no camera; at least "
+        "{} are needed, better ten, tilted by 20 to 40 degrees in different directions",
+        views.size(), different, different == 1 ? "" : "s", kFewest));
   Calibration out;
   data::Camera& camera = out.camera;
   camera.width_px = size_px.width;
