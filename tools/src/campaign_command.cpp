@@ -52,14 +52,21 @@ CLI::Validator part_name() {
           "K/N"};
 }
 
-std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Options& options) {
+std::vector<const CampaignItem*> share_of(const Campaign& campaign, const Options& options) {
   const Part part = part_named(options.part).value_or(Part{});
-  std::vector<const CampaignItem*> open;
-  for (std::size_t i = 0; i < campaign.items.size(); ++i) {
-    if (!part.has(i)) continue;
-    const auto record = current_record(campaign, campaign.items[i]);
-    if (!record || options.again || !record->done) open.push_back(&campaign.items[i]);
-  }
+  std::vector<const CampaignItem*> share;
+  for (std::size_t i = 0; i < campaign.items.size(); ++i)
+    if (part.has(i)) share.push_back(&campaign.items[i]);
+  return share;
+}
+
+std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Options& options) {
+  std::vector<const CampaignItem*> open = share_of(campaign, options);
+  if (!options.again)
+    std::erase_if(open, [&](const CampaignItem* item) {
+      const auto record = current_record(campaign, *item);
+      return record && record->done;
+    });
   return open;
 }
 
@@ -75,36 +82,61 @@ void run_items(const Campaign& campaign, const std::vector<const CampaignItem*>&
   });
 }
 
+/// What became of some of a campaign's recordings.
+struct Tally {
+  int recordings = 0, good = 0, not_good = 0, not_run = 0;
+  std::vector<std::string> failures;  ///< names with their reasons
+
+  /// Null for a recording that was not run.
+  void add(const CampaignRecord* record) {
+    ++recordings;
+    if (record == nullptr)
+      ++not_run;
+    else if (!record->done)
+      failures.push_back(fmt::format("{}: {}", record->name, record->message));
+    else
+      ++(record->exit_status == 0 ? good : not_good);
+  }
+};
+
+/// @throws NotGood if any failed. `page`: where the summary is, empty if none was made.
+void tell(const Tally& tally, const std::string& page, bool json) {
+  if (json) {
+    nlohmann::ordered_json answer{{"recordings", tally.recordings},
+                                  {"good", tally.good},
+                                  {"not_good", tally.not_good},
+                                  {"failed", tally.failures.size()},
+                                  {"not_run", tally.not_run}};
+    if (!page.empty()) answer["summary"] = page;
+    print_json(answer);
+  } else {
+    for (const std::string& failure : tally.failures) fmt::print("failed: {}\n", failure);
+    fmt::print("{} recordings: {} good, {} not good, {} failed, {} not run{}\n", tally.recordings,
+               tally.good, tally.not_good, tally.failures.size(), tally.not_run,
+               page.empty() ? "" : fmt::format("; see {} and summary.csv", page));
+  }
+  if (!tally.failures.empty())
+    throw NotGood(
+        fmt::format("{} of {} recordings failed", tally.failures.size(), tally.recordings));
+}
+
 void summarise(const Campaign& campaign, bool json) {
   const std::vector<CampaignLine> lines = collect(campaign);
   data::write_text(summary_csv(lines), campaign.folder / "summary.csv");
   data::write_text(summary_html(campaign, lines), campaign.folder / "summary.html");
-  int good = 0, not_good = 0, failed = 0, open = 0;
-  for (const CampaignLine& line : lines) {
-    if (!line.known)
-      ++open;
-    else if (!line.record.done)
-      ++failed;
-    else
-      ++(line.record.exit_status == 0 ? good : not_good);
+  Tally tally;
+  for (const CampaignLine& line : lines) tally.add(line.known ? &line.record : nullptr);
+  tell(tally, (campaign.folder / "summary.html").string(), json);
+}
+
+/// One job of an array does not know what the others have left: it answers for its own share only.
+void tell_share(const Campaign& campaign, const Options& options) {
+  Tally tally;
+  for (const CampaignItem* item : share_of(campaign, options)) {
+    const auto record = current_record(campaign, *item);
+    tally.add(record ? &*record : nullptr);
   }
-  const std::string page = (campaign.folder / "summary.html").string();
-  if (json) {
-    print_json({{"recordings", lines.size()},
-                {"good", good},
-                {"not_good", not_good},
-                {"failed", failed},
-                {"not_run", open},
-                {"summary", page}});
-  } else {
-    for (const CampaignLine& line : lines)
-      if (line.known && !line.record.done)
-        fmt::print("failed: {}: {}\n", line.record.name, line.record.message);
-    fmt::print(
-        "{} recordings: {} good, {} not good, {} failed, {} not run; see {} and summary.csv\n",
-        lines.size(), good, not_good, failed, open, page);
-  }
-  if (failed > 0) throw NotGood(fmt::format("{} of {} recordings failed", failed, lines.size()));
+  tell(tally, "", options.json);
 }
 
 void run(const Options& options) {
@@ -119,8 +151,10 @@ void run(const Options& options) {
     note(fmt::format("{} of {} recordings to run", items.size(), campaign.items.size()));
     run_items(campaign, items, options.jobs);
   }
-  // One job of an array does not know what the others have left; the summary is made at the end.
-  if (options.part.empty()) summarise(campaign, options.json);
+  if (options.part.empty())
+    summarise(campaign, options.json);
+  else
+    tell_share(campaign, options);
 }
 
 }  // namespace
