@@ -121,6 +121,18 @@ data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& trac
   }
 }
 
+/// What could explain a track that the fit does not.
+std::string advice(const data::Fit& fit, const data::Scene& scene,
+                   const fitting::FitOptions& options) {
+  if (fit.outcome != "unexplained") return "";
+  std::string words;
+  const bool pivot_assumed = fit.model.starts_with("top") && !scene.support.pivot_m &&
+                             !scene.fit.free_pivot && !options.free_pivot;
+  if (pivot_assumed) words += "; the pivot was taken to be at x = y = 0, --free-pivot fits it";
+  if (fit.comparison.empty()) words += "; --compare tries what the model lacks";
+  return words;
+}
+
 void run(const FitCommand& command) {
   std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
   inputs.emplace_back(command.scene);
@@ -142,11 +154,9 @@ void run(const FitCommand& command) {
     fmt::print("{}", data::fit_text(fit, "fit"));
   else
     print(fit);
-  if (!fit.converged) {
-    const bool lacking = fit.outcome == "unexplained" && fit.comparison.empty();
-    throw NotGood(fmt::format("the fit is not good: {}{}", fit.reason,
-                              lacking ? "; --compare tries what the model lacks" : ""));
-  }
+  if (!fit.converged)
+    throw NotGood(
+        fmt::format("the fit is not good: {}{}", fit.reason, advice(fit, scene, command.options)));
 }
 
 }  // namespace
