@@ -92,6 +92,9 @@ Views look_at_inputs(const Options& options, const tracking::BoardPattern& patte
   std::int64_t done = 0;
   for (const fs::path& path : options.inputs) {
     if (!fs::exists(path)) throw InputError(fmt::format("{}: no such file", path.string()));
+    if (fs::is_directory(path))
+      throw InputError(fmt::format("{}: is a folder; give its pictures, e.g. {}", path.string(),
+                                   (path / "*.png").string()));
     const cv::Mat picture = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
     if (!picture.empty())
       views.look(picture, path.string(), pattern);
@@ -115,7 +118,9 @@ std::size_t floor_view(const Options& options, const Views& views) {
   if (options.floor.empty()) return 0;
   for (std::size_t i = 0; i < views.found.size(); ++i) {
     const std::string& name = views.found[i].name;
-    if (name == options.floor || fs::path(name).filename() == options.floor) return i;
+    const fs::path wanted = fs::path(options.floor).lexically_normal();
+    if (fs::path(name).lexically_normal() == wanted || fs::path(name).filename() == wanted)
+      return i;
   }
   throw InputError(
       fmt::format("--floor {}: none of the pictures with a board has this name", options.floor));
