@@ -91,7 +91,8 @@ struct Fit {
   /// residuals beyond twice their noise; no_feature; unexplained.
   std::string verdict;
   std::string verdict_words;  ///< the same as a sentence
-  /// Which start won: integral_matching, windows, shooting, multistart, given.
+  /// Which start won: integral_matching, windows, shooting, multistart, slip (a rim that slips at
+  /// first), rolls_first (one that rolls at first), given.
   std::string start_path;
   std::vector<FitParameter> parameters;       ///< free, fixed and derived ones
   std::vector<std::string> covariance_names;  ///< free parameters, in the order of the rows

@@ -130,7 +130,6 @@ class DormandPrince {
   [[nodiscard]] double t_previous_s() const { return t_previous_; }
   [[nodiscard]] double step_s() const { return step_; }
   [[nodiscard]] const Y& y() const { return y_; }
-  [[nodiscard]] const Y& y_previous() const { return y_previous_; }
   /// dy/dt at t_s() (the next step's first stage).
   [[nodiscard]] const Y& derivative() const { return k_[0]; }
   [[nodiscard]] const StepCounts& counts() const { return counts_; }
@@ -187,10 +186,6 @@ class DormandPrince {
     y = (y + value_of(r_[1][c])) * w;
     y = (y + value_of(r_[0][c])) * u;
     return y + value_of(y_previous_[c]);
-  }
-  /// Coefficients 1..7 of the same nested form (coefficient 0 is y_previous()), for batches.
-  [[nodiscard]] const S& dense_coefficient(int degree, int component) const {
-    return r_[degree - 1][component];
   }
   [[nodiscard]] double fraction(double t_s) const {
     return step_ > 0.0 ? (t_s - t_previous_) / step_ : 0.0;

@@ -10,8 +10,11 @@
 
 namespace trochoid::tracking {
 
+/// How to follow; what the scene's [tracking] says as well is combined as told at each field.
 struct TrackOptions {
-  int objects = 1;
+  int objects = 1;  ///< moving bodies, >= 1; the scene's number if that is larger
+  /// First and last moment, both included: seconds ("1.5") or frame ("f120"). Each one that is
+  /// given replaces the scene's; empty: the scene's, else the recording's own end.
   std::string from, to;
   Effort effort = Effort::normal;
   std::optional<std::filesystem::path> edges;  ///< CSV of accepted edge points per frame
@@ -24,8 +27,12 @@ struct TrackOptions {
 
 /// What happened while tracking, for the report.
 struct TrackSummary {
-  std::int64_t frames = 0, found = 0, lost = 0, doubtful = 0, damaged = 0;
-  std::string camera_words;  ///< how metres were obtained
+  std::int64_t frames = 0;    ///< pictures looked at, once each
+  std::int64_t found = 0;     ///< samples, over all bodies
+  std::int64_t lost = 0;      ///< pictures without a sample, counted for each body
+  std::int64_t doubtful = 0;  ///< samples with a quality below 0.5, among those found
+  std::int64_t damaged = 0;   ///< pictures the decoder found errors in, used all the same
+  std::string camera_words;   ///< how metres were obtained
 };
 
 struct TrackResult {
