@@ -38,6 +38,9 @@ void check_columns(const std::vector<std::string>& columns, const std::string& p
     };
     if (columns[i].front() == '{')
       throw InputError(fmt::format("{}: is JSON, where a table (CSV) is read", place));
+    if (columns[i].front() == '"' || columns[i].front() == '\'')
+      throw InputError(
+          fmt::format("{}: {} is no column name; remove the quotes", place, in_quotes(columns[i])));
     if (!starts_as_name(columns[i].front()))
       throw InputError(fmt::format(
           "{}: {} is no column name; the first line must name the columns, e.g. t_s,x_m,y_m", place,

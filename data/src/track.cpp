@@ -30,14 +30,15 @@ void check_covariance(const TrackSample& sample, const std::string& place) {
     throw InputError(fmt::format(
         "{}: sxx_m2,sxy_m2,syy_m2 must be three finite numbers, or all be empty", place));
   if (!s.allFinite()) return;
-  // The product is compared with room for rounding: fully correlated errors are allowed.
+  // The product is compared with room for rounding. Fully correlated and vanishing errors can be
+  // read, drawn and written; only a fit has no use for them and says the same.
   constexpr double kRounding = 1e-9;
   const bool positive = s(0, 0) >= 0.0 && s(1, 1) >= 0.0 &&
                         s(0, 1) * s(0, 1) <= s(0, 0) * s(1, 1) * (1.0 + kRounding);
   if (!positive)
     throw InputError(
-        fmt::format("{}: sxx_m2,sxy_m2,syy_m2 = {},{},{} is no covariance; need sxx, syy >= 0, "
-                    "sxy^2 <= sxx syy",
+        fmt::format("{}: sxx_m2,sxy_m2,syy_m2 = {},{},{} is no covariance; give sxx_m2, syy_m2 > 0 "
+                    "and sxy_m2^2 < sxx_m2 syy_m2, or leave all three empty",
                     place, s(0, 0), s(0, 1), s(1, 1)));
 }
 

@@ -55,8 +55,9 @@ Eigen::Matrix2d whitener_of(const data::TrackSample& sample) {
   const Eigen::LLT<Eigen::Matrix2d> cholesky(sample.covariance_m2);
   if (cholesky.info() != Eigen::Success)
     throw TrackError(
-        fmt::format("the covariance of the sample at t = {:g} s is not positive definite; give "
-                    "sxx_m2, syy_m2 > 0",
+        fmt::format("the covariance of the sample at t = {:g} s leaves a direction without error, "
+                    "which no fit can weigh; give sxx_m2, syy_m2 > 0 and sxy_m2^2 < sxx_m2 syy_m2, "
+                    "or leave all three empty",
                     sample.t_s));
   const Eigen::Matrix2d lower = cholesky.matrixL();
   return lower.inverse().transpose();

@@ -102,19 +102,21 @@ std::string words_of(const CLI::App& app) {
 }
 
 std::string completion(const CLI::App& app) {
+  // Whole words, between blanks: one command's name may begin with another's.
   std::string cases;
   const std::string everywhere = words_of(app);
   for (const CLI::App* command : shown_commands(app)) {
     for (const CLI::App* below : shown_commands(*command))
-      cases += fmt::format("    {}*{}*) words=\"{}\" ;;\n", command->get_name(), below->get_name(),
-                           words_of(*below));
-    cases += fmt::format("    {}*) words=\"{}\" ;;\n", command->get_name(), words_of(*command));
+      cases += fmt::format("    \" {}\"*\" {} \"*) words=\"{}\" ;;\n", command->get_name(),
+                           below->get_name(), words_of(*below));
+    cases +=
+        fmt::format("    \" {} \"*) words=\"{}\" ;;\n", command->get_name(), words_of(*command));
   }
   return fmt::format(
       "# bash completion of trochoid {}\n"
       "_trochoid() {{\n"
       "  local current=${{COMP_WORDS[COMP_CWORD]}} words\n"
-      "  case \"${{COMP_WORDS[*]:1:COMP_CWORD-1}}\" in\n{}"
+      "  case \" ${{COMP_WORDS[*]:1:COMP_CWORD-1}} \" in\n{}"
       "    *) words=\"{}\" ;;\n"
       "  esac\n"
       "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\") $(compgen -f -- \"$current\"))\n"
