@@ -48,8 +48,9 @@ endif()
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libtrochoid-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "Headers and static libraries: models of spinning and rolling bodies, their integrators, the tracker and the
-fit, for find_package(trochoid COMPONENTS data model fitting tracking).")
+set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "Headers and static libraries: models of spinning and rolling bodies, their
+integrators, the tracker and the fit, for
+find_package(trochoid COMPONENTS data model fitting tracking).")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "libeigen3-dev, libfmt-dev, nlohmann-json3-dev, libtomlplusplus-dev, libssl-dev, libsundials-dev, libceres-dev")
 if(TROCHOID_TRACKING)
