@@ -23,9 +23,9 @@ struct Window {
   [[nodiscard]] bool reversed() const;
 };
 
-/// @throws InputError, which calls the ends `from` and `to` as options, scenes and Python do, if
-/// one
-///         is no moment or if they are reversed. Empty texts leave their end open.
+/// Empty texts leave their end open.
+/// @throws InputError if one is no moment or they are reversed; it calls them `from` and `to`, as
+/// options, scenes and Python do.
 [[nodiscard]] Window parse_window(const std::string& from, const std::string& to);
 
 }  // namespace trochoid::data
