@@ -9,6 +9,7 @@
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <random>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -180,6 +181,74 @@ TEST(Calibration, RefusesOneTiltHoweverOftenItIsSeen) {
     ASSERT_TRUE(view);
     EXPECT_THROW((void)calibrate(std::vector<BoardView>(8, *view), {640, 480}), NumericalError)
         << about_x << ", " << about_y;
+  }
+}
+
+std::vector<BoardView> drawn_views() {
+  std::vector<BoardView> views;
+  for (const auto& [distance, about_x, about_y] : kLooks)
+    views.push_back(*find_board(draw_chessboard(looking(distance, about_x, about_y)),
+                                {kColumns, kRows, kSquare_m, {}, {}}, "drawn"));
+  return views;
+}
+
+// Squares 3 % longer than wide: another board, or a sheet that the printer stretched.
+TEST(Calibration, LeavesOutTheViewOfAnotherBoard) {
+  std::vector<BoardView> views = drawn_views();
+  for (Eigen::Vector2d& p : views[3].board_m) p.x() *= 1.03;
+  const Calibration result = calibrate(views, {640, 480});
+  ASSERT_EQ(result.left_out.size(), 1U);
+  EXPECT_EQ(result.left_out[0].view, 3U);
+  EXPECT_TRUE(result.left_out[0].corners_px.empty());
+  // All together make it 928 px.
+  constexpr double kFocal_px = 3.0;
+  EXPECT_NEAR(result.camera.fx, 900.0, kFocal_px);
+  // Each view keeps its place, and the one left out the rms that the others see in it.
+  ASSERT_EQ(result.view_rms_px.size(), views.size());
+  EXPECT_EQ(result.view_rms_px[3], result.left_out[0].rms_px);
+  EXPECT_GT(result.view_rms_px[3], 5.0 * result.rms_px);
+}
+
+// The sheet's middle stands up by 2 mm over a length of 160.
+TEST(Calibration, LeavesOutTheViewOfABentBoard) {
+  constexpr double kSag_m = 0.002, kHalf_m = 4.0 * kSquare_m;
+  std::vector<BoardView> views = drawn_views();
+  const auto& [distance, about_x, about_y] = kLooks[4];
+  const data::Camera camera = looking(distance, about_x, about_y);
+  for (std::size_t i = 0; i < views[4].board_m.size(); ++i) {
+    const Eigen::Vector2d at = views[4].board_m[i];
+    const double up = kSag_m * (1.0 - std::pow(at.x() / kHalf_m, 2));
+    views[4].image_px[i] += camera.image_from_table<double>({at.x(), at.y(), up}) -
+                            camera.image_from_table<double>({at.x(), at.y(), 0.0});
+  }
+  const Calibration result = calibrate(views, {640, 480});
+  ASSERT_EQ(result.left_out.size(), 1U);
+  EXPECT_EQ(result.left_out[0].view, 4U);
+}
+
+TEST(Calibration, LeavesOutOnlyTheCornerThatIsWrong) {
+  std::vector<BoardView> views = drawn_views();
+  views[2].image_px[10] += Eigen::Vector2d(12.0, 5.0);
+  const Calibration result = calibrate(views, {640, 480});
+  ASSERT_EQ(result.left_out.size(), 1U);
+  EXPECT_EQ(result.left_out[0].view, 2U);
+  ASSERT_EQ(result.left_out[0].corners_px.size(), 1U);
+  EXPECT_EQ(result.left_out[0].corners_px[0], views[2].image_px[10]);
+  constexpr double kCorner_px = 0.05;
+  EXPECT_LT(result.view_rms_px[2], kCorner_px);
+}
+
+// Shaky hands in every picture are no reason to throw pictures away.
+TEST(Calibration, LeavesNoViewOutThatIsAsGoodAsTheOthers) {
+  constexpr double kNoise_px = 0.2;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::vector<BoardView> views = drawn_views();
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise_px(0.0, kNoise_px);
+    for (BoardView& view : views)
+      for (Eigen::Vector2d& p : view.image_px)
+        p += Eigen::Vector2d(noise_px(random), noise_px(random));
+    EXPECT_TRUE(calibrate(views, {640, 480}).left_out.empty()) << seed;
   }
 }
 

@@ -114,6 +114,46 @@ Views look_at_inputs(const Options& options, const tracking::BoardPattern& patte
   return views;
 }
 
+std::string told(const tracking::LeftOut& out, const std::string& name) {
+  const std::size_t corners = out.corners_px.size();
+  if (corners > 0)
+    return fmt::format("{}: {} contradict{} the rest and {} left out, at ({:.0f}, {:.0f}) px{}",
+                       name, corners == 1 ? "a corner" : fmt::format("{} corners", corners),
+                       corners == 1 ? "s" : "", corners == 1 ? "is" : "are", out.corners_px[0].x(),
+                       out.corners_px[0].y(), corners > 1 ? " and more" : "");
+  return fmt::format(
+      "{}: contradicts the other pictures{} and is left out; is it the same board, flat and sharp?",
+      name, std::isfinite(out.rms_px) ? fmt::format(" (rms {:.2f} px)", out.rms_px) : "");
+}
+
+// What contradicts the rest is told, and wrong corners are gone from their views.
+void set_aside(const tracking::Calibration& result, Views& views) {
+  for (const tracking::LeftOut& out : result.left_out) {
+    tracking::BoardView& view = views.found[out.view];
+    note(told(out, view.name));
+    for (const Eigen::Vector2d& corner : out.corners_px) {
+      const auto at = std::find(view.image_px.begin(), view.image_px.end(), corner);
+      view.board_m.erase(view.board_m.begin() + (at - view.image_px.begin()));
+      view.image_px.erase(at);
+    }
+  }
+}
+
+bool is_left_out(const tracking::Calibration& result, std::size_t view) {
+  return std::any_of(result.left_out.begin(), result.left_out.end(), [view](const auto& out) {
+    return out.view == view && out.corners_px.empty();
+  });
+}
+
+std::size_t worst_view(const tracking::Calibration& result) {
+  std::size_t worst = 0;
+  double worst_px = -1.0;
+  for (std::size_t i = 0; i < result.view_rms_px.size(); ++i)
+    if (!is_left_out(result, i) && result.view_rms_px[i] > worst_px)
+      worst = i, worst_px = result.view_rms_px[i];
+  return worst;
+}
+
 std::size_t floor_view(const Options& options, const Views& views) {
   if (options.floor.empty()) return 0;
   for (std::size_t i = 0; i < views.found.size(); ++i) {
@@ -182,9 +222,12 @@ void draw_check(const Options& options, const Views& views, data::Camera camera)
 
 void tell(const Options& options, const Views& views, const tracking::Calibration& result,
           const std::string& floor) {
-  const auto worst = std::max_element(result.view_rms_px.begin(), result.view_rms_px.end());
-  const std::string& worst_name =
-      views.found[static_cast<std::size_t>(worst - result.view_rms_px.begin())].name;
+  const std::size_t worst = worst_view(result);
+  const double worst_px = result.view_rms_px[worst];
+  const std::string& worst_name = views.found[worst].name;
+  std::vector<std::string> left_out;
+  for (std::size_t i = 0; i < views.found.size(); ++i)
+    if (is_left_out(result, i)) left_out.push_back(views.found[i].name);
   const data::Camera& c = result.camera;
   const Eigen::Vector3d at = c.position_m();
   if (options.json)
@@ -193,15 +236,17 @@ void tell(const Options& options, const Views& views, const tracking::Calibratio
                        {"pictures", views.looked_at},
                        {"rms_px", result.rms_px},
                        {"worst_view", worst_name},
-                       {"worst_rms_px", *worst},
+                       {"worst_rms_px", worst_px},
+                       {"left_out", left_out},
                        {"sigma_focal_px", result.sigma_focal_px},
                        {"sigma_centre_px", result.sigma_centre_px},
                        {"floor", floor},
                        {"camera_m", {at.x(), at.y(), at.z()}}});
   fmt::print(
-      "{}: board found in {} of {} pictures, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
-      options.output.string(), views.found.size(), views.looked_at, result.rms_px, *worst,
-      worst_name);
+      "{}: board found in {} of {} pictures{}, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
+      options.output.string(), views.found.size(), views.looked_at,
+      left_out.empty() ? "" : fmt::format(", {} left out", left_out.size()), result.rms_px,
+      worst_px, worst_name);
   fmt::print(
       "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
       "{:.4f}, k2 {:.4f}\n",
@@ -222,8 +267,9 @@ void check_outputs(const Options& options) {
 void run(const Options& options) {
   check_outputs(options);
   const tracking::BoardPattern pattern = pattern_of(options);
-  const Views views = look_at_inputs(options, pattern);
+  Views views = look_at_inputs(options, pattern);
   tracking::Calibration result = tracking::calibrate(views.found, views.size);
+  set_aside(result, views);
   const std::string floor = place_floor(options, views, result.camera);
   if (!options.picture.empty()) draw_check(options, views, result.camera);
   data::write_camera(result.camera, options.output);
@@ -234,6 +280,12 @@ void run(const Options& options) {
         fmt::format("reprojection rms {:.2f} px is poor: a bent board, motion blur or "
                     "wrong corners",
                     result.rms_px));
+  const bool on_board = options.floor_points.empty() && options.circle_points.empty();
+  if (on_board && is_left_out(result, floor_view(options, views)))
+    throw NotGood(
+        fmt::format("{}: contradicts the other pictures, and the floor is taken from it; name "
+                    "another with --floor",
+                    views.found[floor_view(options, views)].name));
 }
 
 }  // namespace

@@ -103,24 +103,6 @@ std::optional<BoardView> find_charuco(const cv::Mat& luma, const BoardPattern& p
   return view;
 }
 
-/// Boards in parallel planes say the same about a camera, however often they are filmed
-/// [Zhang2000].
-std::size_t different_tilts(const std::vector<cv::Mat>& rotations) {
-  constexpr double kApart_rad = 0.07;
-  std::vector<Eigen::Vector3d> normals;
-  for (const cv::Mat& rotation : rotations) {
-    cv::Mat attitude;
-    cv::Rodrigues(rotation, attitude);
-    const Eigen::Vector3d normal(attitude.at<double>(0, 2), attitude.at<double>(1, 2),
-                                 attitude.at<double>(2, 2));
-    if (std::all_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& other) {
-          return normal.cross(other).norm() > kApart_rad;
-        }))
-      normals.push_back(normal);
-  }
-  return normals.size();
-}
-
 cv::Mat matrix_of(const data::Camera& camera) {
   return (cv::Mat_<double>(3, 3) << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0,
           1.0);
@@ -161,68 +143,6 @@ std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pat
   if (!seen_from_above(*view))
     for (Eigen::Vector2d& p : view->board_m) p.y() = -p.y();
   return view;
-}
-
-Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_px) {
-  constexpr std::size_t kFewest = 3;
-  if (views.size() < kFewest)
-    throw InputError(
-        fmt::format("{} views of the board; at least {} from different directions "
-                    "make a camera",
-                    views.size(), kFewest));
-  std::vector<std::vector<cv::Point3f>> board;
-  std::vector<std::vector<cv::Point2f>> image;
-  for (const BoardView& view : views) {
-    board.emplace_back();
-    image.emplace_back();
-    for (std::size_t i = 0; i < view.board_m.size(); ++i) {
-      board.back().emplace_back(static_cast<float>(view.board_m[i].x()),
-                                static_cast<float>(view.board_m[i].y()), 0.0F);
-      image.back().emplace_back(static_cast<float>(view.image_px[i].x()),
-                                static_cast<float>(view.image_px[i].y()));
-    }
-  }
-  cv::Mat matrix, distortion, intrinsic_sd, extrinsic_sd, view_rms;
-  std::vector<cv::Mat> rotations, translations;
-  double rms = 0.0;
-  try {
-    rms = cv::calibrateCamera(board, image, size_px, matrix, distortion, rotations, translations,
-                              intrinsic_sd, extrinsic_sd, view_rms, cv::CALIB_FIX_K3);
-  } catch (const cv::Exception& error) {
-    throw NumericalError(
-        fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
-  }
-  if (const std::size_t different = different_tilts(rotations); different < kFewest)
-    throw NumericalError(fmt::format(
-        "{} views of the board are tilted in {} direction{} only and determine no camera; at least "
-        "{} are needed, better ten, tilted by 20 to 40 degrees in different directions",
-        views.size(), different, different == 1 ? "" : "s", kFewest));
-  Calibration out;
-  data::Camera& camera = out.camera;
-  camera.width_px = size_px.width;
-  camera.height_px = size_px.height;
-  camera.fx = matrix.at<double>(0, 0);
-  camera.fy = matrix.at<double>(1, 1);
-  camera.cx = matrix.at<double>(0, 2);
-  camera.cy = matrix.at<double>(1, 2);
-  for (int i = 0; i < 5; ++i)
-    camera.distortion[static_cast<std::size_t>(i)] = distortion.at<double>(i);
-  out.rms_px = rms / std::sqrt(2.0);  // OpenCV counts both coordinates of a corner as one
-  for (int i = 0; i < view_rms.rows; ++i)
-    out.view_rms_px.push_back(view_rms.at<double>(i) / std::sqrt(2.0));
-  out.sigma_focal_px = std::max(intrinsic_sd.at<double>(0), intrinsic_sd.at<double>(1));
-  out.sigma_centre_px = std::max(intrinsic_sd.at<double>(2), intrinsic_sd.at<double>(3));
-  out.sigma_k1 = intrinsic_sd.at<double>(4);
-  constexpr double kUseless = 0.2;
-  // Boards that are never tilted let the focal length run away, with an error bar that is none.
-  constexpr double kLongestLens = 1000.0;  // in pictures' widths: 0.06 degrees from side to side
-  if (!(camera.fx > 0.0 && camera.fy > 0.0) || !(out.sigma_focal_px <= kUseless * camera.fx) ||
-      !(std::max(camera.fx, camera.fy) < kLongestLens * size_px.width))
-    throw NumericalError(
-        fmt::format("{} views of the board determine no camera; tilt it by 20 to 40 degrees, in "
-                    "different directions, in ten pictures or more",
-                    views.size()));
-  return out;
 }
 
 double set_floor(data::Camera& camera, const FloorPoints& points, double height_m) {

@@ -32,15 +32,26 @@ struct BoardView {
 [[nodiscard]] std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pattern,
                                                   const std::string& name);
 
+/// A view that contradicts the others, or the few corners of it that do.
+struct LeftOut {
+  std::size_t view = 0;                     ///< of those given
+  std::vector<Eigen::Vector2d> corners_px;  ///< where they were found; empty: the whole view
+  double rms_px = 0.0;  ///< of the view, per coordinate, as the camera of the others sees it
+};
+
 /// A camera from several views of a board. Its table frame is not set yet.
 struct Calibration {
   data::Camera camera;
-  double rms_px = 0.0;              ///< reprojection error per coordinate, over all corners
-  std::vector<double> view_rms_px;  ///< of each view
+  double rms_px = 0.0;              ///< reprojection error per coordinate, over all corners used
+  std::vector<double> view_rms_px;  ///< of each view given, also of those left out
+  std::vector<LeftOut> left_out;
   double sigma_focal_px = 0.0, sigma_centre_px = 0.0, sigma_k1 = 0.0;
 };
 
 /// Focal lengths, principal point and distortion k1, k2, p1, p2, [Zhang2000] as OpenCV does it.
+/// Of four views or more, those that pull the camera three times as hard as the others' scatter
+/// allows are left out, hardest first, a third of them at most; where a tenth of a view's corners
+/// accounts for it, only these.
 /// @throws InputError for fewer than three views; NumericalError if they do not determine a camera
 /// (all seen from the same direction).
 [[nodiscard]] Calibration calibrate(const std::vector<BoardView>& views, const cv::Size& size_px);
