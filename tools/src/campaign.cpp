@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "child_process.hpp"
+#include "commands.hpp"
 #include "run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -112,7 +114,36 @@ void read_answer(const fs::path& file, CampaignRecord& record) {
   record.verdict = answer.value("verdict", "");
 }
 
+// Also of a run that failed: they tell whether its cause was mended. Empty for what cannot be read.
+std::vector<std::pair<std::string, std::string>> checksums(const CampaignItem& item) {
+  std::vector<std::pair<std::string, std::string>> sums;
+  for (const fs::path& file : inputs_of(item)) {
+    sums.emplace_back(file.string(), "");
+    try {
+      sums.back().second = tracking::sha256_of_recording(file);
+    } catch (const InputError&) {  // the run has said so
+    }
+  }
+  return sums;
+}
+
 }  // namespace
+
+void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items) {
+  std::string first;
+  int wrong = 0;
+  for (const CampaignItem* item : items) try {
+      std::vector<std::string> words = command_of(campaign, *item);
+      words.erase(words.begin(), std::find(words.begin(), words.end(), "run") + 1);
+      check_run(words);
+    } catch (const InputError& error) {
+      if (wrong++ == 0) first = fmt::format("{}: {}", item->declared, error.what());
+    }
+  if (wrong > 1)
+    first += fmt::format(" ({} more recording{} cannot be run either)", wrong - 1,
+                         wrong == 2 ? "" : "s");
+  if (wrong > 0) throw InputError(first);
+}
 
 std::optional<CampaignRecord> current_record(const Campaign& campaign, const CampaignItem& item) {
   const Json json = read_json(record_path(campaign, item));
@@ -140,16 +171,8 @@ CampaignRecord run_item(const Campaign& campaign, const CampaignItem& item) {
   record.seconds = run.seconds;
   record.peak_mb = run.peak_mb;
   record.done = run.exit_status == 0 || run.exit_status == 3;
-  try {
-    if (record.done) {
-      read_answer(answer.path(), record);
-      for (const fs::path& file : inputs_of(item))
-        record.inputs.emplace_back(file.string(), tracking::sha256_of_recording(file));
-    }
-  } catch (const InputError& error) {
-    record.done = false;
-    record.message = error.what();
-  }
+  record.inputs = checksums(item);
+  if (record.done) read_answer(answer.path(), record);
   if (record.exit_status != 0 && record.message.empty())
     record.message = last_line(run.error_output);
   if (record.exit_status < 0 && record.message.empty()) record.message = "the process was killed";

@@ -14,6 +14,7 @@ struct CampaignItem {
   std::string name;  ///< of its folder and record; unique
   std::filesystem::path video, scene, camera;
   std::vector<std::string> options;  ///< further words of the command line
+  std::string declared;              ///< where in the manifest, "lab.toml:5"
 };
 
 struct Campaign {
@@ -24,6 +25,11 @@ struct Campaign {
 /// Reads a manifest (docs/campaigns.md); relative paths start at its folder.
 /// @throws InputError naming file and key, or a pattern that matches nothing.
 [[nodiscard]] Campaign read_campaign(const std::filesystem::path& manifest);
+
+/// Before any is run: every one must have its files, a scene that can be read, and options that
+/// `trochoid run` takes. What only the recording itself tells stays with its own run.
+/// @throws InputError naming the first that cannot be run, and how many more there are.
+void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items);
 
 /// What is known of an item after it was run; survives as records/NAME.json.
 struct CampaignRecord {

@@ -141,13 +141,15 @@ void tell_share(const Campaign& campaign, const Options& options) {
 
 void run(const Options& options) {
   const Campaign campaign = read_campaign(options.manifest);
+  std::vector<const CampaignItem*> items;
+  if (!options.summary_only) items = items_to_run(campaign, options);
+  check_items(campaign, items);
   std::error_code code;
   fs::create_directories(campaign.folder / "records", code);
   if (code)
     throw InputError(
         fmt::format("{}: cannot be made: {}", campaign.folder.string(), code.message()));
   if (!options.summary_only) {
-    const std::vector<const CampaignItem*> items = items_to_run(campaign, options);
     note(fmt::format("{} of {} recordings to run", items.size(), campaign.items.size()));
     run_items(campaign, items, options.jobs);
   }

@@ -103,11 +103,13 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
     fail(campaign.manifest, *table.get("video"),
          fmt::format("video = '{}' matches no file", text("video")));
   for (const fs::path& video : videos) {
-    CampaignItem item{.name = unique_name(video, taken),
-                      .video = video,
-                      .scene = filled_in(text("scene"), video, base),
-                      .camera = filled_in(text("camera"), video, base),
-                      .options = {}};
+    CampaignItem item{
+        .name = unique_name(video, taken),
+        .video = video,
+        .scene = filled_in(text("scene"), video, base),
+        .camera = filled_in(text("camera"), video, base),
+        .options = {},
+        .declared = fmt::format("{}:{}", campaign.manifest.string(), table.source().begin.line)};
     for (const OptionKey& option : kOptions)
       if (table.contains(option.key)) {
         item.options.emplace_back(option.option);

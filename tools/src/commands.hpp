@@ -30,6 +30,9 @@ void add_study_tracking_sweep(CLI::App& study);
 void add_init_command(CLI::App& app);
 void add_overlay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
+/// What `trochoid run` would refuse before it looks into the recording.
+/// @throws InputError as it would.
+void check_run(const std::vector<std::string>& words);
 void add_campaign_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_calibrate_command(CLI::App& app);

@@ -19,6 +19,7 @@
 #include "track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/tracking/tracker.hpp"
@@ -315,44 +316,65 @@ void run(const Options& options) {
     throw NotGood(fmt::format("the fit is not good: {}", run.fit->reason));
 }
 
-}  // namespace
-
-void add_run_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "run", "Track, fit, overlay and report: a recording in, a folder with everything out");
-  command->add_option("video", options->video, "Recording")->required();
-  command->add_option("--scene", options->scene,
-                      "Scene TOML: body, camera, model (docs/formats.md)");
-  command->add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
-  command->add_option("-o,--output", options->output,
-                      "Folder to make (default: VIDEO's name with .trochoid)");
+std::shared_ptr<Options> add_options(CLI::App& command) {
+  auto options = std::make_shared<Options>();
+  command.add_option("video", options->video, "Recording")->required();
+  command.add_option("--scene", options->scene,
+                     "Scene TOML: body, camera, model (docs/formats.md)");
+  command.add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
+  command.add_option("-o,--output", options->output,
+                     "Folder to make (default: VIDEO's name with .trochoid)");
   command
-      ->add_option("--model", options->model,
-                   "Model to fit, or auto: compare; overrides the scene's")
+      .add_option("--model", options->model,
+                  "Model to fit, or auto: compare; overrides the scene's")
       ->check(fitted_model());
   command
-      ->add_option("--objects", options->objects,
-                   "Number of moving bodies, all of the size the scene gives")
+      .add_option("--objects", options->objects,
+                  "Number of moving bodies, all of the size the scene gives")
       ->check(CLI::Range(1, 64));
-  add_at(*command, options->at);
-  command->add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
-  command->add_option("--to", options->to, "Last moment: seconds or a frame");
+  add_at(command, options->at);
+  command.add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
+  command.add_option("--to", options->to, "Last moment: seconds or a frame");
   command
-      ->add_option("--rate", options->rate_hz,
-                   "True frame rate [Hz]: of slow motion, or of an image folder or series")
+      .add_option("--rate", options->rate_hz,
+                  "True frame rate [Hz]: of slow motion, or of an image folder or series")
       ->check(frame_rate());
   add_effort(
-      *command, options->effort,
+      command, options->effort,
       "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
       "likelihoods and bootstrap");
-  command->add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
+  command.add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
   command
-      ->add_option("--slow", options->slow,
-                   "Overlay plays this many times slower (default: at most 60 frames/s)")
+      .add_option("--slow", options->slow,
+                  "Overlay plays this many times slower (default: at most 60 frames/s)")
       ->check(number_within(0.01, 1000.0));
-  command->add_option("--seed", options->seed, "Seed of everything random");
-  add_json_flag(*command, options->json);
+  command.add_option("--seed", options->seed, "Seed of everything random");
+  add_json_flag(command, options->json);
+  return options;
+}
+
+}  // namespace
+
+void check_run(const std::vector<std::string>& words) {
+  CLI::App command;
+  const auto options = add_options(command);
+  try {
+    command.parse(std::vector<std::string>(words.rbegin(),
+                                           words.rend()));  // from the back, as CLI11 wants them
+  } catch (const CLI::ParseError& error) {
+    throw InputError(error.what());
+  }
+  const bool numbered = options->video.find('%') != std::string::npos;  // img/%04d.png
+  if (!numbered && !fs::exists(options->video))
+    throw InputError(fmt::format("{}: no such file", options->video));
+  (void)data::parse_window(options->from, options->to);
+  (void)prepared(*options);
+}
+
+void add_run_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "run", "Track, fit, overlay and report: a recording in, a folder with everything out");
+  const auto options = add_options(*command);
   command->footer(
       "Example:\n  trochoid run ring.mp4 --scene ring.toml\nwrites ring.trochoid/; open "
       "ring.trochoid/report.html");
