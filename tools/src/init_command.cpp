@@ -69,9 +69,12 @@ Measures measures_of(const Inspection& seen, double radius_mm) {
 
 std::string body_words(const Inspection& seen, const Measures& body) {
   std::string text = "[body]\n";
-  text += body.ring
-              ? "kind = \"ring\"             # the floor shows through its middle; else \"disc\"\n"
-              : "kind = \"disc\"             # nothing shows through its middle; else \"ring\"\n";
+  if (!seen.body)
+    text += "kind = \"disc\"             # NOT SEEN, a placeholder; else \"ring\" or \"top\"\n";
+  else if (body.ring)
+    text += "kind = \"ring\"             # the floor shows through its middle; else \"disc\"\n";
+  else
+    text += "kind = \"disc\"             # nothing shows through its middle; else \"ring\"\n";
   text += fmt::format(
       "radius_m = {:<15g} # {}\n", body.radius_m,
       body.measured ? "outer rim"
@@ -106,7 +109,10 @@ std::string prior_words(const Measures& body) {
 
 std::string support_words(const Inspection& seen) {
   constexpr double kStays = 0.1;  // of its radius: what turns on the spot is held there
-  const bool flat = seen.body && seen.body->least_axis_ratio > kFlatRatio;
+  if (!seen.body)
+    return "\n# [support]\n# kind = \"floor\"          # runs on its rim; \"flat\": slides on its "
+           "face; \"pivot\": turns about a fixed point\n";
+  const bool flat = seen.body->least_axis_ratio > kFlatRatio;
   const bool held = flat && seen.body->travel_px < kStays * seen.body->radius_px;
   const char* kind = held ? "pivot" : flat ? "flat" : "floor";
   const char* why = held   ? "its centre stays: it turns about a fixed point"
@@ -162,6 +168,17 @@ std::string scene_text(const Options& options, const Inspection& seen, double ra
   return text;
 }
 
+void tell_json(const Options& options, const Inspection& seen) {
+  nlohmann::ordered_json summary{{"scene", options.output.string()},
+                                 {"frame_rate_hz", seen.video.frame_rate_hz},
+                                 {"found", seen.body.has_value()}};
+  if (seen.body)
+    summary.update({{"kind", seen.body->bore_shows ? "ring" : "disc"},
+                    {"radius_px", seen.body->radius_px},
+                    {"frames", seen.body->frames}});
+  print_json(summary);
+}
+
 void run(Options options) {
   if (options.output.empty())
     options.output = fs::path(options.video).replace_extension(".toml").filename();
@@ -175,20 +192,15 @@ void run(Options options) {
   const std::string text = scene_text(options, seen, radius_mm);
   (void)data::parse_scene(text, options.output.string());  // what is written can be read
   data::write_text(text, options.output);
-  if (options.json) {
-    nlohmann::ordered_json summary{{"scene", options.output.string()},
-                                   {"frame_rate_hz", seen.video.frame_rate_hz},
-                                   {"found", seen.body.has_value()}};
-    if (seen.body)
-      summary.update({{"kind", seen.body->bore_shows ? "ring" : "disc"},
-                      {"radius_px", seen.body->radius_px},
-                      {"frames", seen.body->frames}});
-    return print_json(summary);
-  }
-  note(seen.body ? fmt::format("{}: {} of about {:.0f} px radius, followed through {} frames",
-                               options.output.string(), seen.body->bore_shows ? "a ring" : "a disc",
-                               seen.body->radius_px, seen.body->frames)
-                 : fmt::format("{}: no moving body found", options.output.string()));
+  if (options.json) tell_json(options, seen);
+  if (!seen.body)
+    throw NotGood(
+        fmt::format("{}: no moving body found; {} holds placeholders only, to be filled in by hand",
+                    options.video.string(), options.output.string()));
+  if (options.json) return;
+  note(fmt::format("{}: {} of about {:.0f} px radius, followed through {} frames",
+                   options.output.string(), seen.body->bore_shows ? "a ring" : "a disc",
+                   seen.body->radius_px, seen.body->frames));
 }
 
 }  // namespace

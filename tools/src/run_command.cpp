@@ -308,10 +308,7 @@ void run(const Options& options) {
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();
   tell(run, verdict, options);
-  const auto wanted = static_cast<std::size_t>(run.scene.tracking.objects);
-  if (run.tracked.file.tracks.size() < wanted)
-    throw NotGood(
-        fmt::format("only {} of {} moving bodies found", run.tracked.file.tracks.size(), wanted));
+  check_found(run.tracked.file, run.scene.tracking.objects);
   if (run.fit && !run.fit->converged)
     throw NotGood(fmt::format("the fit is not good: {}", run.fit->reason));
 }

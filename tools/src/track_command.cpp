@@ -129,10 +129,7 @@ void run(const Options& options) {
   write_timing(options.output, elapsed.count(), result.summary);
   detail_tracks(result.file);
   tell(options, result, interpolated);
-  const auto wanted = static_cast<std::size_t>(scene.tracking.objects);
-  if (result.file.tracks.size() < wanted)
-    throw NotGood(
-        fmt::format("only {} of {} moving bodies found", result.file.tracks.size(), wanted));
+  check_found(result.file, scene.tracking.objects);
 }
 
 }  // namespace

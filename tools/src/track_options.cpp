@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 
+#include "commands.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {
@@ -49,6 +51,21 @@ Eigen::Vector2d parse_point(const std::string& text) {
   if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
     throw InputError(fmt::format("--at {}: give a point in pixels as x,y", text));
   return {x, y};
+}
+
+void check_found(const data::TrackFile& found, int wanted) {
+  if (found.tracks.size() < static_cast<std::size_t>(wanted))
+    throw NotGood(fmt::format("only {} of {} moving bodies found", found.tracks.size(), wanted));
+  for (const data::Track& track : found.tracks) {
+    const auto& samples = track.samples;
+    if (std::all_of(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); }))
+      throw NotGood(fmt::format(
+          "{}{} doubtful; is it the body that the scene describes (dimensions, camera)? --at x,y "
+          "points at it",
+          found.tracks.size() > 1 ? fmt::format("object {}: ", track.object) : "",
+          samples.size() == 1 ? std::string("the only frame with the body is")
+                              : fmt::format("all {} frames with the body are", samples.size())));
+  }
 }
 
 }  // namespace trochoid::tools

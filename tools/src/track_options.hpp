@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "trochoid/data/track.hpp"
 #include "trochoid/tracking/effort.hpp"
 
 namespace trochoid::tools {
@@ -18,5 +19,9 @@ void add_effort(CLI::App& command, tracking::Effort& effort, const std::string& 
 void add_at(CLI::App& command, std::string& at);
 /// @throws InputError unless the text is x,y [px].
 [[nodiscard]] Eigen::Vector2d parse_point(const std::string& text);
+
+/// What is found in a track to be sure of, once its files are written.
+/// @throws NotGood if fewer bodies were found than wanted, or one only in frames that are doubtful.
+void check_found(const data::TrackFile& found, int wanted);
 
 }  // namespace trochoid::tools
