@@ -9,7 +9,8 @@
 /// Small helpers of the readers and writers; private to this module.
 namespace trochoid::data {
 
-/// Bytes of a file, refused beyond `limit_bytes` (an endless device, a video given as a table).
+/// A file's text, refused beyond `limit_bytes` (an endless device, a video given as a table). Lines
+/// that end in \r alone throughout end in \n.
 /// @throws InputError naming the file if it is missing, a folder, unreadable or too large.
 [[nodiscard]] std::string read_text(const std::filesystem::path& path,
                                     std::size_t limit_bytes = std::size_t{64} << 20);

@@ -62,6 +62,11 @@ void check_sample(const TrackSample& sample, const TrackSample* previous,
   if (previous && !(sample.t_s > previous->t_s))
     throw InputError(fmt::format("{}: t_s = {} does not increase (previous {}); sort the track",
                                  place, sample.t_s, previous->t_s));
+  // Two rows of one frame: two tracks in one, or a tracker that saw two bodies.
+  if (previous && sample.frame >= 0 && sample.frame <= previous->frame)
+    throw InputError(fmt::format(
+        "{}: frame = {} does not increase (previous {}); one row for each frame and body", place,
+        sample.frame, previous->frame));
   check_centre(sample, place);
   check_covariance(sample, place);
   check_angle(sample.theta, "theta", place);

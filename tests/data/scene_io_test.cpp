@@ -299,8 +299,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"NoObjects", "[tracking]\nobjects = 0", ":2:", "1..64"},
         Refusal{"HalfObjects", "[tracking]\nobjects = 1.5", ":2:", "whole number"},
         Refusal{"BadFrom", "[tracking]\nfrom = 'soon'", ":2:", "seconds (1.5) or a frame"},
-        Refusal{"BackwardWindow", "[tracking]\nto = 1\nfrom = 2.5", ":3:",
-                "[tracking] from = 2.5 lies after to = 1"},
+        Refusal{"BackwardWindow", "[tracking]\nto = 1\nfrom = 2.5",
+                ":3:", "[tracking] from = 2.5 lies after to = 1"},
         Refusal{"BackwardFrames", "[tracking]\nfrom = 'f9'\nto = 'f8'", ":2:", "exchange them"},
         Refusal{"UnknownModel", "[model]\nname = 'roling'", ":2:", "did you mean rolling?"},
         Refusal{"NegativeFriction", "[model]\nfriction = -0.1", ":2:", "0 or greater"},
@@ -323,6 +323,13 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"LongUnknownKey", "[body]\n" + std::string(100000, 'a') + " = 1", ":2:", "..."},
         Refusal{"DeepNesting", "[fit]\nfree = " + std::string(100000, '['), ":2:", "not TOML"}),
     [](const auto& instance) { return instance.param.name; });
+
+TEST(SceneFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
+  const TestFolder folder;
+  EXPECT_EQ(
+      read_scene(folder.write("cr.toml", "# a disc\r[body]\rradius_m = 0.03\r")).body->radius_m,
+      0.03);
+}
 
 }  // namespace
 }  // namespace trochoid::data

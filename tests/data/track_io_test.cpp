@@ -149,6 +149,25 @@ TEST(TrackFile, FromASpreadsheetMayHaveCarriageReturnsBlanksAByteOrderMarkAndFur
   EXPECT_EQ(read.notes, std::vector<std::string>{"exported by hand"});
 }
 
+TEST(TrackFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
+  const TestFolder folder;
+  const TrackFile read =
+      read_track(folder.write("cr.csv", "# by hand\rt_s,x_m,y_m\r0,1,2\r1,3,4\r"));
+  ASSERT_EQ(read.tracks.at(0).samples.size(), 2u);
+  EXPECT_EQ(read.tracks[0].samples[1].centre_m, Eigen::Vector2d(3, 4));
+  const auto bad = folder.write("bad.csv", "t_s,x_m,y_m\r0,1,2\r0,3,4\r");
+  EXPECT_NE(refusal([&] { static_cast<void>(read_track(bad)); }).find("bad.csv:3: "),
+            std::string::npos);
+}
+
+// Two bodies may share a frame, one may not be in it twice.
+TEST(TrackFile, CountsTheFramesOfEachBodyByThemselves) {
+  const TestFolder folder;
+  const TrackFile read = read_track(folder.write(
+      "two.csv", "frame,t_s,x_m,y_m,object\n0,0,1,2,0\n0,0,3,4,1\n1,1,1,2,0\n1,1,3,4,1\n"));
+  EXPECT_EQ(read.tracks.size(), 2u);
+}
+
 struct CommaPoint : std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }
@@ -228,6 +247,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"Quality", "t_s,x_m,y_m,quality\n0,1,2,1.5\n", ":2:", "0..1"},
         Refusal{"BrokenFrame", "frame,t_s,x_m,y_m\n1.5,0,1,2\n", ":2:", "whole number"},
         Refusal{"NegativeFrame", "frame,t_s,x_m,y_m\n-4,0,1,2\n", ":2:", "whole number"},
+        Refusal{"DoubledFrame", "frame,t_s,x_m,y_m\n7,0,1,2\n8,1,1,2\n8,2,1,2\n",
+                ":4:", "frame = 8 does not increase (previous 8)"},
         Refusal{"NoObject", "t_s,x_m,y_m,object\n0,1,2,\n", ":2:", "object = ''"},
         Refusal{"HugeObject", "t_s,x_m,y_m,object\n0,1,2,1e300\n", ":2:", "whole number"},
         Refusal{"FutureVersion", "# trochoid track 2\nt_s,x_m,y_m\n0,1,2\n", ":", "version 1"},

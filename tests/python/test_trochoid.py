@@ -60,6 +60,18 @@ class Errors(unittest.TestCase):
         with self.assertRaisesRegex(trochoid.InputError, "radius_m"):
             trochoid.Scene({"body": {"radus_m": 0.03}})
 
+    def test_what_is_wrong_with_a_scene_is_told_where_the_caller_can_find_it(self):
+        for scene, words in (({"run": {"until_s": 1.0}, "body": {"radius_m": 0.03, "radus_m": 0.03}},
+                              r"^scene\['body'\]: 'radus_m' is not a key of \[body\]"),
+                             ({"body": {"radius_m": -1.0}}, r"^scene\['body'\]: radius_m = -1 must be"),
+                             ({"bdy": {"radius_m": 0.03}}, r"^scene\['bdy'\]: 'bdy' is not a key")):
+            with self.subTest(scene), self.assertRaisesRegex(trochoid.InputError, words):
+                trochoid.Scene(scene)
+        with self.assertRaisesRegex(trochoid.InputError, "^scene text:3: radius_m = -1 must be"):
+            trochoid.Scene.from_toml("# a disc\n[body]\nradius_m = -1\n")
+        with self.assertRaisesRegex(trochoid.InputError, "^scene: until_s = -1 must be"):
+            trochoid.simulate(TOP, until_s=-1.0)
+
     def test_errors_are_also_pythons_own(self):
         self.assertTrue(issubclass(trochoid.InputError, ValueError))
         self.assertTrue(issubclass(trochoid.NumericalError, ArithmeticError))

@@ -35,9 +35,17 @@ struct SceneValue {
   data::Scene scene;
 };
 
-/// What was set from Python passes the same checks as a scene file. @throws InputError
+/// What was set from Python passes the same checks as a scene file. @throws InputError without the
+/// line: nobody has seen the text in which it would be counted.
 data::Scene checked(const data::Scene& scene) {
-  return data::parse_scene(data::to_toml(scene), "scene");
+  const std::string where = "scene";
+  try {
+    return data::parse_scene(data::to_toml(scene), where);
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    if (!message.starts_with(where + ":")) throw;
+    throw InputError(where + message.substr(message.find(": ")));
+  }
 }
 
 std::vector<data::Track> tracks_of(const py::list& list) {
@@ -304,9 +312,10 @@ void add_scene(py::module_& module) {
       .def(py::init())
       .def_static("load",
                   [](const std::string& name) { return SceneValue{tools::load_scene(name)}; })
-      .def_static(
-          "parse",
-          [](const std::string& toml) { return SceneValue{data::parse_scene(toml, "scene")}; })
+      .def_static("parse",
+                  [](const std::string& toml, const std::string& where) {
+                    return SceneValue{data::parse_scene(toml, where)};
+                  })
       .def("with_run",
            [](SceneValue value, std::optional<double> until_s, std::optional<double> rate_hz,
               std::optional<double> tolerance, const std::string& model,

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import reprlib
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
@@ -107,14 +108,20 @@ def _toml_value(value: Any) -> str:
     raise InputError(f"scene: a {type(value).__name__} cannot be written in a scene")
 
 
-def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    lines = []
+def _scene_of_dict(tables: Mapping[str, Mapping[str, Any]]) -> "_core.SceneValue":
+    lines, owners = [], []  # of each line: the table it belongs to
     for name, table in tables.items():
         if not isinstance(table, Mapping):
             raise InputError(f"scene: '{name}' is not a table; give a dict of dicts")
-        lines.append(f"[{name}]")
-        lines += [f"{key} = {_toml_value(value)}" for key, value in table.items()]
-    return "\n".join(lines) + "\n"
+        lines += [f"[{name}]"] + [f"{key} = {_toml_value(value)}" for key, value in table.items()]
+        owners += [name] * (1 + len(table))
+    try:
+        return _core.SceneValue.parse("\n".join(lines) + "\n", "scene")
+    except InputError as error:  # the lines are not the caller's: says the table instead
+        line = re.match(r"scene:(\d+): ", str(error))
+        if not line or int(line[1]) > len(owners):
+            raise
+        raise InputError(f"scene[{owners[int(line[1]) - 1]!r}]: {str(error)[line.end():]}") from None
 
 
 class Scene:
@@ -129,7 +136,7 @@ class Scene:
         elif isinstance(scene, Scene):
             self._value = scene._value
         elif isinstance(scene, Mapping):
-            self._value = _core.SceneValue.parse(_toml(scene))
+            self._value = _scene_of_dict(scene)
         else:
             self._value = _core.SceneValue.load(_path("scene", scene))
 
@@ -137,7 +144,7 @@ class Scene:
     def from_toml(cls, text: str) -> "Scene":
         """A scene from the text of a scene file."""
         scene = cls()
-        scene._value = _core.SceneValue.parse(_text("text", text))
+        scene._value = _core.SceneValue.parse(_text("text", text), "scene text")
         return scene
 
     @property
