@@ -22,3 +22,11 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/trochoidConfig.cmake
               ${CMAKE_BINARY_DIR}/trochoidConfigVersion.cmake
         DESTINATION ${package_dir} COMPONENT development)
+
+# Below share/doc as below the source folder: what headers and pages cite is found under the name they use.
+install(FILES ${CMAKE_SOURCE_DIR}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+install(FILES ${CMAKE_SOURCE_DIR}/docs/formats.md ${CMAKE_SOURCE_DIR}/docs/library.md
+        DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/libtrochoid-dev/docs COMPONENT development)
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/model/theory
+        DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/libtrochoid-dev/model COMPONENT development)
