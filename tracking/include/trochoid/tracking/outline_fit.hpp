@@ -14,6 +14,8 @@
 
 namespace trochoid::tracking {
 
+/// How light falls off beside an outline: what one frame's measurement hands to the next one's, and
+/// nothing to look into.
 class ShadingMemory;
 
 /// An edge found in the image that the fit accepted.
