@@ -73,6 +73,10 @@ void check_target(const fs::path& target) {
   if (!fs::is_directory(folder, code))
     throw InputError(fmt::format("{}: cannot be written, the folder {} does not exist",
                                  target.string(), folder.string()));
+  // A rename would replace it all the same; whoever protected it did not want that.
+  if (fs::exists(target, code) && ::access(target.c_str(), W_OK) != 0)
+    throw InputError(
+        fmt::format("{}: cannot be written, the file is write-protected", target.string()));
   if (!is_special(target) && ::access(folder.c_str(), W_OK) != 0)
     throw InputError(fmt::format("{}: cannot be written, the folder {} does not allow it",
                                  target.string(), folder.string()));

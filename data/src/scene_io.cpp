@@ -159,6 +159,12 @@ Scene scene_of(const toml::table& root, const std::string& where) {
       [&](const TableReader& r) { check_run(r, scene.run); });
   read(
       "fit", scene.fit, [](auto&& v) { fit_keys(v); }, unchecked);
+  for (const auto& [key, node] : root)
+    if (!node.is_table() && !node.is_array_of_tables())
+      throw InputError(
+          fmt::format("{}:{}: {} stands outside of every table; lengths belong under "
+                      "[body], for instance",
+                      where, key.source().begin.line, in_quotes(key.str())));
   top.refuse_unknown();
   return scene;
 }

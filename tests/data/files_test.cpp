@@ -24,6 +24,15 @@ TEST(WriteText, RefusesAFolderAsTarget) {
   EXPECT_NE(refusal([&] { write_text("x", folder.path()); }).find("folder"), std::string::npos);
 }
 
+TEST(WriteText, LeavesAWriteProtectedFileAlone) {
+  if (::geteuid() == 0) GTEST_SKIP() << "nothing is protected from root";
+  const TestFolder folder;
+  const auto path = folder.write("kept.txt", "old");
+  std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+  EXPECT_NE(refusal([&] { write_text("new", path); }).find("write-protected"), std::string::npos);
+  EXPECT_EQ(content(path), "old");
+}
+
 TEST(WriteText, WritesIntoADeviceInsteadOfReplacingIt) {
   write_text("gone", "/dev/null");
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
