@@ -9,7 +9,9 @@ import signal
 import tempfile
 import threading
 import time
+import types
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -71,6 +73,16 @@ class Errors(unittest.TestCase):
             trochoid.Scene.from_toml("# a disc\n[body]\nradius_m = -1\n")
         with self.assertRaisesRegex(trochoid.InputError, "^scene: until_s = -1 must be"):
             trochoid.simulate(TOP, until_s=-1.0)
+
+    def test_a_build_without_tracking_says_so(self):
+        without = types.SimpleNamespace(**{name: value for name, value in vars(trochoid._core).items()
+                                           if name not in ("track", "overlay")})
+        with unittest.mock.patch.object(trochoid, "_core", without):
+            for name, call in (("track", lambda: trochoid.track("some.mp4")),
+                               ("overlay", lambda: trochoid.overlay("some.mp4", noisy_track(), still="x.png"))):
+                with self.subTest(name), self.assertRaisesRegex(
+                        trochoid.Error, f"^{name}: this trochoid was built without tracking"):
+                    call()
 
     def test_errors_are_also_pythons_own(self):
         self.assertTrue(issubclass(trochoid.InputError, ValueError))

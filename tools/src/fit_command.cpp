@@ -54,8 +54,14 @@ const char* word(data::ParameterStatus status) {
   }
 }
 
+void print_notes(const data::Fit& fit) {
+  for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
+}
+
 void print(const data::Fit& fit) {
   fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
+  // Where no start led anywhere, there is nothing to count.
+  if (fit.parameters.empty()) return print_notes(fit);
   if (fit.converged) fmt::print("  {}: {}\n", fit.verdict, fit.verdict_words);
   for (const data::FitParameter& p : fit.parameters)
     fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
@@ -83,7 +89,7 @@ void print(const data::Fit& fit) {
     if (!m.reason.empty()) fmt::print("      not accepted: {}\n", m.reason);
   }
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
-  for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
+  print_notes(fit);
 }
 
 std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
@@ -142,8 +148,8 @@ void run(const FitCommand& command) {
   const std::vector<data::Track> tracks = read_tracks(command, provenance);
   data::Scene scene;
   if (!command.scene.empty()) {
-    scene = data::read_scene(command.scene);
-    add_checksum(provenance.inputs, command.scene);
+    scene = load_scene(command.scene);
+    if (std::filesystem::exists(command.scene)) add_checksum(provenance.inputs, command.scene);
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
@@ -167,7 +173,7 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("track", command->tracks,
                   "Track CSV files (docs/formats.md); t_s,x_m,y_m will do")
       ->required();
-  fit->add_option("--scene,-s", command->scene, "Scene file: body, model, priors");
+  fit->add_option("--scene,-s", command->scene, "Scene file, or a bundled scene's name: body, model, priors");
   fit->add_option("--model,-m", command->options.model,
                   "Model to fit, or auto: compare, as where the scene names none; overrides the "
                   "scene's")

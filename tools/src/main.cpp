@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -22,6 +24,18 @@ std::string understood(const CLI::App& app) {
   return words;
 }
 
+/// Whether a command that is not there would be in a build with tracking.
+bool needs_tracking([[maybe_unused]] const std::string& command) {
+#ifdef TROCHOID_HAS_TRACKING
+  return false;
+#else
+  constexpr std::array<std::string_view, 9> kCommands{"init",   "calibrate", "run",
+                                                      "track",  "overlay",   "campaign",
+                                                      "render", "tracking",  "tracking-sweep"};
+  return std::find(kCommands.begin(), kCommands.end(), command) != kCommands.end();
+#endif
+}
+
 /// One line: what was wrong and where to look.
 std::string usage_error(const CLI::App* app, const CLI::Error& error) {
   const std::string words = understood(*app);
@@ -29,6 +43,9 @@ std::string usage_error(const CLI::App* app, const CLI::Error& error) {
   const bool unknown = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
                        !left.empty() && !left.front().starts_with('-') &&
                        std::string_view(error.what()).find("subcommand") != std::string_view::npos;
+  if (unknown && needs_tracking(left.front()))
+    return fmt::format("trochoid: this trochoid was built without tracking: it has no '{}'\n",
+                       left.front());
   return fmt::format("trochoid: {}; {} --help tells more\n",
                      unknown ? fmt::format("'{}' is no subcommand of {}", left.front(), words)
                              : std::string(error.what()),
@@ -82,6 +99,7 @@ int main(int argc, char** argv) try {
   trochoid::tools::clean_up_when_interrupted();
   return run(argc, argv);
 } catch (const trochoid::tools::NotGood& answer) {
+  std::fflush(stdout);  // where both go into one file, the complaint follows the results
   fmt::print(stderr, "trochoid: {}\n", answer.what());
   return kNotGood;
 } catch (const std::filesystem::filesystem_error& error) {

@@ -116,7 +116,7 @@ void tell(const Options& options, const model::Trajectory& run, const fs::path& 
                        {"integrator", run.integrator},
                        {"error_estimate_m", run.error_estimate_m},
                        {"pictures", pictures}});
-  fmt::print("{}: {} rows, {}\n", output.string(), run.values.rows(), outcome);
+  fmt::print("{}: {} rows. {}\n", output.string(), run.values.rows(), outcome);
   note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
                    run.integrator, run.integrator_reason, run.error_estimate_m));
   for (const std::string& picture : pictures) fmt::print("{}\n", picture);

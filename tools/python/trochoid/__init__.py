@@ -237,6 +237,11 @@ def _moment(name: str, value: Moment) -> str:
     return value if isinstance(value, str) else str(_number(name, value))
 
 
+def _needs_tracking(function: str) -> None:
+    if not hasattr(_core, function):
+        raise Error(f"{function}: this trochoid was built without tracking")
+
+
 def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
           camera: Optional[Path] = None, objects: Optional[int] = None, from_: Moment = None,
           to: Moment = None, at_px: Optional[tuple[float, float]] = None,
@@ -256,6 +261,7 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
     smooth   write smoothed positions and velocities [m, m/s] into this CSV; never fit these
     output   write the track into this CSV
     """
+    _needs_tracking("track")
     if at_px is not None:
         if not isinstance(at_px, (Sequence, np.ndarray)) or len(at_px) != 2:
             raise _wrong("at_px", at_px, "a point (x, y)")
@@ -438,6 +444,7 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
     output  overlay video (.mp4);  still: one picture of the whole path (.png, .jpg)
     slow    play so many times slower; 0: at most 60 pictures a second
     """
+    _needs_tracking("overlay")
     if output is None and still is None:
         raise InputError("overlay: nothing to write; give output='overlay.mp4', still='path.png' or both")
     inputs = video, track, fit, scene, camera
