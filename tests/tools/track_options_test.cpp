@@ -32,9 +32,9 @@ std::string complaint(std::vector<data::Track> tracks, int wanted) {
 TEST(CheckFound, AsksForOneFrameOfEachBodyThatIsNotDoubtful) {
   EXPECT_EQ(complaint({track(0, {0.1, 0.9, 0.1})}, 1), "");
   EXPECT_THAT(complaint({track(0, {0.1, 0.4})}, 1),
-              testing::StartsWith("all 2 frames with the body are doubtful; "));
+              testing::StartsWith("all 2 frames with the body are doubtful: "));
   EXPECT_THAT(complaint({track(0, {0.9}), track(1, {0.1})}, 2),
-              testing::StartsWith("object 1: the only frame with the body is doubtful; "));
+              testing::StartsWith("object 1: the only frame with the body is doubtful: "));
   EXPECT_EQ(complaint({track(0, {0.9})}, 2), "only 1 of 2 moving bodies found");
 }
 

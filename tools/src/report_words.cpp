@@ -37,12 +37,14 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
   const bool doubtful = !fit.converged;
   const bool weak = fit.verdict == "weak";
   const bool wide = facts.rms_axis_sigma > kTooWide;
-  if (doubtful)
+  if (doubtful) {
+    const std::string& why = fit.verdict_words.empty() ? fit.reason : fit.verdict_words;
     return {"bad",
             fit.verdict == "no_feature" ? "nothing to fit" : "not trustworthy",
-            fmt::format("The model “{}” was tried: {}. Do not use its numbers.", fit.model,
-                        fit.verdict_words.empty() ? fit.reason : fit.verdict_words),
+            fmt::format("The model “{}” was tried: {}{} Do not use its numbers.", fit.model, why,
+                        why.ends_with('?') ? "" : "."),
             {}};
+  }
   const bool followed = fit.verdict == "doubtful";
   const char* word = followed                           ? "followed, not explained"
                      : weak                             ? "explained, not all determined"

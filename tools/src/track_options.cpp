@@ -60,8 +60,9 @@ void check_found(const data::TrackFile& found, int wanted) {
     const auto& samples = track.samples;
     if (std::all_of(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); }))
       throw NotGood(fmt::format(
-          "{}{} doubtful; is it the body that the scene describes (dimensions, camera)? --at x,y "
-          "points at it",
+          "{}{} doubtful: more of the recording may tell its tilt from the mirrored one; else "
+          "check "
+          "the scene's dimensions and camera, or point at the body with --at x,y",
           found.tracks.size() > 1 ? fmt::format("object {}: ", track.object) : "",
           samples.size() == 1 ? std::string("the only frame with the body is")
                               : fmt::format("all {} frames with the body are", samples.size())));
