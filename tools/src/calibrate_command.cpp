@@ -166,27 +166,44 @@ std::size_t floor_view(const Options& options, const Views& views) {
       fmt::format("--floor {}: none of the pictures with a board has this name", options.floor));
 }
 
-std::vector<Eigen::Vector2d> points(const data::Table& table, const char* x, const char* y) {
+std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const char* y,
+                                    Eigen::Index fewest) {
+  const data::Table table = data::read_table(path);
+  for (const char* column : {x, y})
+    if (!table.has(column))
+      throw InputError(fmt::format("{}: there is no column {}", path.string(), column));
   const Eigen::VectorXd u = table.column(x), v = table.column(y);
+  if (u.size() < fewest)
+    throw InputError(fmt::format("{}: {} point{}; at least {} are needed", path.string(), u.size(),
+                                 u.size() == 1 ? "" : "s", fewest));
+  if (!u.allFinite() || !v.allFinite())
+    throw InputError(fmt::format("{}: a point lacks its {} or {}", path.string(), x, y));
   std::vector<Eigen::Vector2d> out;
   for (Eigen::Index i = 0; i < u.size(); ++i) out.emplace_back(u[i], v[i]);
   return out;
+}
+
+tracking::FloorPoints floor_points(const Options& options) {
+  constexpr Eigen::Index kFewest = 4;
+  return {points(options.floor_points, "x_m", "y_m", kFewest),
+          points(options.floor_points, "x_px", "y_px", kFewest)};
+}
+
+std::vector<Eigen::Vector2d> circle_points(const Options& options) {
+  constexpr Eigen::Index kFewest = 6;
+  return points(options.circle_points, "x_px", "y_px", kFewest);
 }
 
 // The table frame from whatever says where the floor is; a sentence about it.
 std::string place_floor(const Options& options, const Views& views, data::Camera& camera) {
   const double height_m = 1e-3 * options.floor_height_mm;
   if (!options.floor_points.empty()) {
-    const data::Table table = data::read_table(options.floor_points);
-    const tracking::FloorPoints floor{points(table, "x_m", "y_m"), points(table, "x_px", "y_px")};
+    const tracking::FloorPoints floor = floor_points(options);
     const double rms = tracking::set_floor(camera, floor, height_m);
     return fmt::format("floor from {} points, rms {:.3f} px", floor.table_m.size(), rms);
   }
   if (!options.circle_points.empty()) {
-    if (!(options.radius_mm > 0.0))
-      throw InputError("--circle-points needs --radius-mm, the radius of the circle");
-    const data::Table table = data::read_table(options.circle_points);
-    const double rms = tracking::set_floor_from_circle(camera, points(table, "x_px", "y_px"),
+    const double rms = tracking::set_floor_from_circle(camera, circle_points(options),
                                                        1e-3 * options.radius_mm, height_m);
     return fmt::format("floor from a circle, rms {:.3f} px", rms);
   }
@@ -255,6 +272,15 @@ void tell(const Options& options, const Views& views, const tracking::Calibratio
   fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
 }
 
+// Before the pictures, which take time to look at.
+void check_points(const Options& options) {
+  if (!options.floor_points.empty()) (void)floor_points(options);
+  if (options.circle_points.empty()) return;
+  (void)circle_points(options);
+  if (!(options.radius_mm > 0.0))
+    throw InputError("--circle-points needs --radius-mm, the radius of the circle");
+}
+
 void check_outputs(const Options& options) {
   std::vector<fs::path> inputs = options.inputs;
   inputs.push_back(options.floor_points);
@@ -266,6 +292,7 @@ void check_outputs(const Options& options) {
 
 void run(const Options& options) {
   check_outputs(options);
+  check_points(options);
   const tracking::BoardPattern pattern = pattern_of(options);
   Views views = look_at_inputs(options, pattern);
   tracking::Calibration result = tracking::calibrate(views.found, views.size);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -92,6 +93,22 @@ void print(const data::Fit& fit) {
   print_notes(fit);
 }
 
+// No unit can be told from numbers alone, but these are no laboratory's.
+void tell_odd_units(const std::string& path, const data::Track& track) {
+  constexpr double kWide_m = 20.0, kSparse_s = 1.0;
+  if (track.samples.size() < 2) return;
+  Eigen::AlignedBox2d box;
+  for (const data::TrackSample& sample : track.samples)
+    if (sample.has_metres()) box.extend(sample.centre_m);
+  if (!box.isEmpty() && box.diagonal().norm() > kWide_m)
+    note(fmt::format("{}: the path is {:.3g} m across; are x_m, y_m in metres?", path,
+                     box.diagonal().norm()));
+  const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
+                        static_cast<double>(track.samples.size() - 1);
+  if (step_s > kSparse_s)
+    note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
+}
+
 std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
   std::vector<data::Track> tracks;
   std::map<std::string, std::string> by_checksum;
@@ -104,7 +121,10 @@ std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& prove
     add_checksum(provenance.inputs, path);
     if (!file.source_sha256.empty()) provenance.inputs[file.source] = file.source_sha256;
     for (const data::Track& track : file.tracks)
-      if (!command.object || track.object == *command.object) tracks.push_back(track);
+      if (!command.object || track.object == *command.object) {
+        tell_odd_units(path, track);
+        tracks.push_back(track);
+      }
   }
   if (tracks.empty())
     throw InputError(fmt::format("--object {}: no track has it", command.object.value_or(0)));
@@ -173,7 +193,8 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("track", command->tracks,
                   "Track CSV files (docs/formats.md); t_s,x_m,y_m will do")
       ->required();
-  fit->add_option("--scene,-s", command->scene, "Scene file, or a bundled scene's name: body, model, priors");
+  fit->add_option("--scene,-s", command->scene,
+                  "Scene file, or a bundled scene's name: body, model, priors");
   fit->add_option("--model,-m", command->options.model,
                   "Model to fit, or auto: compare, as where the scene names none; overrides the "
                   "scene's")
