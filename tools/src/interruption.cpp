@@ -42,6 +42,9 @@ void wait_for_signal() {
 }  // namespace
 
 void clean_up_when_interrupted() {
+  // A file beyond the caller's limit (ulimit -f) is then a write that fails, and told like a full
+  // disk.
+  std::signal(SIGXFSZ, SIG_IGN);
   if (pipe2(wake_up.data(), O_CLOEXEC) != 0) return;
   std::thread(wait_for_signal).detach();
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {

@@ -97,7 +97,10 @@ int run(int argc, char** argv) {
 // The only place that catches: libraries throw, commands do not print errors.
 int main(int argc, char** argv) try {
   trochoid::tools::clean_up_when_interrupted();
-  return run(argc, argv);
+  const int status = run(argc, argv);
+  if (std::fflush(stdout) != 0)
+    throw trochoid::InputError("standard output cannot be written (is the disk full?)");
+  return status;
 } catch (const trochoid::tools::NotGood& answer) {
   std::fflush(stdout);  // where both go into one file, the complaint follows the results
   fmt::print(stderr, "trochoid: {}\n", answer.what());
