@@ -130,6 +130,40 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   return worst;
 }
 
+// Positions the fit has given up although they lie on one path with the others: not the tracker's
+// glitches, but motion that the model does not have.
+struct GivenUp {
+  int samples = 0, of = 0;
+  double first_s = 0.0, last_s = 0.0;
+  [[nodiscard]] double share() const { return of > 0 ? static_cast<double>(samples) / of : 0.0; }
+  [[nodiscard]] std::string words() const {
+    return fmt::format(
+        "{} of its {} positions, between {:.4g} and {:.4g} s, lie too far from the model to count, "
+        "although they lie on one path with the others",
+        samples, of, first_s, last_s);
+  }
+};
+
+GivenUp given_up(const Problem& problem) {
+  constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
+  GivenUp all;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    const std::vector<int> consistent = consistent_samples(data);
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != Channel::position) continue;
+      ++all.of;
+      if (robust_weight(problem, arc, reading) > kHardlyCounts ||
+          !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
+        continue;
+      const double t_s = data.t_s[reading.sample];
+      if (all.samples++ == 0) all.first_s = t_s;
+      all.last_s = t_s;
+    }
+  }
+  return all;
+}
+
 // Chi-square of the positions about a polynomial in time, weighted as in the fit.
 double polynomial_chi2(const Problem& problem, int arc, int degree) {
   const ArcData& data = problem.arcs[arc];
@@ -142,8 +176,7 @@ double polynomial_chi2(const Problem& problem, int arc, int degree) {
   Eigen::VectorXd right(2 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Reading& reading = *readings[i];
-    double weight = 1.0 / problem.noise_scale[0];
-    if (problem.row_weights[arc].size() > 0) weight *= problem.row_weights[arc][reading.row];
+    const double weight = robust_weight(problem, arc, reading) / problem.noise_scale[0];
     const Eigen::Matrix2d wt = weight * reading.whitener.transpose();
     const double t = 2.0 * (data.t_s[reading.sample] - data.t_s.front()) / duration_s - 1.0;
     double power = 1.0;
@@ -224,17 +257,21 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
 }
 
 void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
-            const Misfit& worst, data::Fit& fit) {
+            const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
+  constexpr double kMany = 0.02;
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
-  const bool doubtful = worst.times > kDoubtful;
+  const bool misses = worst.times > kDoubtful;
+  const bool doubtful = misses || lost.share() > kMany;
   const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
                                    [](const ArcData& arc) { return arc.sigma_unknown; });
   std::string words = "the model explains the track";
-  if (doubtful)
+  if (doubtful && !misses)
+    words = "the model follows the track, but does not explain it: " + lost.words();
+  else if (doubtful)
     words = fmt::format(
         "the model follows the track, but does not explain it: the residuals of its {} are {:.2g} "
         "times their noise, the model lacks something, or a better minimum exists, and the error "
@@ -284,13 +321,18 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                               "noise",
                               kChannelWords[static_cast<int>(worst.channel)], worst.times),
                   fit);
+  constexpr double kTooMany = 0.1;
+  const GivenUp lost = given_up(problem);
+  if (lost.share() > kTooMany)
+    return refuse("unexplained", "unexplained",
+                  "the model does not explain the track: " + lost.words(), fit);
   if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)
     return refuse("not_identifiable", "no_feature",
                   fmt::format("{} in time explains the path as well: nothing in it asks for the "
                               "model '{}', whose parameters mean nothing here",
                               kPolynomials[degree], fit.model),
                   fit);
-  accept(problem, solution, error, worst, fit);
+  accept(problem, solution, error, worst, lost, fit);
 }
 
 double straying_m(std::span<const data::Track> tracks) {

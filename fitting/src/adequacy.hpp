@@ -21,10 +21,12 @@ struct Squares {
 /// What a fit is worth. Words of data::Fit::verdict:
 ///   unexplained      not a minimum; or residuals beyond 4 times the track's sigmas, the samples'
 ///                    scatter about a smooth curve and 1 % of the motion (angles: 0.2 rad), or
-///                    beyond 8 times; or a 30th of the motion's variance left
+///                    beyond 8 times; or a 30th of the motion's variance left; or a tenth of the
+///                    positions given up that lie on one path with the others
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
-///   doubtful         followed, but residuals are beyond 2 times those measures
+///   doubtful         followed, but residuals are beyond 2 times those measures, or a fiftieth of
+///                    the positions given up
 ///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise

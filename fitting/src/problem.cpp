@@ -406,8 +406,8 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   }
   for (const Reading& reading : data.readings) {
     const int width = reading.channel == Channel::position ? 2 : 1;
-    double weight = 1.0 / problem.noise_scale[static_cast<int>(reading.channel)];
-    if (problem.row_weights[arc].size() > 0) weight *= problem.row_weights[arc][reading.row];
+    const double weight = robust_weight(problem, arc, reading) /
+                          problem.noise_scale[static_cast<int>(reading.channel)];
     if (weight == 1.0) continue;
     residuals.segment(reading.row, width) *= weight;
     if (jacobian != nullptr) jacobian->middleRows(reading.row, width) *= weight;

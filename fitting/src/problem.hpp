@@ -143,9 +143,19 @@ struct SolveOptions {
 [[nodiscard]] Solution seek(const Problem& problem, const Eigen::VectorXd& u,
                             const SolveOptions& options = {});
 
-/// Sets noise_scale (per channel, if `rescale`) and robust weights from the residuals at u.
-/// Points within 3.5 scaled sigma keep weight 1, so that clean Gaussian data are left alone.
+/// Readings within so many scaled sigmas count in full: clean Gaussian data are left alone.
+inline constexpr double kInlier = 3.5;
+
+/// Sets noise_scale (per channel, if `rescale`) and robust weights from the residuals at u: a
+/// reading d > kInlier scaled sigmas off is multiplied by (kInlier/d)^2.
 /// @returns the largest change of any weight or scale.
 double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale);
+
+/// What a reading's residuals are multiplied by for standing out.
+[[nodiscard]] double robust_weight(const Problem& problem, int arc, const Reading& reading);
+
+/// What the readings that stand out in a channel cost beyond their weighted squares. The cost whose
+/// slope those weights give rises to 2 kInlier^2 for a reading far off: to give it up is not free.
+[[nodiscard]] double cost_of_standing_out(const Problem& problem, Channel channel);
 
 }  // namespace trochoid::fitting

@@ -44,7 +44,7 @@ double channel_scale(const Problem& problem, const RawResiduals& raw, Channel ch
     double squares = 0.0;
     int inliers = 0;
     for (const double d : lengths)
-      if (d <= 3.5 * scale) {
+      if (d <= kInlier * scale) {
         squares += d * d;
         ++inliers;
       }
@@ -79,9 +79,9 @@ double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
     for (const Reading& reading : problem.arcs[arc].readings) {
       const double d =
           length(reading, raw.per_arc[arc]) / spread[static_cast<int>(reading.channel)];
-      if (d <= 3.5) continue;
-      // Influence falls like 1/d: a glitch far away does not pull.
-      const double weight = 3.5 * 3.5 / (d * d);
+      if (d <= kInlier) continue;
+      // Influence falls like 1/d^3: a glitch far away does not pull.
+      const double weight = kInlier * kInlier / (d * d);
       weights.segment(reading.row, reading.channel == Channel::position ? 2 : 1)
           .setConstant(weight);
     }
@@ -92,6 +92,21 @@ double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
     problem.row_weights[arc] = std::move(weights);
   }
   return change;
+}
+
+double robust_weight(const Problem& problem, int arc, const Reading& reading) {
+  const Eigen::VectorXd& weights = problem.row_weights[static_cast<std::size_t>(arc)];
+  return weights.size() > 0 ? weights[reading.row] : 1.0;
+}
+
+double cost_of_standing_out(const Problem& problem, Channel channel) {
+  double cost = 0.0;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings)
+      if (reading.channel == channel)
+        cost +=
+            2.0 * kInlier * kInlier * (1.0 - robust_weight(problem, static_cast<int>(arc), reading));
+  return cost;
 }
 
 }  // namespace trochoid::fitting

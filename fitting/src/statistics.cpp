@@ -171,8 +171,9 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
     if (rows == 0.0) continue;
     found.channels.push_back(channel_noise(problem, all, channel, scaled, unit_steps));
     const Whiteness& one = found.channels.back().whiteness;
-    result.surprise +=
-        found.channels.back().surprise + 2.0 * rows * std::log(problem.noise_scale[c]);
+    result.surprise += found.channels.back().surprise +
+                       2.0 * rows * std::log(problem.noise_scale[c]) +
+                       cost_of_standing_out(problem, channel);
     if (one.inflation > 1.0)
       for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
         found.offsets.push_back(common_offset(problem, all, channel, axis));

@@ -51,8 +51,7 @@ double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector
     const double phi = at(circle.azimuth_rad, t);
     const Eigen::Vector2d place =
         pivot_m + at(circle.distance_m, t) * Eigen::Vector2d(std::sin(phi), -std::cos(phi));
-    double weight = 1.0 / problem.noise_scale[0];
-    if (problem.row_weights[0].size() > 0) weight *= problem.row_weights[0][reading.row];
+    const double weight = robust_weight(problem, 0, reading) / problem.noise_scale[0];
     chi2 += (weight * (reading.whitener.transpose() * (place - reading.value))).squaredNorm();
   }
   return chi2;

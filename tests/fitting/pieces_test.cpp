@@ -131,5 +131,26 @@ TEST(Pieces, ABodyThatFellFlatLiesStillFromThenOn) {
   EXPECT_NE(residuals[1], residuals[rows - 1]) << "it has moved before";
 }
 
+// The minimiser draws a reading, d scaled sigmas off, back with a force of w^2 d: the cost of
+// getting there is the integral of that.
+TEST(Pieces, WhatStandsOutCostsWhatItTookToGetThere) {
+  const auto weight = [](double d) { return std::min(1.0, kInlier * kInlier / (d * d)); };
+  for (const double d : {1.0, 4.0, 12.0, 1000.0}) {
+    Problem problem;
+    problem.arcs.resize(1);
+    problem.arcs[0].readings.resize(1);
+    problem.arcs[0].rows = 2;
+    problem.row_weights = {Eigen::Vector2d::Constant(weight(d))};
+    constexpr int kSteps = 200000;
+    double twice_cost = 0.0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double s = d * (i + 0.5) / kSteps;
+      twice_cost += 2.0 * weight(s) * weight(s) * s * d / kSteps;
+    }
+    const double squares = std::pow(weight(d) * d, 2);
+    EXPECT_NEAR(squares + cost_of_standing_out(problem, Channel::position), twice_cost, 1e-3) << d;
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

@@ -152,6 +152,35 @@ TEST(Verdict, IsUnexplainedWhereACutShortSearchLeavesMoreThanTheNoise) {
   EXPECT_EQ(verdict(0.0, true), "good");
 }
 
+// A top that touches something in the last part of the film and is pushed along.
+Path pushed(double from_s) {
+  return [path = nutating_top(), from_s](double t) -> Eigen::Vector2d {
+    constexpr double kPush_m_s2 = 0.4;
+    const double since_s = std::max(0.0, t - from_s);
+    return path(t) + Eigen::Vector2d(0.5 * kPush_m_s2 * since_s * since_s, 0.0);
+  };
+}
+
+TEST(Verdict, IsUnexplainedWhereTheModelGivesUpAPartOfThePath) {
+  const data::Fit fit = fit_of(track_of(pushed(2.4), white(kSigma_m, 10)), top());
+  EXPECT_EQ(fit.verdict, "unexplained") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("s, lie too far from the model to count"));
+}
+
+TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
+  const data::Fit fit = fit_of(track_of(pushed(2.75), white(kSigma_m, 10)), top());
+  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+}
+
+// Glitches anywhere in the picture are the tracker's, however many.
+TEST(Verdict, IsGoodWhereTheTrackerTookOtherThingsForTheBody) {
+  data::Track track = track_of(nutating_top(), white(kSigma_m, 11));
+  for (std::size_t i = 5; i < track.samples.size(); i += 8)
+    track.samples[i].centre_m = Eigen::Vector2d(0.3, -0.2 + 0.002 * static_cast<double>(i % 7));
+  const data::Fit fit = fit_of(track, top());
+  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+}
+
 // A top that nutates once in 2.3 frames, fitted in the wrong phase. A smooth curve knows nothing of
 // nutations as fast as that: samples scatter about it as much as they are off the prediction.
 TEST(Verdict, DoesNotTakeMotionBetweenTooFewFramesForNoise) {
