@@ -258,14 +258,15 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
 
 void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
             const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
-  constexpr double kMany = 0.02;
+  constexpr double kMany = 0.01;
+  constexpr int kFewest = 3;
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
   const bool misses = worst.times > kDoubtful;
-  const bool doubtful = misses || lost.share() > kMany;
+  const bool doubtful = misses || (lost.samples >= kFewest && lost.share() > kMany);
   const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
                                    [](const ArcData& arc) { return arc.sigma_unknown; });
   std::string words = "the model explains the track";

@@ -25,8 +25,8 @@ struct Squares {
 ///                    positions given up that lie on one path with the others
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
-///   doubtful         followed, but residuals are beyond 2 times those measures, or a fiftieth of
-///                    the positions given up
+///   doubtful         followed, but residuals are beyond 2 times those measures, or a
+///                    hundredth of the positions, three at least, given up
 ///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <tuple>
 
 #include "adequacy.hpp"
 #include "first_guess.hpp"
@@ -23,16 +24,22 @@ const Rung* least_bic(const std::vector<Rung>& rungs) {
   return best;
 }
 
-// Fewest parameters among those as good as the best; among these the least BIC.
-const Rung* simplest_sufficient(const std::vector<Rung>& rungs) {
+// Fewest parameters among those as good as the best; among these the fewest unusual terms, and then
+// the least BIC.
+const Rung* simplest_sufficient(const Ladder& ladder, const std::vector<Rung>& rungs) {
+  const auto unusual = [&](const Rung& rung) {
+    return std::count_if(rung.terms.begin(), rung.terms.end(), [&](int index) {
+      const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+      return !term.usual && !term.last_resort;
+    });
+  };
   const Rung* best = least_bic(rungs);
   const double allowed = best != nullptr ? best->bic + kStrong : 0.0;
-  for (const Rung& rung : rungs) {
-    if (!rung.fitted || rung.bic > allowed) continue;
-    if (rung.parameters < best->parameters ||
-        (rung.parameters == best->parameters && rung.bic < best->bic))
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.bic <= allowed &&
+        std::tuple(rung.parameters, unusual(rung), rung.bic) <
+            std::tuple(best->parameters, unusual(*best), best->bic))
       best = &rung;
-  }
   return best;
 }
 
@@ -111,35 +118,83 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
   return resort ? terms : std::set<int>{};
 }
 
-// Everything but the last resort was added before it was known what that explains: terms the data
-// do not need any more are left out again, one at a time, as long as that costs no strong evidence.
-void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
-               std::size_t current, std::vector<Rung>& rungs) {
+// Fits the rungs with these sets of terms that are not known yet, side by side, from the solution of
+// rungs[known].
+void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
+                    const FitOptions& options, const std::vector<std::set<int>>& wanted,
+                    std::size_t known, std::vector<Rung>& rungs) {
+  const std::size_t first = rungs.size();
+  for (const std::set<int>& terms : wanted)
+    if (std::none_of(rungs.begin(), rungs.end(),
+                     [&](const Rung& rung) { return rung.terms == terms; }))
+      rungs.push_back(rung_with(ladder, terms));
   FitOptions one = options;
   one.threads = 1;
+  in_parallel(static_cast<int>(rungs.size() - first), options.threads, [&](int i) {
+    Rung& rung = rungs[first + static_cast<std::size_t>(i)];
+    fit_neighbour(tracks, rungs[known], options_for(rung, one), rung);
+  });
+}
+
+// The terms without one of `these`; the last resort stays.
+std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<int>& terms,
+                                         const std::set<int>& these) {
+  std::vector<std::set<int>> sets;
+  for (const int index : these) {
+    if (ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
+    sets.push_back(terms);
+    sets.back().erase(index);
+  }
+  return sets;
+}
+
+// The terms with one more that no fitted rung of the same law has.
+std::vector<std::set<int>> with_one_untried(const Ladder& ladder, const Rung& rung,
+                                            const std::vector<Rung>& rungs) {
+  std::vector<std::set<int>> sets;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
+    const bool tried = std::any_of(rungs.begin(), rungs.end(), [&](const Rung& other) {
+      return other.fitted && other.fit.model == rung.fit.model && other.terms.contains(index);
+    });
+    if (tried || ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
+    sets.push_back(rung.terms);
+    sets.back().insert(index);
+  }
+  return sets;
+}
+
+// Everything but the last resort was added before it was known what that explains: terms the data
+// do not need any more are left out again, one at a time, as long as that costs no strong evidence.
+// @returns the index of what is left.
+std::size_t step_down(const Ladder& ladder, std::span<const data::Track> tracks,
+                      const FitOptions& options, std::size_t current, std::vector<Rung>& rungs) {
   while (rungs[current].fitted && rungs[current].fit.converged) {
     const std::size_t first = rungs.size();
-    for (const int index : rungs[current].terms) {
-      if (ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
-      std::set<int> terms = rungs[current].terms;
-      terms.erase(index);
-      const bool known = std::any_of(rungs.begin(), rungs.end(),
-                                     [&](const Rung& rung) { return rung.terms == terms; });
-      if (!known) rungs.push_back(rung_with(ladder, terms));
-    }
-    in_parallel(static_cast<int>(rungs.size() - first), options.threads, [&](int i) {
-      Rung& rung = rungs[first + static_cast<std::size_t>(i)];
-      fit_smaller_rung(tracks, rungs[current], options_for(rung, one), rung);
-    });
+    const std::set<int> terms = rungs[current].terms;
+    add_neighbours(ladder, tracks, options, with_one_less(ladder, terms, terms), current, rungs);
     std::size_t best = current;
     for (std::size_t i = first; i < rungs.size(); ++i)
       if (rungs[i].fitted && rungs[i].fit.converged &&
           rungs[i].bic < rungs[current].bic + kStrong &&
           (best == current || rungs[i].bic < rungs[best].bic))
         best = i;
-    if (best == current) return;
+    if (best == current) break;
     current = best;
   }
+  return current;
+}
+
+// And for the same reason some terms were never tried beside it: each is added to what is left, and
+// put in the place of every other.
+void try_the_others(const Ladder& ladder, std::span<const data::Track> tracks,
+                    const FitOptions& options, std::size_t current, std::vector<Rung>& rungs) {
+  if (!rungs[current].fitted || !rungs[current].fit.converged) return;
+  const auto larger = with_one_untried(ladder, rungs[current], rungs);
+  std::vector<std::set<int>> wanted = larger;
+  for (const std::set<int>& terms : larger)
+    for (std::set<int>& exchanged : with_one_less(ladder, terms, rungs[current].terms))
+      wanted.push_back(std::move(exchanged));
+  add_neighbours(ladder, tracks, options, wanted, current, rungs);
 }
 
 // The plainest model and, one more term at a time, all extensions of the best so far.
@@ -153,7 +208,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
   const std::size_t terms = ladder.terms.size();
-  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
+  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2 + terms * (terms + 1));
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   std::size_t current = 0;
@@ -166,10 +221,15 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   // Residuals that hang together but hardly exceed the track's own noise are the tracker's.
   constexpr double kTrackersOwn = 1.3;
   const auto explains = [&](std::size_t i) {
-    return rungs[i].fitted &&
+    const std::string& verdict = rungs[i].fit.verdict;
+    return rungs[i].fitted && verdict != "doubtful" && verdict != "unexplained" &&
            (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= kTrackersOwn);
   };
   if (explains(current)) return rungs;
+  const auto settle = [&](std::size_t known) {
+    known = step_down(ladder, tracks, options, known, rungs);
+    try_the_others(ladder, tracks, options, known, rungs);
+  };
   if (ladder.frictionless) {
     rungs.push_back(frictionless_rung(ladder));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
@@ -179,7 +239,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (rungs[current].fit.converged) {
     const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
     if (last != current && explains(last)) {
-      step_down(ladder, tracks, options, last, rungs);
+      settle(last);
       return rungs;
     }
   }
@@ -189,7 +249,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
-    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+    settle(rungs.size() - 1);
   }
   return rungs;
 }
@@ -229,7 +289,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   if (!options.start.empty())
     check_first_guess(options.start, "the models compared have", parameters_of_any(ladder));
   const std::vector<Rung> rungs = climb(ladder, tracks, options);
-  const Rung* chosen = simplest_sufficient(rungs);
+  const Rung* chosen = simplest_sufficient(ladder, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};
     none.fit.comparison = table_of(rungs, nullptr);
@@ -247,6 +307,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
       result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
     }
   }
+  if (result.fit.converged) allow_for_rivals(rungs, *chosen, result.fit);
   result.fit.comparison = table_of(rungs, chosen);
   result.fit.recommendation = sentence(rungs, *chosen, ladder);
   return result;

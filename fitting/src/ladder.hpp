@@ -15,7 +15,8 @@ struct Term {
   std::function<void(data::Scene&)> switch_on;
   std::map<std::string, double> start;  ///< starting values of its parameters
   bool last_resort = false;  ///< costly: tried only where nothing else explains the track
-  bool usual = false;  ///< acts on nearly every body: tried with the last resort where that fails
+  /// Acts on nearly every body: tried with the last resort where that fails, and preferred.
+  bool usual = false;
 };
 
 /// A scene's possible models: the plainest one and the terms it may take on.

@@ -161,14 +161,14 @@ double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& ru
   }
 }
 
-// Parameters that `below` does not have start at a fiftieth of their typical size: near the known
+// Parameters that `known` does not have start at a fiftieth of their typical size: near the known
 // solution.
-std::map<std::string, double> extended_start(const Rung& below, const Rung& rung) {
+std::map<std::string, double> extended_start(const Rung& known, const Rung& rung) {
   constexpr double kLittle = 0.02;
-  std::map<std::string, double> start = values_of(below.fit);
+  std::map<std::string, double> start = values_of(known.fit);
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())
-    if (info.role == model::ParameterInfo::Role::dynamics && below.fit.find(info.name) == nullptr)
+    if (info.role == model::ParameterInfo::Role::dynamics && known.fit.find(info.name) == nullptr)
       start[info.name] = kLittle * info.value;
   return start;
 }
@@ -222,18 +222,18 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
   conclude(rung);
 }
 
-void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
-                      const FitOptions& options, Rung& rung) {
+void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
+                   const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  if (auto values = values_of(above.fit); !values.empty()) {
-    own.start = std::move(values);
+  if (known.fit.arcs.size() == 1) {
+    own.start = extended_start(known, rung);
     own.strategy = "single";
   }
   try {
-    if (above.softness_fitted) {
-      fit_softly(tracks, own, rung, &above);
+    if (known.softness_fitted) {
+      fit_softly(tracks, own, rung, &known);
     } else {
-      rung.scene.model.slip_regularisation_m_s = above.scene.model.slip_regularisation_m_s;
+      rung.scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
       rung.fit = fit_one_of_several(tracks, rung.scene, own);
     }
     rung.fitted = usable(rung.fit);

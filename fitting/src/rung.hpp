@@ -4,6 +4,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "ladder.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -38,14 +39,20 @@ struct Rung {
 /// Free and fixed values by name; empty where there are several arcs.
 [[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
 
+/// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
+/// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq. 4):
+/// those that follow the same law, and that BIC does not rule out. A loss that a rung lacks is zero
+/// there. Warns where a bar grows noticeably.
+void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
+
 /// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back
 /// third.
 /// @param below  the fitted rung this one extends by one term; null for the plainest.
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung);
 
-/// Fits a rung that lacks a term of `above`, from the solution of that.
-void fit_smaller_rung(std::span<const data::Track> tracks, const Rung& above,
-                      const FitOptions& options, Rung& rung);
+/// Fits a rung that has a term more or less than `known`, from the solution of that alone.
+void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
+                   const FitOptions& options, Rung& rung);
 
 }  // namespace trochoid::fitting

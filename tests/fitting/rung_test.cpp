@@ -61,7 +61,7 @@ TEST(Rung, ThatLacksATermGoesOnFromTheSolutionOfTheOneAbove) {
   below.scene = alone.scene = top();
   fit_rung(std::span(&track, 1), nullptr, nullptr, {}, above);
   ASSERT_TRUE(above.fitted) << above.reason;
-  fit_smaller_rung(std::span(&track, 1), above, {}, below);
+  fit_neighbour(std::span(&track, 1), above, {}, below);
   ASSERT_TRUE(below.fitted) << below.reason;
   EXPECT_EQ(below.fit.start_path, "given") << "else it was searched for anew";
   EXPECT_EQ(below.parameters, above.parameters - 2);
@@ -79,6 +79,61 @@ TEST(Rung, OfSeveralArcsIsSearchedForAnew) {
   EXPECT_TRUE(values_of(two).empty());
   two.arcs.resize(1);
   EXPECT_EQ(values_of(two).at("friction"), 0.2);
+}
+
+data::FitParameter loss(const std::string& name, double value, double sigma) {
+  return {name, value, sigma, "m", data::ParameterStatus::free, true, ""};
+}
+
+Rung rung_of(std::vector<data::FitParameter> parameters, double aicc, double bic) {
+  Rung rung;
+  rung.fitted = rung.fit.converged = true;
+  rung.fit.model = "rolling";
+  rung.fit.arcs.resize(1);
+  rung.fit.parameters = std::move(parameters);
+  const auto count = static_cast<Eigen::Index>(rung.fit.parameters.size());
+  rung.fit.covariance = Eigen::MatrixXd::Zero(count, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const data::FitParameter& parameter = rung.fit.parameters[static_cast<std::size_t>(i)];
+    rung.fit.covariance_names.push_back(parameter.name);
+    rung.fit.covariance(i, i) = parameter.sigma * parameter.sigma;
+  }
+  rung.aicc = aicc, rung.bic = bic;
+  return rung;
+}
+
+TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
+  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                          rung_of({loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  // Either model is right with probability one half: 0.6 off half of the time.
+  const double expected = std::sqrt(0.1 * 0.1 + 0.5 * 0.6 * 0.6);
+  EXPECT_NEAR(fit.parameters[0].sigma, expected, 1e-12);
+  EXPECT_NEAR(fit.covariance(0, 0), expected * expected, 1e-12);
+  ASSERT_EQ(fit.warnings.size(), 1u);
+  EXPECT_NE(fit.warnings[0].find("rolling_friction_m"), std::string::npos);
+}
+
+TEST(Rivals, WithoutALossTakeItForNothing) {
+  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                          rung_of({loss("pivoting_friction_m", 3.0, 0.1)}, 100.0, 100.0)};
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_NEAR(fit.parameters[0].sigma, std::sqrt(0.1 * 0.1 + 0.5), 1e-12);
+}
+
+TEST(Rivals, ThatAreRuledOutOrUnexplainedDoNotCount) {
+  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                          rung_of({loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 111.0),
+                          rung_of({loss("rolling_friction_m", 0.3, 0.1)}, 80.0, 90.0),
+                          rung_of({loss("rolling_friction_m", 0.2, 0.1)}, 100.0, 100.0)};
+  rungs[2].fit.converged = false;
+  rungs[3].fit.model = "sliding";
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_DOUBLE_EQ(fit.parameters[0].sigma, 0.1);
+  EXPECT_TRUE(fit.warnings.empty());
 }
 
 }  // namespace

@@ -21,10 +21,10 @@ struct Comparison {
 /// drag; puck: air force; spin-down: dry, viscous and quadratic couple, a weight out of balance,
 /// and dry friction that weakens with speed). Terms the scene names beforehand give starting values
 /// only.
-/// Every rung is judged by AICc and BIC (with the effective number of samples of the best one, so
-/// that they can be compared), whiteness of residuals and the prediction of the last third of the
-/// track from the first two. Recommended is the rung with the fewest parameters within 2 of the
-/// least BIC. Where the fitted ring or disc turns retrograde, the recommendation says which losses
+/// Every rung is judged by AICc and BIC (both allow for residuals that hang together), whiteness of
+/// residuals and the prediction of the last third of the track from the first two. Recommended is
+/// the rung with the fewest parameters within 6 of the least BIC; its error bars allow for what
+/// rungs that are not ruled out make of its parameters. Where the fitted ring or disc turns retrograde, the recommendation says which losses
 /// explain that and whether the track can tell.
 /// @throws InputError as fit() does for the model without losses.
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
