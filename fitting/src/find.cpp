@@ -58,10 +58,18 @@ Start with_given_losses(const Problem& problem, Start start) {
   return start;
 }
 
+// The same problem for an easier model, whose friction sets in as softly as that model says.
+Problem eased(const Problem& problem, const model::Predictor& model) {
+  Problem easier = for_predictor(problem, model);
+  if (const int slip = model.index_of(kSlipScale); slip >= 0)
+    for (Eigen::VectorXd& base : easier.base) base[slip] = model.parameters()[slip].value;
+  return easier;
+}
+
 // From a relative's solution over its bridges: a start for the model itself.
 Start carried_over(const Problem& problem, const Relative& relative, Start start) {
   for (const model::Predictor* bridge : relative.bridges) {
-    Problem between = for_predictor(problem, *bridge);
+    Problem between = eased(problem, *bridge);
     apply(start, between);
     const Solution solution =
         seek(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
@@ -140,7 +148,7 @@ Found search_path(const Problem& problem, const Quest& quest) {
       if (take(search(problem, quest.starter))) return best;
       continue;
     }
-    Problem easier = for_predictor(problem, *relative.model);
+    Problem easier = eased(problem, *relative.model);
     // From positions alone neighbouring valleys are many, and a start has to be near the right one.
     easier.rough = seen;
     const bool rolls = relative.model->model_name() == "rolling";

@@ -176,7 +176,8 @@ Problem single_arc(const Problem& problem, int arc) {
 bool is_loss(const Problem& problem, const FreeParameter& parameter) {
   const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
   return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
-         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction";
+         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction" &&
+         info.name != kSlipScale;
 }
 
 namespace {
@@ -224,6 +225,10 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
+  // A law sharper than that makes stiff equations, and no camera tells it from Coulomb's.
+  constexpr double kSharpest_m_s = 5e-5;
+  if (info.name == kSlipScale)
+    return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
 }
 
@@ -233,10 +238,11 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
     if (info.name == asked_for) return true;
   if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
     return settings.free_pivot || listed(settings.free, info.name);
-  // Freeing the clock leaves the model its own choice of the rest.
-  const bool chosen =
-      std::any_of(settings.free.begin(), settings.free.end(),
-                  [](const std::string& name) { return name != kReadout && name != kAngleDelay; });
+  // Freeing the clock, or how friction sets in, leaves the model its own choice of the rest.
+  const bool chosen = std::any_of(
+      settings.free.begin(), settings.free.end(), [](const std::string& name) {
+        return name != kReadout && name != kAngleDelay && name != kSlipScale;
+      });
   if (!chosen || info.role == ParameterInfo::Role::initial)
     return info.worth_fitting || listed(settings.free, info.name);
   return listed(settings.free, info.name);

@@ -15,6 +15,9 @@
 
 namespace trochoid::fitting {
 
+/// How friction sets in: the slip speed of the regularised law, absent in Coulomb's.
+inline constexpr const char* kSlipScale = "slip_regularisation_m_s";
+
 /// How a free parameter is handed to the minimiser, so that it stays in its range.
 ///   identity  value = u
 ///   log       value = exp(u): positive, over decades

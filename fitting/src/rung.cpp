@@ -230,12 +230,10 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     own.strategy = "single";
   }
   try {
-    if (known.softness_fitted) {
-      fit_softly(tracks, own, rung, &known);
-    } else {
-      rung.scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
+    if (softness_is_open(rung) && !softness_is_open(known))
+      fit_softly(tracks, own, rung);
+    else
       rung.fit = fit_one_of_several(tracks, rung.scene, own);
-    }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);

@@ -25,8 +25,7 @@ struct Rung {
   data::Scene scene;
   data::Fit fit;
   bool fitted = false;
-  bool softness_fitted = false;  ///< how friction sets in was fitted too, and stands in the scene
-  std::string reason;            ///< why there is no fit, or why it is not accepted; else empty
+  std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
   double aicc = std::numeric_limits<double>::infinity();

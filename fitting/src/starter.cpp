@@ -64,7 +64,10 @@ std::vector<OwnedRelative> relatives_of(data::Scene scene) {
   const double given_m_s = scene.model.slip_regularisation_m_s.value_or(0.0);
   scene.model.name = "rolling";
   relatives.push_back({model::make_predictor(scene), {}});
-  if (given_m_s >= 0.7 * kGentle_m_s) return relatives;
+  const auto& asked = scene.fit.free;
+  const bool soft_as_it_may_be =
+      given_m_s > 0.0 && std::find(asked.begin(), asked.end(), kSlipScale) != asked.end();
+  if (soft_as_it_may_be || given_m_s >= 0.7 * kGentle_m_s) return relatives;
   scene.model.name = "sliding";
   const auto softened = [&](double by_m_s) {
     scene.model.slip_regularisation_m_s = by_m_s;

@@ -19,9 +19,12 @@ int free_rows(const Problem& problem) {
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
 // are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
 void leash(Problem& problem) {
-  for (FreeParameter& parameter : problem.free)
-    if (parameter.transform.is_over_decades() && is_loss(problem, parameter))
+  for (FreeParameter& parameter : problem.free) {
+    const std::string& name = problem.predictor->parameters()[parameter.index].name;
+    if ((parameter.transform.is_over_decades() && is_loss(problem, parameter)) ||
+        name == kSlipScale)
       parameter.leash = data::Prior{parameter.transform.inverse(parameter.given), 1.0};
+  }
 }
 
 }  // namespace

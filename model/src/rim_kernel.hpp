@@ -23,7 +23,7 @@ template <class S>
 struct RimInput {
   S theta, phi, psi, w1, w2, w3, x, y, vx, vy;
   LossValues<S> losses;
-  S friction;
+  S friction, eps_v;  ///< of a floor that grips; eps_v as in Coulomb
 };
 
 /// What is the same in every call of one scene.
@@ -57,7 +57,8 @@ RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimR
 
 /// Steps an explicit method would need for the regularised law over `duration_s`: its stability
 /// limit times the fastest rate, at most (S19) while N = m g; 0 for the exact law.
-[[nodiscard]] double explicit_steps(const RimModel& model, double friction, double duration_s);
+[[nodiscard]] double explicit_steps(const RimModel& model, const Coulomb<double>& friction,
+                                    double duration_s);
 
 /// Absolute tolerances of a sliding body's slip: stick lives at slips below the regularisation,
 /// which have to be resolved whatever the tolerance.

@@ -32,16 +32,16 @@ template <class S>
 RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input, const RimRunOptions& given,
                        std::span<const double> t_s) {
   RimRunOptions options = given;
-  const double eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
-  const double steps = explicit_steps(model, value_of(input.friction), options.end_s);
+  const Coulomb<S> friction{input.friction, input.eps_v};
+  const double steps = explicit_steps(model, friction.values(), options.end_s);
   if (!options.impact_at_rim && too_stiff(model, steps, options))
     return run_stiff(model, input, options, t_s);
   // Stability asks for that many, whatever the motion.
   options.max_steps = std::max(options.max_steps, static_cast<int>(steps));
-  const S limit = eps_v > 0.0 ? S(0.0) : input.friction;
+  const S limit = value_of(friction.eps_v) > 0.0 ? S(0.0) : friction.mu;
   return with_few_terms(model.terms, [&](auto terms) {
-    return rim_path<S, Coulomb>(model, input, Coulomb<S>{input.friction, eps_v}, limit,
-                                Regime::sliding, options, t_s, terms);
+    return rim_path<S, Coulomb>(model, input, friction, limit, Regime::sliding, options, t_s,
+                                terms);
   });
 }
 

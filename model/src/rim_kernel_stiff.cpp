@@ -14,11 +14,10 @@ template <class S, class From>
 Stiff<S> stiff_system(const RimModel& model, const RimInput<From>& input) {
   Stiff<S> system;
   place(model, input, system);
-  system.friction.eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
   if constexpr (std::is_same_v<S, From>)
-    system.friction.mu = input.friction;
+    system.friction = {input.friction, input.eps_v};
   else
-    system.friction.mu = S(value_of(input.friction));
+    system.friction = {S(value_of(input.friction)), S(value_of(input.eps_v))};
   return system;
 }
 
@@ -69,13 +68,12 @@ State<Dual8, kStates> state_at(const SundialsRun& run, Eigen::Index row, const D
 
 }  // namespace
 
-double explicit_steps(const RimModel& model, double friction, double duration_s) {
-  const double eps_v = model.terms.slip_regularisation_m_s.value_or(0.0);
-  if (eps_v == 0.0) return 0.0;
+double explicit_steps(const RimModel& model, const Coulomb<double>& friction, double duration_s) {
+  if (friction.eps_v == 0.0) return 0.0;
   constexpr double kStability = 6.0;
   const RimBody& b = model.body;
-  const double rate =
-      friction * b.m * b.g / eps_v * (1.0 / b.m + b.R * b.R / b.C + (b.h * b.h + b.R * b.R) / b.A);
+  const double rate = friction.mu * b.m * b.g / friction.eps_v *
+                      (1.0 / b.m + b.R * b.R / b.C + (b.h * b.h + b.R * b.R) / b.A);
   return rate * duration_s / kStability;
 }
 
@@ -92,7 +90,7 @@ RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimR
   Ode ode = rim_ode(stiff_system<double>(model, input), stiff_system<Dual<16>>(model, input));
   if constexpr (std::is_same_v<S, Dual8>) ode.sensitivities = sensitivities_of(model, input, start);
   StepControl<kStates> control = rim_control<kStates>(model.body, options);
-  resolve_stick(model.terms.slip_regularisation_m_s.value_or(0.0), control);
+  resolve_stick(value_of(input.eps_v), control);
   SundialsOptions sundials;
   sundials.method = SundialsMethod::cvode_bdf;
   constexpr double kFinest = 1e-14;

@@ -19,7 +19,7 @@ using Role = ParameterInfo::Role;
 enum class Floor { rolling, smooth, sliding };
 
 /// Places of the parameters in RimInput: initial state, losses, friction.
-constexpr int kInitial = 10, kFriction = kInitial + kLosses;
+constexpr int kInitial = 10, kFriction = kInitial + kLosses, kSlipScale = kFriction + 1;
 enum Slot : int { kTheta, kPhi, kPsi, kW1, kW2, kW3, kX, kY, kVx, kVy };
 
 template <class S>
@@ -27,7 +27,8 @@ S& slot(RimInput<S>& in, int index) {
   S* const initial[kInitial] = {&in.theta, &in.phi, &in.psi, &in.w1, &in.w2,
                                 &in.w3,    &in.x,   &in.y,   &in.vx, &in.vy};
   if (index < kInitial) return *initial[index];
-  return index < kFriction ? in.losses.value[index - kInitial] : in.friction;
+  if (index < kFriction) return in.losses.value[index - kInitial];
+  return index == kFriction ? in.friction : in.eps_v;
 }
 
 ParameterInfo initial_parameter(const char* name, const char* unit, double value,
@@ -77,6 +78,11 @@ void add_dynamics(const data::ModelSettings& model, Floor floor, Entries& entrie
   entries.add({"friction", "1", Role::dynamics, 0.0, kInfinity, true, *model.friction, true,
                "Coulomb coefficient of the floor"},
               kFriction);
+  // Coulomb's law itself has no slip speed to fit.
+  if (const double eps_m_s = model.slip_regularisation_m_s.value_or(0.0); eps_m_s > 0.0)
+    entries.add({"slip_regularisation_m_s", "m/s", Role::dynamics, 0.0, kInfinity, true, eps_m_s,
+                 false, "slip speed over which friction sets in"},
+                kSlipScale);
 }
 
 class RimPredictor : public Predictor {

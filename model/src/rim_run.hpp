@@ -100,7 +100,7 @@ class RimRun {
         options_(options),
         t_s_(t_s) {
     if constexpr (kCoulomb) {
-      if (friction.eps_v == 0.0)
+      if (value_of(friction.eps_v) == 0.0)
         slide_.stick_speed_m_s = options.stick_factor * stick_speed_m_s(body);
     }
   }

@@ -91,9 +91,7 @@ struct RimJob {
     options.stick_factor = stick;
     return options;
   }
-  [[nodiscard]] double eps_v() const {
-    return law == "sliding" ? model.terms.slip_regularisation_m_s.value_or(0.0) : 0.0;
-  }
+  [[nodiscard]] Coulomb<double> friction() const { return {input.friction, input.eps_v}; }
 };
 
 template <template <class> class Friction, template <class> class... Terms>
@@ -124,7 +122,7 @@ RimRecord run_sundials(const RimJob& job, const System& system, const DualSystem
   Eigen::VectorXd y0(n);
   for (int i = 0; i < n; ++i) y0[i] = start[i];
   StepControl<n> control = rim_control<n>(job.model.body, job.options(tolerance, 1.0));
-  if constexpr (n == 10) resolve_stick(job.eps_v(), control);
+  if constexpr (n == 10) resolve_stick(job.input.eps_v, control);
   const SundialsRun run =
       integrate_sundials(rim_ode(system, duals), 0.0, y0, job.t_s,
                          sundials_options(job.method, control.rtol, control.atol, n));
@@ -149,8 +147,8 @@ RimRecord run_sliding_by(const RimJob& job, double tolerance) {
   place(job.model, job.input, system);
   place(job.model, job.input, duals);
   if constexpr (Friction<double>::kActive) {
-    system.friction = {job.input.friction, job.eps_v()};
-    duals.friction = {Jacobian(job.input.friction), job.eps_v()};
+    system.friction = job.friction();
+    duals.friction = {Jacobian(job.input.friction), Jacobian(job.input.eps_v)};
   }
   return run_sundials(job, system, duals, tolerance);
 }
@@ -184,10 +182,9 @@ RimRecord run_job(const RimJob& job, double tolerance, double stick) {
     });
   }
   if (!own) return run_sliding_by<Coulomb>(job, tolerance);
-  const Coulomb<double> friction{job.input.friction, job.eps_v()};
-  const double limit = job.eps_v() > 0.0 ? 0.0 : job.input.friction;
+  const double limit = job.input.eps_v > 0.0 ? 0.0 : job.input.friction;
   return with_few_terms(terms, [&](auto list) {
-    return run_phases(job, friction, limit, Regime::sliding, options, list);
+    return run_phases(job, job.friction(), limit, Regime::sliding, options, list);
   });
 }
 
@@ -198,17 +195,17 @@ struct ContactChoice {
 
 ContactChoice choose(const RimJob& job, const std::string& asked) {
   constexpr double kManySteps = 2e5;
-  const bool exact = job.law == "sliding" && job.eps_v() == 0.0;
+  const bool exact = job.law == "sliding" && job.input.eps_v == 0.0;
   if (asked == "auto") {
     if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
     const double steps =
-        job.eps_v() > 0.0 ? explicit_steps(job.model, job.input.friction, job.t_s.back()) : 0.0;
+        job.law == "sliding" ? explicit_steps(job.model, job.friction(), job.t_s.back()) : 0.0;
     if (steps > kManySteps)
       return {
           Method::cvode_bdf, "cvode-bdf",
           fmt::format("stiff friction: an explicit method would take about {:.0e} steps", steps)};
     return {Method::dop853, "dop853",
-            job.eps_v() > 0.0
+            job.input.eps_v > 0.0
                 ? fmt::format("friction that is not stiff: about {:.0e} explicit steps", steps)
                 : "no friction law that could be stiff, smooth between events"};
   }
@@ -241,6 +238,7 @@ RimJob rim_job(const data::Scene& scene, const std::string& law) {
                start.vx_m_s,
                start.vy_m_s,
                loss_values(scene.model),
+               0.0,
                0.0};
   if (law == "sliding") {
     if (!scene.model.friction)
@@ -249,14 +247,17 @@ RimJob rim_job(const data::Scene& scene, const std::string& law) {
     job.input.friction = *scene.model.friction;
     if (!(job.input.friction >= 0.0) || !std::isfinite(job.input.friction))
       throw InputError(fmt::format("model.friction = {} must be 0 or greater", job.input.friction));
-    if (job.input.friction == 0.0) job.law = "smooth";
+    if (job.input.friction == 0.0)
+      job.law = "smooth";
+    else
+      job.input.eps_v = scene.model.slip_regularisation_m_s.value_or(0.0);
   }
   if (scene.run.rim_switch != "end" && scene.run.rim_switch != "impact")
     throw InputError(
         fmt::format("run.rim_switch = \"{}\" must be end or impact", scene.run.rim_switch));
   job.impact = scene.run.rim_switch == "impact";
   job.columns = {central_inertia(*scene.body).mass_known,
-                 job.law == "sliding" && job.eps_v() == 0.0};
+                 job.law == "sliding" && job.input.eps_v == 0.0};
   job.t_s = output_times_s(scene.run);
   return job;
 }

@@ -253,7 +253,6 @@ TEST_F(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
     c.track.samples[i].phi = {columns.at("phi")[2 * i] + normal(generator), kAngle_rad};
   }
   data::ModelSettings nothing;
-  nothing.slip_regularisation_m_s = c.scene.model.slip_regularisation_m_s;
   nothing.couple_regularisation_rad_s = c.scene.model.couple_regularisation_rad_s;
   c.scene.model = nothing;
   const Comparison found = compare(std::span(&c.track, 1), c.scene, {});
@@ -266,6 +265,18 @@ TEST_F(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
   int most = 0;
   for (const data::ModelScore& one : found.fit.comparison) most = std::max(most, one.parameters);
   EXPECT_LT(score->parameters, most) << found.fit.recommendation;
+}
+
+// Over 1e-3 m/s in truth, given as a third of that.
+TEST_F(RimFit, FindsHowFrictionSetsIn) {
+  Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
+  c.scene.model.slip_regularisation_m_s = 3e-4;
+  c.scene.fit.free = {"slip_regularisation_m_s"};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "slip_regularisation_m_s", 1e-3), kFar);
+  EXPECT_LT(fit.find("slip_regularisation_m_s")->sigma, 2e-4);
+  EXPECT_LT(pull(fit, "friction", 0.3), kFar);
 }
 
 // With friction that sets in and stops, neighbouring valleys leave several times the noise.

@@ -34,6 +34,7 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
     {"air_force_N_s_m", &ModelSettings::air_force_N_s_m},
     {"gap_viscosity_Pa_s", &ModelSettings::gap_viscosity_Pa_s},
     {"friction", &ModelSettings::friction},
+    {"slip_regularisation_m_s", &ModelSettings::slip_regularisation_m_s},
     {"rolling_friction_m", &ModelSettings::rolling_friction_m},
     {"pivoting_friction_m", &ModelSettings::pivoting_friction_m},
     {"contour_friction_m", &ModelSettings::contour_friction_m},

@@ -19,8 +19,8 @@ template <class S>
 struct Coulomb {
   static constexpr bool kActive = true;
   S mu{0.0};
-  double eps_v = 0.0;  ///< [m/s]
-  [[nodiscard]] Coulomb<double> values() const { return {value_of(mu), eps_v}; }
+  S eps_v{0.0};  ///< [m/s]
+  [[nodiscard]] Coulomb<double> values() const { return {value_of(mu), value_of(eps_v)}; }
   /// Friction per unit normal force along n and mh.
   [[nodiscard]] TROCHOID_INLINE Horizontal<S> per_normal(const Horizontal<S>& u) const {
     const S scale = mu / sqrt(u.along_n * u.along_n + u.along_mh * u.along_mh + eps_v * eps_v);
