@@ -118,8 +118,8 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
   return resort ? terms : std::set<int>{};
 }
 
-// Fits the rungs with these sets of terms that are not known yet, side by side, from the solution of
-// rungs[known].
+// Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
+// of rungs[known].
 void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
                     const FitOptions& options, const std::vector<std::set<int>>& wanted,
                     std::size_t known, std::vector<Rung>& rungs) {
@@ -148,16 +148,13 @@ std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<in
   return sets;
 }
 
-// The terms with one more that no fitted rung of the same law has.
-std::vector<std::set<int>> with_one_untried(const Ladder& ladder, const Rung& rung,
-                                            const std::vector<Rung>& rungs) {
+// The terms with one more; the last resort is not added.
+std::vector<std::set<int>> with_one_more(const Ladder& ladder, const std::set<int>& terms) {
   std::vector<std::set<int>> sets;
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
-    const bool tried = std::any_of(rungs.begin(), rungs.end(), [&](const Rung& other) {
-      return other.fitted && other.fit.model == rung.fit.model && other.terms.contains(index);
-    });
-    if (tried || ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
-    sets.push_back(rung.terms);
+    if (terms.contains(index) || ladder.terms[static_cast<std::size_t>(index)].last_resort)
+      continue;
+    sets.push_back(terms);
     sets.back().insert(index);
   }
   return sets;
@@ -165,9 +162,8 @@ std::vector<std::set<int>> with_one_untried(const Ladder& ladder, const Rung& ru
 
 // Everything but the last resort was added before it was known what that explains: terms the data
 // do not need any more are left out again, one at a time, as long as that costs no strong evidence.
-// @returns the index of what is left.
-std::size_t step_down(const Ladder& ladder, std::span<const data::Track> tracks,
-                      const FitOptions& options, std::size_t current, std::vector<Rung>& rungs) {
+void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
+               std::size_t current, std::vector<Rung>& rungs) {
   while (rungs[current].fitted && rungs[current].fit.converged) {
     const std::size_t first = rungs.size();
     const std::set<int> terms = rungs[current].terms;
@@ -178,37 +174,49 @@ std::size_t step_down(const Ladder& ladder, std::span<const data::Track> tracks,
           rungs[i].bic < rungs[current].bic + kStrong &&
           (best == current || rungs[i].bic < rungs[best].bic))
         best = i;
-    if (best == current) break;
+    if (best == current) return;
     current = best;
   }
-  return current;
 }
 
-// And for the same reason some terms were never tried beside it: each is added to what is left, and
-// put in the place of every other.
-void try_the_others(const Ladder& ladder, std::span<const data::Track> tracks,
+// Whether a fitted rung's losses that a smaller one lacks may be zero, by their error bars.
+bool may_do_without(const Rung& rung, const Rung& smaller) {
+  constexpr double kSurely = 4.0;  // sigmas, which curvature may misjudge
+  if (!rung.fitted || !rung.fit.converged) return false;
+  std::set<std::string> lost = parameters_of(rung.scene);
+  for (const std::string& name : parameters_of(smaller.scene)) lost.erase(name);
+  lost.erase(kSlipScale);  // the smaller one's is fitted anew
+  return std::all_of(lost.begin(), lost.end(), [&](const std::string& name) {
+    const data::FitParameter* loss = rung.fit.find(name);
+    return loss != nullptr && loss->value < kSurely * loss->sigma;
+  });
+}
+
+// Terms are added one at a time, by what is gained at once, and those of a last resort all
+// together: what never stood beside the others may do as well as one of them. Every term left is
+// added to a rung, and put in the place of those that are not sure beside it.
+void exchange_terms(const Ladder& ladder, std::span<const data::Track> tracks,
                     const FitOptions& options, std::size_t current, std::vector<Rung>& rungs) {
-  if (!rungs[current].fitted || !rungs[current].fit.converged) return;
-  const auto larger = with_one_untried(ladder, rungs[current], rungs);
-  std::vector<std::set<int>> wanted = larger;
-  for (const std::set<int>& terms : larger)
-    for (std::set<int>& exchanged : with_one_less(ladder, terms, rungs[current].terms))
-      wanted.push_back(std::move(exchanged));
-  add_neighbours(ladder, tracks, options, wanted, current, rungs);
+  const std::set<int> terms = rungs[current].terms;
+  const auto larger = with_one_more(ladder, terms);
+  add_neighbours(ladder, tracks, options, larger, current, rungs);
+  std::vector<std::set<int>> exchanged;
+  for (const Rung& rung : rungs) {
+    if (std::find(larger.begin(), larger.end(), rung.terms) == larger.end()) continue;
+    for (std::set<int>& others : with_one_less(ladder, rung.terms, terms))
+      if (may_do_without(rung, rung_with(ladder, others))) exchanged.push_back(std::move(others));
+  }
+  add_neighbours(ladder, tracks, options, exchanged, current, rungs);
 }
 
 // The plainest model and, one more term at a time, all extensions of the best so far.
 std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
-                        const FitOptions& given) {
+                        const FitOptions& options) {
   constexpr std::size_t kMostTerms = 3;
-  FitOptions options = given;
-  options.profile = false;
-  options.bootstrap = 0;
-  options.model.clear();
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
   const std::size_t terms = ladder.terms.size();
-  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2 + terms * (terms + 1));
+  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   std::size_t current = 0;
@@ -226,10 +234,6 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
            (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= kTrackersOwn);
   };
   if (explains(current)) return rungs;
-  const auto settle = [&](std::size_t known) {
-    known = step_down(ladder, tracks, options, known, rungs);
-    try_the_others(ladder, tracks, options, known, rungs);
-  };
   if (ladder.frictionless) {
     rungs.push_back(frictionless_rung(ladder));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
@@ -239,7 +243,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (rungs[current].fit.converged) {
     const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
     if (last != current && explains(last)) {
-      settle(last);
+      step_down(ladder, tracks, options, last, rungs);
       return rungs;
     }
   }
@@ -249,7 +253,7 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
     rungs.push_back(rung_with(ladder, all));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
-    settle(rungs.size() - 1);
+    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
   }
   return rungs;
 }
@@ -288,8 +292,16 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   const Ladder ladder = ladder_of(named);
   if (!options.start.empty())
     check_first_guess(options.start, "the models compared have", parameters_of_any(ladder));
-  const std::vector<Rung> rungs = climb(ladder, tracks, options);
+  FitOptions plain = options;
+  plain.profile = false;
+  plain.bootstrap = 0;
+  plain.model.clear();
+  std::vector<Rung> rungs = climb(ladder, tracks, plain);
   const Rung* chosen = simplest_sufficient(ladder, rungs);
+  if (chosen != nullptr && chosen->fit.converged) {
+    exchange_terms(ladder, tracks, plain, static_cast<std::size_t>(chosen - rungs.data()), rungs);
+    chosen = simplest_sufficient(ladder, rungs);
+  }
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};
     none.fit.comparison = table_of(rungs, nullptr);

@@ -141,7 +141,7 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
         "there the motion hangs on what is far below them (an impact, the fall onto a "
         "face), and the error bars do not know of it",
         fit.integration_error_sigma));
-  problem.set_base(solution.u);
+  hold_vanished(problem, solution.u);
   name_attitudes(problem);
   solution.u = problem.start();
   return solution;

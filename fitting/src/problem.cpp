@@ -239,8 +239,8 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
     return settings.free_pivot || listed(settings.free, info.name);
   // Freeing the clock, or how friction sets in, leaves the model its own choice of the rest.
-  const bool chosen = std::any_of(
-      settings.free.begin(), settings.free.end(), [](const std::string& name) {
+  const bool chosen =
+      std::any_of(settings.free.begin(), settings.free.end(), [](const std::string& name) {
         return name != kReadout && name != kAngleDelay && name != kSlipScale;
       });
   if (!chosen || info.role == ParameterInfo::Role::initial)

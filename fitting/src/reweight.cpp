@@ -104,8 +104,8 @@ double cost_of_standing_out(const Problem& problem, Channel channel) {
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
     for (const Reading& reading : problem.arcs[arc].readings)
       if (reading.channel == channel)
-        cost +=
-            2.0 * kInlier * kInlier * (1.0 - robust_weight(problem, static_cast<int>(arc), reading));
+        cost += 2.0 * kInlier * kInlier *
+                (1.0 - robust_weight(problem, static_cast<int>(arc), reading));
   return cost;
 }
 

@@ -235,7 +235,8 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     else
       rung.fit = fit_one_of_several(tracks, rung.scene, own);
     rung.fitted = usable(rung.fit);
-    if (rung.fitted && rung.fit.converged)
+    const bool in_question = rung.fit.bic < known.fit.bic + kVeryStrong;
+    if (rung.fitted && rung.fit.converged && in_question)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   } catch (const NumericalError& error) {
     rung.fitted = usable(rung.fit);

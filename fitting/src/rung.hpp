@@ -39,9 +39,10 @@ struct Rung {
 [[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
 
 /// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
-/// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq. 4):
-/// those that follow the same law, and that BIC does not rule out. A loss that a rung lacks is zero
-/// there. Warns where a bar grows noticeably.
+/// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
+/// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out. A
+/// loss that a rung lacks is zero there. Warns where a bar grows noticeably. What rungs with
+/// further terms that nothing asks for would change is said, and not allowed for.
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
 
 /// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back
@@ -50,7 +51,8 @@ void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung);
 
-/// Fits a rung that has a term more or less than `known`, from the solution of that alone.
+/// Fits a rung that has a term more or less than `known`, from the solution of that alone. Predicts
+/// the held-back third where BIC does not rule it out beside that one.
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
                    const FitOptions& options, Rung& rung);
 

@@ -23,8 +23,7 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   const double duration = std::max(arc.duration_s(), 1e-9);
   if (info.unit == "rad") return 1.0;
   // A loss that came out as nothing is known if its error is small against the given value's.
-  if (info.logarithmic)
-    return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
+  if (info.logarithmic) return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
   if (info.unit == "s")  // a clock's error is known if it is known to a frame
     return duration / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
   if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);

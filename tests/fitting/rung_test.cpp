@@ -85,8 +85,10 @@ data::FitParameter loss(const std::string& name, double value, double sigma) {
   return {name, value, sigma, "m", data::ParameterStatus::free, true, ""};
 }
 
-Rung rung_of(std::vector<data::FitParameter> parameters, double aicc, double bic) {
+Rung rung_of(std::set<int> terms, std::vector<data::FitParameter> parameters, double aicc,
+             double bic) {
   Rung rung;
+  rung.terms = std::move(terms);
   rung.fitted = rung.fit.converged = true;
   rung.fit.model = "rolling";
   rung.fit.arcs.resize(1);
@@ -103,8 +105,8 @@ Rung rung_of(std::vector<data::FitParameter> parameters, double aicc, double bic
 }
 
 TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
-  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                          rung_of({loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};
+  const std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                                rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   // Either model is right with probability one half: 0.6 off half of the time.
@@ -116,24 +118,39 @@ TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
 }
 
 TEST(Rivals, WithoutALossTakeItForNothing) {
-  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                          rung_of({loss("pivoting_friction_m", 3.0, 0.1)}, 100.0, 100.0)};
+  const std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+      rung_of({2}, {loss("pivoting_friction_m", 3.0, 0.1)}, 100.0, 100.0)};
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_NEAR(fit.parameters[0].sigma, std::sqrt(0.1 * 0.1 + 0.5), 1e-12);
 }
 
-TEST(Rivals, ThatAreRuledOutOrUnexplainedDoNotCount) {
-  std::vector<Rung> rungs{rung_of({loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                          rung_of({loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 111.0),
-                          rung_of({loss("rolling_friction_m", 0.3, 0.1)}, 80.0, 90.0),
-                          rung_of({loss("rolling_friction_m", 0.2, 0.1)}, 100.0, 100.0)};
+TEST(Rivals, ThatAreRuledOutOrUnexplainedOrOfAnotherLawDoNotCount) {
+  std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                          rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 111.0),
+                          rung_of({3}, {loss("rolling_friction_m", 0.3, 0.1)}, 80.0, 90.0),
+                          rung_of({4}, {loss("rolling_friction_m", 0.2, 0.1)}, 100.0, 100.0)};
   rungs[2].fit.converged = false;
   rungs[3].fit.model = "sliding";
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_DOUBLE_EQ(fit.parameters[0].sigma, 0.1);
   EXPECT_TRUE(fit.warnings.empty());
+}
+
+// The simplest model that suffices stands; what it leaves out is told.
+TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
+  const std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              98.0, 104.0)};
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_DOUBLE_EQ(fit.parameters[0].sigma, 0.1);
+  ASSERT_EQ(fit.warnings.size(), 1u);
+  EXPECT_NE(fit.warnings[0].find("rolling_friction_m would be 0.4 +- 0.5, 6 of"), std::string::npos)
+      << fit.warnings[0];
 }
 
 }  // namespace

@@ -24,8 +24,9 @@ struct Comparison {
 /// Every rung is judged by AICc and BIC (both allow for residuals that hang together), whiteness of
 /// residuals and the prediction of the last third of the track from the first two. Recommended is
 /// the rung with the fewest parameters within 6 of the least BIC; its error bars allow for what
-/// rungs that are not ruled out make of its parameters. Where the fitted ring or disc turns retrograde, the recommendation says which losses
-/// explain that and whether the track can tell.
+/// rungs with other terms that are not ruled out make of its parameters. Where the fitted ring or
+/// disc turns retrograde, the recommendation says which losses explain that and whether the track
+/// can tell.
 /// @throws InputError as fit() does for the model without losses.
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
                                  const FitOptions& options = {});
