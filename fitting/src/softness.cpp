@@ -26,27 +26,38 @@ std::optional<data::Fit> fit_named(std::span<const data::Track> tracks, const da
   return std::nullopt;
 }
 
+FitOptions going_on_from(const data::Fit& fit, FitOptions options) {
+  if (auto values = values_of(fit); !values.empty()) {
+    options.start = std::move(values);
+    options.strategy = "single";
+  }
+  return options;
+}
+
+// Where a search with eps free leads nowhere, one with eps held may: it has one way less to stray.
 std::optional<data::Fit> fit_gently(std::span<const data::Track> tracks, const FitOptions& options,
                                     data::Scene& scene) {
   constexpr double kGentle_m_s = 1e-3;
+  const std::string law = "friction that sets in gently, ";
   const auto known = options.start.find(kSlipScale);
   scene.model.slip_regularisation_m_s = known != options.start.end() ? known->second : kGentle_m_s;
+  const data::Scene held = scene;
   scene.fit.free.emplace_back(kSlipScale);
-  auto fit = fit_named(tracks, scene, options, "friction that sets in gently, ");
+  auto fit = fit_named(tracks, scene, options, law);
+  if (options.strategy == "auto" && (!fit || !fit->converged))
+    if (const auto near = fit_named(tracks, held, options, law); near && near->converged)
+      fit = fit_named(tracks, scene, going_on_from(*near, options), law);
   if (const data::FitParameter* found = fit ? fit->find(kSlipScale) : nullptr)
     scene.model.slip_regularisation_m_s = found->value;
   return fit;
 }
 
 // From the gentle law's solution.
-std::optional<data::Fit> fit_sharply(std::span<const data::Track> tracks, FitOptions options,
+std::optional<data::Fit> fit_sharply(std::span<const data::Track> tracks, const FitOptions& options,
                                      const data::Scene& scene, const data::Fit& gentle) {
-  if (auto values = values_of(gentle); !values.empty()) {
-    options.start = std::move(values);
-    options.strategy = "single";
-  }
-  options.start.erase(kSlipScale);
-  return fit_named(tracks, scene, options, "Coulomb's law, ");
+  FitOptions own = going_on_from(gentle, options);
+  own.start.erase(kSlipScale);
+  return fit_named(tracks, scene, std::move(own), "Coulomb's law, ");
 }
 
 // Whether so many standard deviations of eps are beyond what a parabola may hide of Coulomb's law.
