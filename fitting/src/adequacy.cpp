@@ -258,6 +258,7 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
 
 void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
             const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
+  // One or two in a row may be a glitch that happens to lie near the path.
   constexpr double kMany = 0.01;
   constexpr int kFewest = 3;
   fit.converged = true;

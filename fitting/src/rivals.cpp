@@ -14,11 +14,6 @@ struct Rival {
   double weight = 0.0;  // by AICc, of all that are not ruled out together 1
 };
 
-bool contains(const Rung& whole, const Rung& part) {
-  return std::includes(whole.terms.begin(), whole.terms.end(), part.terms.begin(),
-                       part.terms.end());
-}
-
 // Of the same law, and not ruled out.
 bool in_question(const Rung& rung, const Rung& chosen) {
   return &rung != &chosen && rung.fitted && rung.fit.converged &&
@@ -31,7 +26,7 @@ std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen)
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
-    if (!in_question(rung, chosen) || contains(rung, chosen)) continue;
+    if (!in_question(rung, chosen) || has_all_terms_of(rung, chosen)) continue;
     rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc))});
     all += rivals.back().weight;
   }
@@ -84,7 +79,7 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
   constexpr double kFar = 3.0;  // error bars
   const Rung* likeliest = nullptr;
   for (const Rung& rung : rungs)
-    if (in_question(rung, chosen) && contains(rung, chosen) && rung.aicc < chosen.aicc &&
+    if (in_question(rung, chosen) && has_all_terms_of(rung, chosen) && rung.aicc < chosen.aicc &&
         (likeliest == nullptr || rung.aicc < likeliest->aicc))
       likeliest = &rung;
   if (likeliest == nullptr) return;

@@ -17,6 +17,11 @@
 
 namespace trochoid::fitting {
 
+bool has_all_terms_of(const Rung& rung, const Rung& other) {
+  return std::includes(rung.terms.begin(), rung.terms.end(), other.terms.begin(),
+                       other.terms.end());
+}
+
 bool usable(const data::Fit& fit) {
   return !fit.parameters.empty() && std::isfinite(fit.chi2);
 }

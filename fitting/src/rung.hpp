@@ -32,6 +32,9 @@ struct Rung {
   double bic = std::numeric_limits<double>::infinity();
 };
 
+/// Whether a rung has all terms of another; also where they are the same.
+[[nodiscard]] bool has_all_terms_of(const Rung& rung, const Rung& other);
+
 /// Whether a fit came to an end, good or bad.
 [[nodiscard]] bool usable(const data::Fit& fit);
 

@@ -10,10 +10,6 @@
 namespace trochoid::fitting {
 namespace {
 
-bool contains(const std::set<int>& whole, const std::set<int>& part) {
-  return std::includes(whole.begin(), whole.end(), part.begin(), part.end());
-}
-
 std::string listed(const std::vector<const Rung*>& rungs, double bic) {
   std::string words;
   for (const Rung* rung : rungs)
@@ -63,7 +59,7 @@ std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const L
   for (const Rung& rung : rungs) {
     if (!rung.fitted || &rung == &chosen) continue;
     const bool near = rung.bic - chosen.bic < kVeryStrong;
-    if (!contains(rung.terms, chosen.terms))
+    if (!has_all_terms_of(rung, chosen))
       (near ? alike : worse).push_back(&rung);
     else if (near)
       more.push_back(&rung);
