@@ -213,9 +213,8 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
 }
 #endif
 
-void add_fit_values(py::module_& module) {
-  using data::Bootstrap, data::BootstrapSpread, data::NullVector, data::Profile;
-  using data::Fit, data::FitParameter, data::FitArc, data::ModelScore;
+void add_fit_parts(py::module_& module) {
+  using data::FitParameter, data::FitArc, data::ModelScore, data::NullVector;
   py::class_<FitParameter>(module, "Parameter", "One parameter of a fit.")
       .def_readonly("name", &FitParameter::name)
       .def_readonly("value", &FitParameter::value)
@@ -253,6 +252,10 @@ void add_fit_values(py::module_& module) {
                          "A direction of parameter space the data do not see.")
       .def_readonly("components", &NullVector::components, "Weight by parameter name, unit length.")
       .def_readonly("words", &NullVector::words);
+}
+
+void add_error_bars(py::module_& module) {
+  using data::Bootstrap, data::BootstrapSpread, data::Profile;
   py::class_<Profile>(module, "Profile", "How well the fit holds at fixed values of a parameter.")
       .def_readonly("parameter", &Profile::parameter)
       .def_readonly("verdict", &Profile::verdict, "bounded, one-sided or flat")
@@ -270,6 +273,12 @@ void add_fit_values(py::module_& module) {
       .def_readonly("failed", &Bootstrap::failed)
       .def_readonly("block_s", &Bootstrap::block_s)
       .def_readonly("parameters", &Bootstrap::parameters);
+}
+
+void add_fit_values(py::module_& module) {
+  using data::Fit;
+  add_fit_parts(module);
+  add_error_bars(module);
   py::class_<Fit>(module, "FitValue")
       .def_readonly("model", &Fit::model)
       .def_readonly("converged", &Fit::converged)
