@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -15,6 +16,7 @@ constexpr double kPi = std::numbers::pi;
 struct AngleSeries {
   std::vector<double> t_s;
   Eigen::MatrixXd value;
+  SmoothCurve curve;
 };
 
 AngleSeries series_of(const ArcData& arc, Channel channel) {
@@ -28,20 +30,25 @@ AngleSeries series_of(const ArcData& arc, Channel channel) {
     series.t_s.push_back(arc.t_s[reading.sample]);
   }
   series.value = Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
+  if (values.size() >= 8) series.curve = smooth_auto(series.t_s, series.value);
   return series;
+}
+
+Eigen::Index nearest(const AngleSeries& series, double t_s) {
+  const auto found = std::lower_bound(series.t_s.begin(), series.t_s.end(), t_s);
+  return std::min<Eigen::Index>(found - series.t_s.begin(),
+                                static_cast<Eigen::Index>(series.t_s.size()) - 1);
 }
 
 // Value and rate at an instant: the smoothed curve's nearest sample, carried there.
 std::pair<double, double> at(const AngleSeries& series, double t_s) {
-  const SmoothCurve curve = smooth_auto(series.t_s, series.value);
-  const auto nearest = std::lower_bound(series.t_s.begin(), series.t_s.end(), t_s);
-  const Eigen::Index i = std::min<Eigen::Index>(nearest - series.t_s.begin(),
-                                                static_cast<Eigen::Index>(series.t_s.size()) - 1);
-  const double ahead_s = t_s - series.t_s[i];
-  return {curve.value(i, 0) + curve.first(i, 0) * ahead_s, curve.first(i, 0)};
+  const Eigen::Index i = nearest(series, t_s);
+  const double rate = series.curve.first(i, 0);
+  return {series.curve.value(i, 0) + rate * (t_s - series.t_s[i]), rate};
 }
 
 struct Motion {
+  SmoothCurve curve;
   Eigen::Vector2d position_m, velocity_m_s, acceleration_m_s2;
   double turning_rad_s = 0.0;   // median rate of the heading
   double veering_rad_s = 0.0;   // and of the acceleration's direction
@@ -53,7 +60,7 @@ double cross(const Eigen::RowVector2d& a, const Eigen::RowVector2d& b) {
 }
 
 Motion motion_of(const ArcData& arc) {
-  const SmoothCurve curve = smooth_auto(arc.t_s, arc.positions_m());
+  SmoothCurve curve = smooth_auto(arc.t_s, arc.positions_m());
   std::vector<double> turning, veering, acceleration;
   for (Eigen::Index i = 0; i < curve.value.rows(); ++i) {
     const Eigen::RowVector2d v = curve.first.row(i), a = curve.second.row(i);
@@ -67,9 +74,12 @@ Motion motion_of(const ArcData& arc) {
   const auto upper =
       acceleration.begin() + static_cast<std::ptrdiff_t>(acceleration.size() * 9 / 10);
   std::nth_element(acceleration.begin(), upper, acceleration.end());
-  return {.position_m = curve.value.row(0).transpose(),
-          .velocity_m_s = curve.first.row(0).transpose(),
-          .acceleration_m_s2 = curve.second.row(0).transpose(),
+  const Eigen::Vector2d position = curve.value.row(0), velocity = curve.first.row(0),
+                        pull = curve.second.row(0);
+  return {.curve = std::move(curve),
+          .position_m = position,
+          .velocity_m_s = velocity,
+          .acceleration_m_s2 = pull,
           .turning_rad_s = median(std::move(turning)),
           .veering_rad_s = median(std::move(veering)),
           .strongest_m_s2 = *upper};
@@ -114,6 +124,34 @@ double steady_spin(const RimShape& q, double theta, double W) {
   const double s = std::sin(theta), c = std::cos(theta), z = q.R * s + q.h * c;
   const double pull = W * W * s * (q.A * c + z * q.h) + q.g * (q.h * s - q.R * c);
   return pull / (W * (q.C * s + q.R * z));
+}
+
+// Spin at the window's first sample, whatever the rim does on the floor: the couples about the node
+// line balance when (per mass)
+//   A ddtheta = A w2 O3 - C w2 w3 - z' N + z Ft,  O3 = w2 cot theta,  N = g + d2z/dt2,
+// and the force along the line, Fn, is what changes the spin: C dw3 = R Fn. Median over the window.
+double spin_by_couples(const RimShape& q, const ArcData& arc, const AngleSeries& tilts,
+                       const AngleSeries& turns, const Motion& motion) {
+  std::vector<double> spins;
+  double gained = 0.0, before = 0.0;  // spin since the first sample, and its rate at the last one
+  for (std::size_t sample = 0; sample < arc.t_s.size(); ++sample) {
+    const double t_s = arc.t_s[sample];
+    const Eigen::Index i = nearest(tilts, t_s), k = nearest(turns, t_s);
+    const double theta = tilts.curve.value(i, 0), w1 = tilts.curve.first(i, 0);
+    const double dw1 = tilts.curve.second(i, 0), W = turns.curve.first(k, 0);
+    const double s = std::sin(theta), c = std::cos(theta), h = std::copysign(q.h, c);
+    const double z = q.R * s + h * c, slope = q.R * c - h * s;
+    const Eigen::Vector2d n =
+        Eigen::Rotation2Dd(turns.curve.value(k, 0)) * Eigen::Vector2d::UnitX();
+    const Eigen::Vector2d force = motion.curve.second.row(static_cast<Eigen::Index>(sample));
+    const double Fn = n.dot(force), Ft = n.x() * force.y() - n.y() * force.x();
+    const double N = q.g + slope * dw1 - z * w1 * w1, rate = q.R * Fn / q.C;
+    if (sample > 0) gained += 0.5 * (before + rate) * (t_s - arc.t_s[sample - 1]);
+    before = rate;
+    const double pull = q.A * (W * W * s * c - dw1) - slope * N + z * Ft;
+    spins.push_back(pull / (q.C * W * s) - gained);
+  }
+  return median(std::move(spins));
 }
 
 // Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
@@ -169,12 +207,14 @@ std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const 
   // the other guess of the spin. Where it is not, bodies that slide would be led astray by it.
   constexpr double kFew = 20.0;
   const bool slow = readings_a_turn(phi) < kFew;
+  const double balanced = spin_by_couples(shape, arc, theta, phi, motion);
   const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
                        double share) {
     const double leaning = std::clamp(tilt.first, 0.03, kPi - 0.03), azimuth = turn.first;
     const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
     std::vector<double> spins{spin_by_velocity(motion, shape, azimuth, w2)};
     if (slow && turn.second != 0.0) spins.push_back(steady_spin(shape, leaning, turn.second));
+    if (shape.slides && std::isfinite(balanced)) spins.push_back(balanced);
     for (const double w3 : spins)
       starts.push_back(state(motion, leaning, azimuth, w1, w2, w3, "windows"));
   };
@@ -241,6 +281,25 @@ std::vector<Start> from_slip(const RimShape& shape, const Motion& motion) {
   return starts;
 }
 
+// A rim that slips because the body spins fast pulls its centre along the node line, and the pull
+// veers as fast as the line turns. The spin is that at which gravity makes it turn so.
+std::vector<Start> from_spin(const RimShape& shape, const Motion& motion) {
+  const double brake_m_s2 = motion.acceleration_m_s2.norm();
+  const double heading = std::atan2(motion.acceleration_m_s2.y(), motion.acceleration_m_s2.x());
+  std::vector<Start> starts;
+  for (double theta = 0.15; theta < 1.5; theta += 0.15)
+    for (const double share : {0.5, 0.7, 1.0, 1.4, 2.0}) {
+      const double s = std::sin(theta), c = std::cos(theta), W = share * motion.veering_rad_s;
+      const double pull = shape.A * W * W * s * c + shape.g * (shape.h * s - shape.R * c);
+      const double w2 = W * s, w3 = pull / (shape.C * w2);
+      if (!std::isfinite(w3)) continue;
+      const double phi = shape.R * w3 < shape.h * w2 ? heading : heading + kPi;
+      starts.push_back(state(motion, theta, phi, 0.0, w2, w3, "spin"));
+      starts.back().values["friction"] = std::clamp(brake_m_s2 / shape.g, 0.03, 0.9);
+    }
+  return starts;
+}
+
 }  // namespace
 
 std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
@@ -257,8 +316,9 @@ std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
     starts.push_back(starts[i]);
     starts.back().values["friction"] = std::clamp(1.1 * motion.strongest_m_s2 / shape.g, 0.05, 0.9);
   }
-  if (!seen)
-    for (Start& start : from_slip(shape, motion)) starts.push_back(std::move(start));
+  if (seen) return starts;
+  for (const auto& slipping : {from_slip(shape, motion), from_spin(shape, motion)})
+    starts.insert(starts.end(), slipping.begin(), slipping.end());
   return starts;
 }
 

@@ -45,7 +45,8 @@ struct RimShape {
 /// R w3, gives the spin, and so does steady rolling where a turn has few readings. From positions
 /// alone: a grid over the tilt, the direction of motion against the node line and the precession
 /// rate (the path's turning rate, and the two roots of steady rolling). A body that slides may also
-/// slip at its start, against its acceleration: a grid over the slip's speed.
+/// slip at its start, against its acceleration: a grid over the slip's speed, and the spin at which
+/// the couples balance, from the angles or from how fast the acceleration veers.
 [[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
