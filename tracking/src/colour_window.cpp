@@ -113,9 +113,9 @@ double mixing_error(const Tints& tints, double inner_light, double outer_light) 
   return (light_of(mixed) - 0.5 * (inner_light + outer_light)) / step;
 }
 
-LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window, const data::Body& body,
-                          const data::Camera& camera, const data::Pose<>& pose) {
-  constexpr double kLeastLevels = 5.0, kLeastRatio = 2.0;
+ColourWindow colour_window(const cv::Mat& chroma, const cv::Rect& window, const data::Body& body,
+                           const data::Camera& camera, const data::Pose<>& pose) {
+  constexpr double kLeastLevels = 5.0, kLeastRatio = 2.0, kPlainRatio = 4.0, kRounding = 0.5;
   if (chroma.empty()) return {};
   const double R = body.radius_m, band = R - body.inner_radius_m;
   Colour inside, outside;
@@ -124,13 +124,13 @@ LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window, const d
     return {};
   const Eigen::Vector2d apart = inside.middle - outside.middle;
   const double size = apart.norm();
-  if (size < kLeastLevels || size < kLeastRatio * (inside.scatter + outside.scatter)) return {};
+  const double scatter = inside.scatter + outside.scatter;
+  if (size < kLeastLevels || size < kLeastRatio * scatter) return {};
   const cv::Rect half =
       cv::Rect(window.x / 2 - 1, window.y / 2 - 1, window.width / 2 + 3, window.height / 2 + 3) &
       cv::Rect({}, chroma.size());
   if (half.width < 4 || half.height < 4) return {};
   cv::Mat values(half.size(), CV_32FC1);
-  // About zero on the floor and `size` on the body.
   const Eigen::Vector2f to = (apart / size).cast<float>(), from = outside.middle.cast<float>();
   for (int y = 0; y < half.height; ++y) {
     const auto* in = chroma.ptr<cv::Vec2b>(half.y + y) + half.x;
@@ -140,7 +140,8 @@ LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window, const d
                to.y() * (static_cast<float>(in[x][1]) - from.y());
   }
   cv::resize(values, values, {}, 2.0, 2.0, cv::INTER_LINEAR);
-  return LightWindow(values, cv::Point(2 * half.x, 2 * half.y));
+  return {LightWindow(values, cv::Point(2 * half.x, 2 * half.y)), size,
+          size > kPlainRatio * (scatter + kRounding)};
 }
 
 }  // namespace trochoid::tracking

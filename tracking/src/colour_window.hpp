@@ -12,13 +12,26 @@ namespace trochoid::tracking {
 /// [px^2]: pixels twice as wide, and the triangle between them.
 inline constexpr double kColourBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0 + 4.0 / 6.0;
 
-/// The colour difference in which the body at `pose` stands out of its surroundings most, of full
-/// size. Shadows hardly change it, so it shows rims that the luma loses. Empty where the colours
-/// are too much alike, or without chroma. Taken to lie in the middle of the four pixels it belongs
-/// to; other codings shift it by half a pixel.
-[[nodiscard]] LightWindow colour_window(const cv::Mat& chroma, const cv::Rect& window,
-                                        const data::Body& body, const data::Camera& camera,
-                                        const data::Pose<>& pose);
+/// A picture of the colour difference in which a body stands out of its surroundings most, about 0
+/// on these and about `body` on it; empty where there is none.
+struct ColourWindow {
+  LightWindow levels;
+  double body = 0.0;
+  bool plain = false;  ///< so much apart that a few pixels tell the body from its surroundings
+
+  [[nodiscard]] bool empty() const { return levels.empty(); }
+  /// The same blurred by a Gaussian.
+  [[nodiscard]] ColourWindow blurred(double sigma_px) const {
+    return {levels.blurred(sigma_px), body, plain};
+  }
+};
+
+/// That of the body at `pose`, of full size. Shadows hardly change it, so it shows rims that the
+/// luma loses. Empty where the colours are too much alike, or without chroma. Taken to lie in the
+/// middle of the four pixels it belongs to; other codings shift it by half a pixel.
+[[nodiscard]] ColourWindow colour_window(const cv::Mat& chroma, const cv::Rect& window,
+                                         const data::Body& body, const data::Camera& camera,
+                                         const data::Pose<>& pose);
 
 /// Colour of a surface in any light: by how much cb and cr differ from neutral, over the luma.
 struct Tint {

@@ -20,7 +20,7 @@ struct Scenery {
   const data::Camera& camera;
   const PoseMotion& motion;
   LightWindow picture, plate;
-  LightWindow colour;  ///< colour_window, or empty
+  ColourWindow colour;
   double most_looks;
   Visit visit = Visit::only;
   PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
