@@ -430,6 +430,95 @@ TEST(OutlineFitter, AContactShadowAsDarkAsTheDiscHardlyPullsIt) {
   }
 }
 
+// A greenish ellipse in chroma planes of half the size.
+void draw_on_chroma(cv::Mat& cb, cv::Mat& cr, const Eigen::Vector2d& centre_px, double a_px,
+                    double b_px) {
+  const Eigen::Vector2d at = 0.5 * (centre_px - Eigen::Vector2d(0.5, 0.5));
+  draw_disc(cb, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, 118.0);
+  draw_disc(cr, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, 110.0);
+}
+
+cv::Mat merged_chroma(const cv::Mat& cb, const cv::Mat& cr) {
+  cv::Mat chroma;
+  cv::merge(std::vector<cv::Mat>{cb, cr}, chroma);
+  chroma.convertTo(chroma, CV_8U);
+  return chroma;
+}
+
+// A tilted disc and beside it a shadow as dark as itself look like a disc that tilts less.
+TEST(OutlineFitter, AShadowAsDarkAsTheDiscIsToldFromItByItsColour) {
+  FlatDisc disc;
+  disc.body.thickness_m = 1e-4;
+  constexpr double kTheta = 0.7, kRadius_px = 30.0, kFloor = 150.0, kDark = 60.0;
+  const double minor_px = kRadius_px * std::cos(kTheta);
+  const Eigen::Vector2d centre(80.2, 70.4), aside(0.0, -4.0);
+  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor)), cb(70, 80, CV_64F, cv::Scalar(128.0)),
+      cr = cb.clone();
+  constexpr int kSlices = 8;
+  for (int k = 0; k <= kSlices; ++k) {
+    const Eigen::Vector2d at = centre + k / static_cast<double>(kSlices) * aside;
+    draw_disc(picture, at.x(), at.y(), kRadius_px, minor_px, 0.0, kDark);
+  }
+  draw_on_chroma(cb, cr, centre, kRadius_px, minor_px);
+  constexpr double kCodedPx = 1.0;  // what coding leaves of colours
+  cv::GaussianBlur(cb, cb, {}, kCodedPx);
+  cv::GaussianBlur(cr, cr, {}, kCodedPx);
+  std::mt19937 random(12);
+  const cv::Mat luma = developed(picture, 2.0, random);
+  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
+  data::Pose<> predicted;
+  predicted.theta_rad = std::acos((minor_px + 2.0) / kRadius_px);
+  predicted.centre_m = disc.camera.table_from_image(
+      centre + 0.5 * aside, data::height_on_floor_m(predicted.theta_rad, disc.body.radius_m,
+                                                    disc.body.half_thickness_m()));
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const auto seen = fitter.measure({.luma = luma,
+                                    .background = plate,
+                                    .detection = {},
+                                    .predicted = predicted,
+                                    .chroma = merged_chroma(cb, cr)});
+  ASSERT_TRUE(seen);
+  constexpr double kTolerance_px = 0.4;  // of the 2 that half the shadow is wide
+  EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
+}
+
+// A tilted disc whose wall lies in the shade and is as bright as the floor: the outline of its
+// bright face alone is that of a disc tilted the other way.
+TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {
+  FlatDisc disc;
+  disc.body.thickness_m = 0.008;
+  constexpr double kTheta = 0.35, kRadius_px = 30.0, kFloor = 150.0, kFace = 210.0;
+  const Eigen::Vector2d centre(80.2, 70.4), face(0.0, 1e3 * 0.004 * std::sin(kTheta));
+  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor)), cb(70, 80, CV_64F, cv::Scalar(128.0)),
+      cr = cb.clone();
+  constexpr int kSlices = 8;
+  for (int k = -kSlices; k <= kSlices; ++k) {
+    const Eigen::Vector2d at = centre + k / static_cast<double>(kSlices) * face;
+    const double minor_px = kRadius_px * std::cos(kTheta);
+    draw_disc(picture, at.x(), at.y(), kRadius_px, minor_px, 0.0, k < kSlices ? kFloor : kFace);
+    draw_on_chroma(cb, cr, at, kRadius_px, minor_px);
+  }
+  const cv::Mat chroma = merged_chroma(cb, cr);
+  std::mt19937 random(13);
+  const cv::Mat luma = developed(picture, 2.0, random);
+  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const auto evidence = [&](double phi_rad) {
+    data::Pose<> predicted;
+    predicted.theta_rad = kTheta, predicted.phi_rad = phi_rad;
+    predicted.centre_m = disc.camera.table_from_image(
+        centre, data::height_on_floor_m(kTheta, disc.body.radius_m, disc.body.half_thickness_m()));
+    const auto seen = fitter.measure({.luma = luma,
+                                      .background = plate,
+                                      .detection = {},
+                                      .predicted = predicted,
+                                      .attitude_known = true,
+                                      .chroma = chroma});
+    return seen ? seen->evidence : 0.0;
+  };
+  EXPECT_GT(evidence(0.0), 1.1 * evidence(std::numbers::pi));
+}
+
 // A disc with a dot on its upper face, predicted the wrong way up: its outline is the same.
 TEST(OutlineFitter, AMarkTellsWhichFaceIsSeen) {
   constexpr double kTheta = 0.6, kPsi = 0.9, kRadius_px = 30.0, kDot_px = 16.0;

@@ -251,13 +251,13 @@ struct Round {
   std::vector<OutlineSample> outline;
   std::vector<Crossings> crossings;                  // exact: of the outline
   std::vector<Sweep> sweeps;                         // during the exposure; empty: hardly any
-  std::vector<bool> floor_within;                    // of the outline; empty without colour
+  std::vector<bool> elsewhere;                       // of the outline: the rim, by its colours
   std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
   std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
 
   [[nodiscard]] const Sweep* sweep(size_t i) const { return sweeps.empty() ? nullptr : &sweeps[i]; }
-  // A shadow's edge may be here, the rim's is not.
-  [[nodiscard]] bool shows_rim(size_t i) const { return floor_within.empty() || !floor_within[i]; }
+  // An edge of a shadow or a print may be here, the rim is not.
+  [[nodiscard]] bool may_show_rim(size_t i) const { return elsewhere.empty() || !elsewhere[i]; }
 };
 
 // Edges of the silhouette, each by itself.
@@ -266,7 +266,7 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
   const std::vector<OutlineSample>& all = round.outline;
   StretchProfile look;
   for (size_t i = 0; i < all.size(); ++i)
-    if (all[i].silhouette && (colour || round.shows_rim(i)) &&
+    if (all[i].silhouette && (colour || round.may_show_rim(i)) &&
         look_at(scenery, all[i], round.sweep(i), nullptr, search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
       keep(all[i], look.edge, equation_of(all[i], look, colour), out);
@@ -284,7 +284,7 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
   places.clear();
   looks.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i)
-    if ((colour ? all[i].silhouette : round.shows_rim(i)) &&
+    if ((colour ? all[i].silhouette : round.may_show_rim(i)) &&
         look_at(scenery, all[i], round.sweep(i), &round.crossings[i], search, colour,
                 looks[places.size()]))
       places.push_back(i);
@@ -335,15 +335,15 @@ void cross_outline(double step_px, Round& round) {
   round.sweeps = std::move(sweeps);
 }
 
-// The share of the body's colour at a distance inwards of the outline, mean over a few pixels along
-// it; 1 outside of the picture.
-double colour_within(const ColourWindow& colour, const OutlineSample& sample, double inwards_px) {
+// The share of the body's colour at a distance from the outline, mean over a few pixels along it;
+// as it should be where the picture ends.
+double colour_at(const ColourWindow& colour, const OutlineSample& sample, double outwards_px) {
   constexpr std::array<double, 3> kAlongPx{-2.0, 0.0, 2.0};
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   double sum = 0.0;
   for (const double off : kAlongPx) {
-    const Eigen::Vector2d p = sample.image_px - inwards_px * sample.normal_px + off * along;
-    if (!colour.levels.holds(p)) return 1.0;
+    const Eigen::Vector2d p = sample.image_px + outwards_px * sample.normal_px + off * along;
+    if (!colour.levels.holds(p)) return outwards_px < 0.0 ? 1.0 : 0.0;
     const Eigen::Vector2f at = p.cast<float>();
     sum += static_cast<double>(colour.levels.at(at.x(), at.y()));
   }
@@ -356,7 +356,7 @@ bool wall_like_face(const ColourWindow& colour, const std::vector<OutlineSample>
   std::vector<double> shares;
   for (const OutlineSample& sample : outline)
     if (sample.silhouette && sample.edge == Edge::lower_rim && sample.inside_px > kWidePx)
-      shares.push_back(colour_within(colour, sample, 0.5 * sample.inside_px));
+      shares.push_back(colour_at(colour, sample, -0.5 * sample.inside_px));
   return shares.empty() || data::median(std::move(shares)) > kLeastShare;
 }
 
@@ -368,25 +368,28 @@ bool darker_within(const LightWindow& picture, const OutlineSample& sample, doub
   return picture.at(a.x(), a.y()) < picture.at(b.x(), b.y());
 }
 
-// Where a silhouette would lie on the edge of the body's shadow: what is within is darker than what
-// is beside it and has the floor's colour.
-void find_floor_within(const Scenery& scenery, const Search& search, Round& round) {
-  constexpr double kClearOfBlur = 1.8, kFloor = 0.4;
-  round.floor_within.clear();
+// Where a silhouette would lie on the edge of the body's shadow (within, the floor's colour, darker
+// than what is beside it), or on an edge of the body's own (beyond, the body's colour).
+void find_rim_elsewhere(const Scenery& scenery, const Search& search, Round& round) {
+  constexpr double kClearOfBlur = 1.8, kFloor = 0.4, kBody = 0.6;
+  round.elsewhere.clear();
   const ColourWindow& colour = scenery.colour;
   if (colour.empty() || !colour.plain) return;
   const bool wall_alike = wall_like_face(colour, round.outline);
   const double clear_px =
       kClearOfBlur * std::sqrt(search.blur_px * search.blur_px + kColourBlur2Px2);
-  round.floor_within.resize(round.outline.size());
+  round.elsewhere.resize(round.outline.size());
   for (size_t i = 0; i < round.outline.size(); ++i) {
     const OutlineSample& sample = round.outline[i];
-    const bool wall = sample.edge == Edge::lower_rim;
-    if (!sample.silhouette || (wall ? !wall_alike : sample.inside_px < clear_px)) continue;
+    if (!sample.silhouette) continue;
     const Sweep* sweep = round.sweep(i);
     const double off_px = clear_px + (sweep != nullptr ? sweep->half_range_px() : 0.0);
-    round.floor_within[i] = colour_within(colour, sample, off_px) < kFloor &&
-                            darker_within(scenery.picture, sample, off_px);
+    const bool told_within =
+        sample.edge == Edge::lower_rim ? wall_alike : sample.inside_px >= clear_px;
+    const bool on_shadow = told_within && colour_at(colour, sample, -off_px) < kFloor &&
+                           darker_within(scenery.picture, sample, off_px);
+    const bool on_body = sample.outside_px > off_px && colour_at(colour, sample, off_px) > kBody;
+    round.elsewhere[i] = on_shadow || on_body;
   }
 }
 
@@ -398,7 +401,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
                                   search.exact ? kSmoothPx : step_px);
   find_sweeps(scenery, pose, round);
   if (search.exact) cross_outline(step_px, round);
-  find_floor_within(scenery, search, round);
+  find_rim_elsewhere(scenery, search, round);
   out.outline_px = 0.0;
   for (const OutlineSample& sample : round.outline)
     if (sample.silhouette) out.outline_px += sample.arc_px;
