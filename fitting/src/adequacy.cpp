@@ -134,8 +134,12 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
 // glitches, but motion that the model does not have.
 struct GivenUp {
   int samples = 0, of = 0;
-  double first_s = 0.0, last_s = 0.0;
-  [[nodiscard]] double share() const { return of > 0 ? static_cast<double>(samples) / of : 0.0; }
+  double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
+  // One or two may be glitches that happen to lie near the path.
+  [[nodiscard]] bool more_than(double share) const {
+    constexpr int kFewest = 3;
+    return samples >= kFewest && samples > share * of;
+  }
   [[nodiscard]] std::string words() const {
     return fmt::format(
         "{} of its {} positions, between {:.4g} and {:.4g} s, lie too far from the model to count, "
@@ -156,9 +160,9 @@ GivenUp given_up(const Problem& problem) {
       if (robust_weight(problem, arc, reading) > kHardlyCounts ||
           !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
         continue;
-      const double t_s = data.t_s[reading.sample];
-      if (all.samples++ == 0) all.first_s = t_s;
-      all.last_s = t_s;
+      ++all.samples;
+      all.first_s = std::min(all.first_s, data.t_s[reading.sample]);
+      all.last_s = std::max(all.last_s, data.t_s[reading.sample]);
     }
   }
   return all;
@@ -258,16 +262,14 @@ void refuse(const char* outcome, const char* verdict, std::string words, data::F
 
 void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
             const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
-  // One or two in a row may be a glitch that happens to lie near the path.
   constexpr double kMany = 0.01;
-  constexpr int kFewest = 3;
   fit.converged = true;
   fit.outcome = "converged";
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
   const bool misses = worst.times > kDoubtful;
-  const bool doubtful = misses || (lost.samples >= kFewest && lost.share() > kMany);
+  const bool doubtful = misses || lost.more_than(kMany);
   const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
                                    [](const ArcData& arc) { return arc.sigma_unknown; });
   std::string words = "the model explains the track";
@@ -325,7 +327,7 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                   fit);
   constexpr double kTooMany = 0.1;
   const GivenUp lost = given_up(problem);
-  if (lost.share() > kTooMany)
+  if (lost.more_than(kTooMany))
     return refuse("unexplained", "unexplained",
                   "the model does not explain the track: " + lost.words(), fit);
   if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)

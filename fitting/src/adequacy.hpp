@@ -22,7 +22,7 @@ struct Squares {
 ///   unexplained      not a minimum; or residuals beyond 4 times the track's sigmas, the samples'
 ///                    scatter about a smooth curve and 1 % of the motion (angles: 0.2 rad), or
 ///                    beyond 8 times; or a 30th of the motion's variance left; or a tenth of the
-///                    positions given up that lie on one path with the others
+///                    positions, three at least, given up that lie on one path with the others
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
 ///   doubtful         followed, but residuals are beyond 2 times those measures, or a

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -188,7 +189,7 @@ bool may_do_without(const Rung& rung, const Rung& smaller) {
   lost.erase(kSlipScale);  // the smaller one's is fitted anew
   return std::all_of(lost.begin(), lost.end(), [&](const std::string& name) {
     const data::FitParameter* loss = rung.fit.find(name);
-    return loss != nullptr && loss->value < kSurely * loss->sigma;
+    return loss != nullptr && std::abs(loss->value) < kSurely * loss->sigma;
   });
 }
 

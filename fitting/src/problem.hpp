@@ -98,7 +98,6 @@ struct Problem {
 
 /// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it
 /// names none) are free, those of role `initial` once per arc.
-/// `held` names parameters that stay fixed whatever the scene says.
 /// @throws InputError for a free or fixed name the model does not have.
 [[nodiscard]] Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                                    const data::Scene& scene);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "problem.hpp"
 #include "smoothing.hpp"
@@ -7,7 +8,7 @@
 namespace trochoid::fitting {
 namespace {
 
-// Sizes of the raw (unweighted) residuals: per reading, the whitened length over sqrt(its rows).
+// Whitened residuals without weights and noise scales.
 struct RawResiduals {
   std::vector<Eigen::VectorXd> per_arc;
   bool ok = true;
@@ -48,10 +49,13 @@ double channel_scale(const Problem& problem, const RawResiduals& raw, Channel ch
         squares += d * d;
         ++inliers;
       }
-    // Share of the variance that lies within 3.5 sigma.
-    const double kept =
-        planar ? 2.0 * (1.0 - std::exp(-6.125) * (1.0 + 6.125)) / (1.0 - std::exp(-6.125))
-               : 0.99390;
+    // Variance of what lies within kInlier sigmas.
+    constexpr double kHalfSquare = 0.5 * kInlier * kInlier;
+    const double beyond = std::exp(-kHalfSquare);
+    const double kept = planar ? 2.0 * (1.0 - beyond * (1.0 + kHalfSquare)) / (1.0 - beyond)
+                               : 1.0 - 2.0 * kInlier * beyond /
+                                           (std::sqrt(2.0 * std::numbers::pi) *
+                                            std::erf(kInlier / std::numbers::sqrt2));
     scale = std::sqrt(squares / std::max(1.0, kept * inliers));
   }
   const double rows = static_cast<double>(lengths.size()) * (planar ? 2.0 : 1.0);

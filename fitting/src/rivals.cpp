@@ -65,9 +65,13 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
       name = before[i].name;
     }
   if (name.empty()) return;
+  // Of that parameter; a likelier rival may leave it where it is.
+  const auto share = [&](const Rival& rival) {
+    return rival.weight * std::pow(shift_of(*fit.find(name), rival.rung->fit), 2);
+  };
   const auto strongest =
       std::max_element(rivals.begin(), rivals.end(),
-                       [](const Rival& a, const Rival& b) { return a.weight < b.weight; });
+                       [&](const Rival& a, const Rival& b) { return share(a) < share(b); });
   fit.warnings.push_back(
       fmt::format("error bars allow for other models that explain the track as well, above all {}: "
                   "that of {} is {:.2g} times as wide",
@@ -86,8 +90,12 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
   const data::FitParameter* moved = nullptr;
   double most = kFar;
   for (const data::FitParameter& parameter : fit.parameters) {
+    // Where Coulomb's law does beside one loss more, the speed over which friction sets in is gone.
+    if (parameter.status != data::ParameterStatus::free ||
+        likeliest->fit.find(parameter.name) == nullptr)
+      continue;
     const double bars = std::abs(shift_of(parameter, likeliest->fit)) / parameter.sigma;
-    if (parameter.status != data::ParameterStatus::free || !(bars > most)) continue;
+    if (!(bars > most)) continue;
     most = bars;
     moved = &parameter;
   }

@@ -153,5 +153,28 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
       << fit.warnings[0];
 }
 
+// Which may be another one than the likeliest.
+TEST(Rivals, ThatMoveAParameterMostAreNamedBesideIt) {
+  std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                          rung_of({2}, {loss("rolling_friction_m", 1.0, 0.1)}, 98.0, 100.0),
+                          rung_of({3}, {loss("rolling_friction_m", 0.2, 0.1)}, 101.0, 103.0)};
+  rungs[1].name = "which agrees";
+  rungs[2].name = "which does not";
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  ASSERT_EQ(fit.warnings.size(), 1u);
+  EXPECT_NE(fit.warnings[0].find("above all which does not"), std::string::npos) << fit.warnings[0];
+}
+
+// Where Coulomb's law does beside one loss more, nothing is said of what it does not have.
+TEST(Rivals, WithATermMoreMayDoWithoutAParameter) {
+  const std::vector<Rung> rungs{
+      rung_of({1}, {loss("slip_regularisation_m_s", 1e-3, 1e-4)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("gap_viscosity_Pa_s", 1.0, 1.0)}, 98.0, 104.0)};
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_TRUE(fit.warnings.empty());
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <random>
+#include <set>
 
 #include "adequacy.hpp"
 #include "prepare.hpp"
@@ -124,13 +125,17 @@ TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
 }
 
-// What is said of a search that ended with these values.
+// What is said of a search that ended with these values and gave up these samples.
 std::string verdict_at(const data::Track& track, const std::map<std::string, double>& found,
-                       bool cut_short) {
+                       bool cut_short, const std::set<int>& given_up = {}) {
   const auto predictor = model::make_predictor(top());
   FitOptions options;
   options.start = found;
-  const Problem problem = prepare(std::span(&track, 1), *predictor, top(), options);
+  Problem problem = prepare(std::span(&track, 1), *predictor, top(), options);
+  problem.row_weights[0] = Eigen::VectorXd::Ones(problem.rows());
+  for (const Reading& reading : problem.arcs[0].readings)
+    if (given_up.contains(reading.sample))
+      problem.row_weights[0].segment<2>(reading.row).setConstant(0.01);
   Solution solution;
   solution.u = problem.start();
   solution.usable = solution.converged = true;
@@ -170,6 +175,16 @@ TEST(Verdict, IsUnexplainedWhereTheModelGivesUpAPartOfThePath) {
 TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
   const data::Fit fit = fit_of(track_of(pushed(2.75), white(kSigma_m, 10)), top());
   EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+}
+
+// Of a short track one or two are soon a tenth.
+TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
+  data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  std::vector<data::TrackSample> few;
+  for (std::size_t i = 0; i < track.samples.size(); i += 10) few.push_back(track.samples[i]);
+  track.samples = few;
+  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 11}), "good");
+  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 5, 11}), "unexplained");
 }
 
 // Glitches anywhere in the picture are the tracker's, however many.
