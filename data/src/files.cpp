@@ -65,7 +65,18 @@ void sweep(const fs::path& target, const fs::path& folder) {
   }
 }
 
-void check_target(const fs::path& target) {
+// What a rename has to replace: the file a link points to, not the link.
+fs::path resolved(const fs::path& target) {
+  std::error_code code;
+  if (!fs::is_symlink(fs::symlink_status(target, code))) return target;
+  const fs::path real = fs::weakly_canonical(target, code);
+  return code ? target : real;
+}
+
+}  // namespace
+
+void check_writable(const fs::path& given) {
+  const fs::path target = is_special(given) ? given : resolved(given);
   std::error_code code;
   if (target.filename().empty() || fs::is_directory(target, code))
     throw InputError(fmt::format("{}: is a folder, name a file to write", target.string()));
@@ -81,16 +92,6 @@ void check_target(const fs::path& target) {
     throw InputError(fmt::format("{}: cannot be written, the folder {} does not allow it",
                                  target.string(), folder.string()));
 }
-
-// What a rename has to replace: the file a link points to, not the link.
-fs::path resolved(const fs::path& target) {
-  std::error_code code;
-  if (!fs::is_symlink(fs::symlink_status(target, code))) return target;
-  const fs::path real = fs::weakly_canonical(target, code);
-  return code ? target : real;
-}
-
-}  // namespace
 
 fs::path pending_neighbour(const fs::path& target) {
   static std::atomic<int> counter{0};
@@ -144,7 +145,7 @@ void remove_pending_and_stop() {
 
 PendingFile::PendingFile(fs::path target) : target_(std::move(target)) {
   if (!is_special(target_)) target_ = resolved(target_);
-  check_target(target_);
+  check_writable(target_);
   temporary_ = pending_neighbour(target_);
 }
 

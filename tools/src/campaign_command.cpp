@@ -168,7 +168,7 @@ void add_campaign_command(CLI::App& app) {
   command->add_option("manifest", options->manifest, "Recordings and scenes (docs/campaigns.md)")
       ->required();
   command->add_option("-j,--jobs", options->jobs, "Recordings at a time; 0: one per core")
-      ->check(non_negative_number());
+      ->check(whole_number());
   CLI::Option* part = command->add_option(
       "--part", options->part,
       "Only the K-th of N equal shares, K/N, and no summary: for a cluster's array");

@@ -200,7 +200,8 @@ void add_fit_command(CLI::App& app) {
                   "scene's")
       ->check(fitted_model());
   fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
-  fit->add_option("--object", command->object, "Fit this object of the track only");
+  fit->add_option("--object", command->object, "Fit this object of the track only")
+      ->check(whole_number());
   fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
   fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
   fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
@@ -210,10 +211,10 @@ void add_fit_command(CLI::App& app) {
                 "Profile likelihood of the body's and the table's parameters");
   fit->add_option("--bootstrap", command->options.bootstrap,
                   "Fits to residuals resampled in blocks, for the shape of the error bars; 0: none")
-      ->check(CLI::Range(0, 100000));
+      ->check(whole_number_within(0, 100000));
   fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
-      ->check(non_negative_number());
-  fit->add_option("--seed", command->options.seed, "Seed of everything random");
+      ->check(whole_number());
+  fit->add_option("--seed", command->options.seed, "Seed of everything random")->check(seed());
   fit->add_flag("--json", command->json, "Print the fit as its file holds it (JSON)");
   fit->footer("Example: trochoid fit ring.track.csv --scene ring.toml -o ring.fit.json");
   fit->callback([command] { run(*command); });

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -127,7 +128,7 @@ std::string completion(const CLI::App& app) {
 
 void run(const CLI::App& app, const Options& options) {
   const fs::path man = options.folder / "man1";
-  fs::create_directories(man);
+  make_folder(man);
   data::write_text(main_page(app), man / "trochoid.1");
   for (const CLI::App* command : shown_commands(app))
     data::write_text(page_of(app, *command),

@@ -1,6 +1,7 @@
 #include "outputs.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -43,13 +44,7 @@ void check_apart(const fs::path& output, const fs::path& input) {
 
 void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (output.empty()) return;
-  std::error_code ignored;  // what cannot be looked at is neither an input nor a folder
-  const fs::path folder = output.parent_path();
-  if (!folder.empty() && !fs::is_directory(folder, ignored))
-    throw InputError(fmt::format("{}: cannot be written, the folder {} does not exist",
-                                 output.string(), folder.string()));
-  if (fs::is_directory(output, ignored))
-    throw InputError(fmt::format("{}: is a folder, name a file to write", output.string()));
+  data::check_writable(output);
   for (const fs::path& input : inputs) {
     check_apart(output, input);
     check_apart(output, camera_of(input));
@@ -57,11 +52,30 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
 }
 
 void check_folder(const fs::path& folder) {
-  std::error_code ignored;
-  if (fs::is_directory(folder, ignored)) return;
+  std::error_code ignored;  // what cannot be looked at is not there
   const std::string ending = folder.extension().string();
-  if (fs::exists(folder, ignored) || ending == ".svg" || ending == ".png" || ending == ".pdf")
-    throw InputError(fmt::format("{}: names a file; give a folder for the plots", folder.string()));
+  const bool is_folder = fs::is_directory(folder, ignored);
+  const bool named_as_file =
+      ending == ".svg" || ending == ".png" || ending == ".pdf" || ending == ".csv";
+  if (!is_folder && (fs::exists(folder, ignored) || named_as_file))
+    throw InputError(fmt::format("{}: names a file; give a folder", folder.string()));
+  fs::path nearest = fs::absolute(folder, ignored);
+  while (!fs::exists(nearest, ignored) && nearest.has_relative_path())
+    nearest = nearest.parent_path();
+  const char* wrong = !fs::is_directory(nearest, ignored)           ? "is a file"
+                      : ::access(nearest.c_str(), W_OK | X_OK) != 0 ? "does not allow it"
+                                                                    : nullptr;
+  if (wrong != nullptr)
+    throw InputError(fmt::format("{}: cannot be {}, {} {}", folder.string(),
+                                 is_folder ? "written into" : "made", nearest.string(), wrong));
+}
+
+void make_folder(const fs::path& folder) {
+  check_folder(folder);
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code)
+    throw InputError(fmt::format("{}: cannot be made: {}", folder.string(), code.message()));
 }
 
 void check_length(const std::string& scene, double until_s, double rate_hz, double most,

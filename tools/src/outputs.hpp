@@ -13,9 +13,12 @@ namespace trochoid::tools {
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);
 
-/// The same for a folder of pictures that is to be made: no file may be in its place, nor its name
-/// be a picture's. @throws InputError naming it.
+/// The same for a folder of results that is there or is to be made: no file may be in its place,
+/// nor its name be a picture's or a table's. @throws InputError naming it.
 void check_folder(const std::filesystem::path& folder);
+
+/// Checks a folder and makes it, with those above it. @throws InputError naming it.
+void make_folder(const std::filesystem::path& folder);
 
 /// A run has at most `most` rows (whatever `rows` calls them): more are a slip of the pen.
 /// @throws InputError naming the scene, and the keys and options that ask for more.

@@ -109,7 +109,7 @@ void add_overlay_command(CLI::App& app) {
   command
       ->add_option("--fit-track", options->fit_track,
                    "Place of this track among those fitted together (0 = first)")
-      ->check(non_negative_number())
+      ->check(whole_number())
       ->needs("--fit");
   add_json_flag(*command, options->json);
   command->footer(

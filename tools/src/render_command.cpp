@@ -261,6 +261,14 @@ Targets targets_of(const fs::path& output, bool lossless) {
   return {output, beside(".truth.csv"), beside(".camera.json"), beside(".object.json")};
 }
 
+void check_targets(const Options& options, const Targets& targets) {
+  const bool folder = options.output.extension().empty();
+  if (folder) check_folder(options.output);
+  if (folder && !fs::exists(options.output)) return;
+  for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
+    check_output(file, {options.scene, options.camera});
+}
+
 RenderStyle style_of(const Options& options) {
   RenderStyle style = options.style;
   style.shadow = !options.no_shadow;
@@ -359,13 +367,14 @@ void tell(const Options& options, const Targets& targets, const data::Camera& ca
 
 void run(const Options& options) {
   const Targets targets = targets_of(options.output, options.lossless);
+  check_targets(options, targets);
   const data::Scene scene = scene_to_draw(options, targets);
   const Motion motion = simulated(options.scene, scene);
   const data::Camera camera = recording_camera(options, scene, motion);
   const double rate_hz = scene.run.rate_hz;
   const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
 
-  if (options.output.extension().empty()) fs::create_directories(options.output);
+  if (options.output.extension().empty()) make_folder(options.output);
   data::PendingFile video(targets.video);
   const Workshop workshop(targets.video);
   const fs::path encoded = workshop.file(targets.video.filename());
@@ -401,10 +410,10 @@ void add_look_options(CLI::App& command, Options& options) {
   command.add_option("--flicker", style.flicker, "Relative amplitude at 100 Hz [0]")
       ->check(number_within(0.0, 0.9));
   command.add_option("--samples", style.samples, "Rays across a pixel on an edge [8]")
-      ->check(CLI::Range(1, 64));
+      ->check(whole_number_within(1, 64));
   command.add_option("--times", style.times, "Pictures averaged over the exposure [5]")
-      ->check(CLI::Range(1, 64));
-  command.add_option("--seed", style.seed, "Of texture and noise [1]");
+      ->check(whole_number_within(1, 64));
+  command.add_option("--seed", style.seed, "Of texture and noise [1]")->check(seed());
 }
 
 }  // namespace
@@ -424,16 +433,16 @@ void add_render_command(CLI::App& app) {
   CLI::Option* camera = command->add_option("--camera", options->camera,
                                             "Camera file [the scene's, else from above]");
   command->add_option("--width", options->width_px, "Of the picture [px, 640]")
-      ->check(CLI::Range(32, 8192))
+      ->check(whole_number_within(32, 8192))
       ->excludes(camera);
   command->add_option("--height", options->height_px, "Of the picture [px, 480]")
-      ->check(CLI::Range(32, 8192))
+      ->check(whole_number_within(32, 8192))
       ->excludes(camera);
   command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
       ->check(frame_rate());
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
   command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
-      ->check(CLI::Range(0, 51));
+      ->check(whole_number_within(0, 51));
   command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)")
       ->excludes("--crf");
   add_look_options(*command, *options);

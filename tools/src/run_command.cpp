@@ -328,7 +328,7 @@ std::shared_ptr<Options> add_options(CLI::App& command) {
   command
       .add_option("--objects", options->objects,
                   "Number of moving bodies, all of the size the scene gives")
-      ->check(CLI::Range(1, 64));
+      ->check(whole_number_within(1, 64));
   add_at(command, options->at);
   command.add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
   command.add_option("--to", options->to, "Last moment: seconds or a frame");
@@ -345,7 +345,7 @@ std::shared_ptr<Options> add_options(CLI::App& command) {
       .add_option("--slow", options->slow,
                   "Overlay plays this many times slower (default: at most 60 frames/s)")
       ->check(number_within(0.01, 1000.0));
-  command.add_option("--seed", options->seed, "Seed of everything random");
+  command.add_option("--seed", options->seed, "Seed of everything random")->check(seed());
   add_json_flag(command, options->json);
   return options;
 }

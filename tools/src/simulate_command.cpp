@@ -198,6 +198,7 @@ void add_simulate_command(CLI::App& app) {
       "--fit", options->fit,
       "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
   command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0")
+      ->check(whole_number())
       ->needs("--fit");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
   command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());

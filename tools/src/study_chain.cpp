@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "fit_trials.hpp"
 #include "made_tracks.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "progress.hpp"
 #include "tracking_chain.hpp"
@@ -18,6 +19,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "validators.hpp"
 
 // study chain: what each setting on the way from pixels to parameters buys, and what it costs.
 namespace trochoid::tools {
@@ -180,7 +182,7 @@ void run(const Options& options) {
             fmt::format("{}: no such file; each folder needs a recording with its truth",
                         (folder / file).string()));
   fitting::silence_solver_log();
-  fs::create_directories(options.out);
+  make_folder(options.out);
   std::vector<Axes> panels{study_fitting(options)};
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.folders.empty())
@@ -202,9 +204,10 @@ void add_study_chain(CLI::App& study) {
 #endif
   command->add_option("--count", options->count, "Tracks per setting of the fit")
       ->capture_default_str()
-      ->check(CLI::Range(1, 10000));
+      ->check(whole_number_within(1, 10000));
   command->add_option("--seed", options->seed, "Seed of scenes, noise and starts")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(seed());
   command->add_option("--out", options->out, "Folder for tables and diagram")
       ->capture_default_str();
   command->footer("Example: trochoid study chain data/samples/*/");

@@ -7,6 +7,7 @@
 
 #include "commands.hpp"
 #include "fit_trials.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "progress.hpp"
 #include "trochoid/data/error.hpp"
@@ -104,7 +105,7 @@ void write_diagram(const std::vector<FitStrategy>& strategies, const std::vector
 
 void run(const Options& options) {
   fitting::silence_solver_log();
-  fs::create_directories(options.out);
+  make_folder(options.out);
   const std::vector<FitStrategy> strategies = fit_strategies();
   fmt::print("# model {}, {} scenes, noise {} of the length, seed {}, trochoid {}\n",
              options.tracks.model, options.count, options.tracks.noise, options.seed,
@@ -147,12 +148,12 @@ void add_study_fits(CLI::App& study) {
       ->capture_default_str();
   command->add_option("--count", options->count, "Scenes, one fit per strategy each")
       ->capture_default_str()
-      ->check(positive_number());
+      ->check(whole_number_within(1, 1000000));
   command
       ->add_option("--draws", options->draws,
                    "Further fits without a guess that test the error bars; 0: none")
       ->capture_default_str()
-      ->check(non_negative_number());
+      ->check(whole_number());
   command
       ->add_option("--noise", options->tracks.noise,
                    "Standard deviation of a position over the body's length (l or radius)")
@@ -166,9 +167,10 @@ void add_study_fits(CLI::App& study) {
       ->capture_default_str()
       ->check(positive_number());
   command->add_option("--seed", options->seed, "Seed of scenes, noise and starts")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(seed());
   command->add_option("--threads", options->threads, "Fits at a time; 0: all cores")
-      ->check(non_negative_number());
+      ->check(whole_number());
   command->add_option("--out", options->out, "Folder for the table and the diagram")
       ->capture_default_str();
   command->footer("Example: trochoid study fits --count 100 --noise 0.05 --draws 4000");

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "scene_library.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/counted.hpp"
@@ -229,6 +230,7 @@ void print_rows(const std::vector<Row>& rows) {
 }
 
 void run(const Options& options) {
+  make_folder(options.out);
   std::vector<Row> rows;
   add_terms(rows);
   add_states(rows);
@@ -248,7 +250,6 @@ void run(const Options& options) {
   std::string csv = "part,has,operations,time_us\n";
   for (const Row& row : rows)
     csv += fmt::format("\"{}\",\"{}\",{},{}\n", row.part, row.has, row.operations, row.time_us);
-  fs::create_directories(options.out);
   data::write_text(csv, options.out / "lean.csv");
 }
 

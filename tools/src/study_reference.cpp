@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -181,7 +182,7 @@ std::vector<fs::path> cases_in(const fs::path& folder) {
 
 void run(const Options& options) {
   const std::vector<fs::path> cases = cases_in(options.folder);
-  if (!options.out.empty()) fs::create_directories(options.out);
+  if (!options.out.empty()) make_folder(options.out);
   print_heading();
   std::vector<std::string> failures;
   for (const fs::path& json : cases) {

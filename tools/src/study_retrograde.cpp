@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "scene_library.hpp"
 #include "trochoid/data/error.hpp"
@@ -154,7 +155,7 @@ Axes path_panel(const Case& item, const Turn& turn) {
 }
 
 void run(const Options& options) {
-  if (!options.out.empty()) fs::create_directories(options.out);
+  if (!options.out.empty()) make_folder(options.out);
   fmt::print("{:<34} {:>8} {:>8} {:>8} {:>7}  {}\n", "body and loss", "first", "last", "demand",
              "end_s",
              "mean path (its turning per precession, medians of the first and last eighth)");

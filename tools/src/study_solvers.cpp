@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
@@ -17,6 +18,7 @@
 #include "study_runs.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "validators.hpp"
 
 // study solvers: work-precision diagrams of every integrator on representative scenes.
 namespace trochoid::tools {
@@ -139,7 +141,7 @@ std::vector<Row> measure(const Options& options) {
 }
 
 void run(const Options& options) {
-  fs::create_directories(options.out);
+  make_folder(options.out);
   const std::vector<Row> rows = measure(options);
   print_machine();
   print_rows(rows);
@@ -165,7 +167,7 @@ void add_study_solvers(CLI::App& study) {
       ->capture_default_str();
   command->add_option("--repeats", options->repeats, "Runs per point; the fastest counts")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
+      ->check(whole_number_within(1, 1000));
   command->footer("Example: trochoid study solvers --out solvers/");
   command->callback([options] { run(*options); });
 }

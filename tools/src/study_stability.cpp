@@ -10,6 +10,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "scene_library.hpp"
 #include "study_runs.hpp"
@@ -209,6 +210,7 @@ std::string drift_words(const StudyRun& run) {
 }
 
 void run(const Options& options) {
+  make_folder(options.out);
   const std::vector<Extreme> list = extremes();
   std::string csv =
       "scene,integrator,tolerance,growth,known_to_rad,verdict,axis_error,path_error_m,stated_error_"
@@ -248,7 +250,6 @@ void run(const Options& options) {
     }
     progress.update(++done, static_cast<std::int64_t>(list.size()));
   }
-  fs::create_directories(options.out);
   data::write_text(csv, options.out / "stability.csv");
   fmt::print("{}", table);
   fmt::print(

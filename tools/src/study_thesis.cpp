@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "scene_library.hpp"
 #include "trochoid/data/table.hpp"
@@ -224,7 +225,6 @@ void write(const std::vector<Axes>& panels, const fs::path& path) {
 }
 
 void write_figures(const fs::path& folder) {
-  fs::create_directories(folder);
   const Quantity spin{"dpsi_rad_s", "dpsi/dt [rad/s]"}, tilt{"theta_rad", "theta [rad]"};
   write({body_rates("thesis-free", "figure 3.1: three different moments"),
          body_rates("thesis-free-case3", "figure 3.5: moments close to each other")},
@@ -267,6 +267,7 @@ void write_figures(const fs::path& folder) {
 }
 
 void run(const Options& options) {
+  if (!options.out.empty()) make_folder(options.out);
   fmt::print("{:<18} {:>8} {:>7} {:>12} {:>11} {:>11}   {:<4} {:>10}\n", "scene", "a_1_s2", "b_1_s",
              "tilt_max_deg", "nutation_s", "dphi_rad", "bump", "run apart");
   for (const BundledScene& bundled : bundled_scenes()) {

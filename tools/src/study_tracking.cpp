@@ -8,6 +8,7 @@
 
 #include "child_process.hpp"
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "progress.hpp"
 #include "tracking_baselines.hpp"
 #include "tracking_scores.hpp"
@@ -218,7 +219,7 @@ bool study(const fs::path& folder, const Options& options) {
 }
 
 void run(const Options& options) {
-  fs::create_directories(options.out);
+  make_folder(options.out);
   int refused = 0;
   for (const fs::path& folder : options.folders) {
     // What a shell's * brings along: a README beside the folders.

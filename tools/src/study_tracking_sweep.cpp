@@ -12,12 +12,14 @@
 #include <random>
 
 #include "commands.hpp"
+#include "outputs.hpp"
 #include "plot.hpp"
 #include "progress.hpp"
 #include "render_picture.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
+#include "validators.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -335,6 +337,8 @@ void draw(const data::Table& table, const std::vector<Point>& all, const fs::pat
 }
 
 void run(const Options& options) {
+  check_output(options.output, {});
+  check_output(options.plot, {options.output});
   const std::vector<Point> all = points();
   data::Table table;
   table.header = {{"trochoid study tracking-sweep", ""},
@@ -373,8 +377,8 @@ void add_study_tracking_sweep(CLI::App& study) {
       "Error of the measured centre against noise, blur, contrast, size and tilt, beside the "
       "Cramer-Rao bound");
   command->add_option("--draws", options->draws, "Pictures per row [16]")
-      ->check(CLI::Range(3, 10000));
-  command->add_option("--seed", options->seed, "Of pictures and starts [1]");
+      ->check(whole_number_within(3, 10000));
+  command->add_option("--seed", options->seed, "Of pictures and starts [1]")->check(seed());
   command->add_option("-o,--output", options->output, "Table to write [tracking_sweep.csv]");
   command->add_option("--plot", options->plot, "Plot to write (.svg, .png)");
   command->footer("Example: trochoid study tracking-sweep");

@@ -145,7 +145,7 @@ void add_track_command(CLI::App& app) {
   track
       ->add_option("--objects", options->objects,
                    "Number of moving bodies, all of the size the scene gives")
-      ->check(CLI::Range(1, 64));
+      ->check(whole_number_within(1, 64));
   track->add_option("--from", options->from, "First frame to use: seconds (1.5) or frame (f120)");
   track->add_option("--to", options->to, "Last frame to use: seconds or frame");
   add_at(*track, options->at);

@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "outputs.hpp"
 #include "plot.hpp"
 
 namespace trochoid::tools {
@@ -71,7 +72,7 @@ void projection(const data::Table& table, const char* x, const char* y, const ch
 std::vector<std::filesystem::path> write_trajectory_plots(const data::Table& trajectory,
                                                           const std::string& title,
                                                           const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder);
+  make_folder(folder);
   std::vector<std::filesystem::path> written;
   for (const PlotRecipe& recipe : kOverTime) over_time(trajectory, recipe, title, folder, written);
   projection(trajectory, "x_m", "y_m", "xy", title + ", from above", folder / "path_xy.svg",

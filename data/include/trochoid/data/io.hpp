@@ -55,6 +55,11 @@ void discard_pending(const std::filesystem::path& path) noexcept;
 /// program that is about to end by a signal. Any other use of pending files waits for ever after.
 void remove_pending_and_stop();
 
+/// Whether a file could be written here: in a folder that exists and lets it, over nothing that is
+/// write-protected. Changes nothing. @throws InputError naming the target and what stands in the
+/// way.
+void check_writable(const std::filesystem::path& target);
+
 /// A temporary file beside `target` that becomes `target` on commit() and vanishes otherwise; for
 /// writers that need a path (video encoders).
 class PendingFile {
