@@ -87,6 +87,15 @@ Camera Camera::overhead(int width_px, int height_px, double scale_px_per_m, doub
   return camera;
 }
 
+void Camera::check_size(int recorded_width_px, int recorded_height_px,
+                        const std::string& recording) const {
+  if (width_px == 0 || (width_px == recorded_width_px && height_px == recorded_height_px)) return;
+  throw InputError(
+      fmt::format("{} is for {} x {} pictures, {} has {} x {}; calibrate the camera at this size",
+                  file.empty() ? "the camera" : file + ": the camera", width_px, height_px,
+                  recording, recorded_width_px, recorded_height_px));
+}
+
 double Camera::depth_m(const Eigen::Vector3d& point_m) const {
   return camera_from_table.row(2).dot(point_m) + camera_from_table_m.z();
 }

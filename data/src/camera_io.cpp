@@ -64,6 +64,7 @@ Camera read_camera(const std::filesystem::path& path) {
   const nlohmann::json object = read_json_object(path);
   const JsonReader json(object, path.string());
   Camera camera;
+  camera.file = path.string();
   camera.projection = projection_of(json);
   camera.width_px = image_size(json, "width");
   camera.height_px = image_size(json, "height");

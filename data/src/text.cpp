@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
 
 namespace trochoid::data {
 

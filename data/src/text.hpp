@@ -1,6 +1,5 @@
 #pragma once
 #include <cstddef>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -8,12 +7,6 @@
 
 /// Small helpers of the readers and writers; private to this module.
 namespace trochoid::data {
-
-/// A file's text, refused beyond `limit_bytes` (an endless device, a video given as a table). Lines
-/// that end in \r alone throughout end in \n.
-/// @throws InputError naming the file if it is missing, a folder, unreadable or too large.
-[[nodiscard]] std::string read_text(const std::filesystem::path& path,
-                                    std::size_t limit_bytes = std::size_t{64} << 20);
 
 /// `text` in single quotes for a message: control characters and bytes outside ASCII become '?',
 /// long text is clipped, so that an error stays one readable line whatever the file holds.

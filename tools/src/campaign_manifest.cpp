@@ -131,7 +131,7 @@ Campaign read_campaign(const fs::path& manifest) {
         fmt::format("{}: no such file; write a manifest (docs/campaigns.md)", manifest.string()));
   toml::table file;
   try {
-    file = toml::parse_file(manifest.string());
+    file = toml::parse(data::read_text(manifest), manifest.string());
   } catch (const toml::parse_error& error) {
     throw InputError(fmt::format("{}:{}: {}", manifest.string(), error.source().begin.line,
                                  error.description()));

@@ -47,7 +47,8 @@ struct ObjectPaths {
 class OverlayContent {
  public:
   /// @param width_px, height_px of the upright recording.
-  /// @throws InputError if the track has neither pixels nor a camera to make them.
+  /// @throws InputError if the track has neither pixels nor a camera to make them, or the camera is
+  ///         for pictures of another size.
   OverlayContent(const OverlayInput& input, int width_px, int height_px);
 
   [[nodiscard]] const std::vector<ObjectPaths>& objects() const { return objects_; }

@@ -27,16 +27,11 @@ namespace fs = std::filesystem;
 
 std::optional<data::Camera> resolve_camera(const data::Scene& scene,
                                            const std::optional<data::Camera>& given,
-                                           const VideoInfo& video) {
+                                           const VideoInfo& video, const fs::path& recording) {
   std::optional<data::Camera> camera = given;
   if (!camera && !scene.camera.file.empty()) camera = data::read_camera(scene.camera.file);
   if (camera) {
-    if (camera->width_px != 0 &&
-        (camera->width_px != video.width_px || camera->height_px != video.height_px))
-      throw InputError(
-          fmt::format("the camera is for {} x {} pictures, the recording has {} x {}; calibrate it "
-                      "at this size",
-                      camera->width_px, camera->height_px, video.width_px, video.height_px));
+    camera->check_size(video.width_px, video.height_px, recording.string());
     return camera;
   }
   if (!scene.camera.scale_px_per_m) return std::nullopt;
@@ -60,7 +55,7 @@ class Tracking {
         options_(options),
         objects_(std::max(options.objects, scene.tracking.objects)),
         recording_(video, source_options(scene, options), options.held_bytes),
-        camera_(resolve_camera(scene, camera, recording_.info())) {
+        camera_(resolve_camera(scene, camera, recording_.info(), video)) {
     if (camera_ && scene.camera.transfer) camera_->transfer = *scene.camera.transfer;
     if (objects_ < 1) throw InputError("the number of objects must be at least 1");
     choose_finder();

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <string>
 
 namespace trochoid::data {
 
@@ -35,6 +36,7 @@ struct Camera {
   std::optional<double> frame_rate_hz;      ///< what the file says of the recording, if anything
   std::optional<double> exposure_fraction;  ///< shutter time as a fraction of the frame interval
   Transfer transfer = Transfer::srgb;
+  std::string file;  ///< where it was read from, for messages; empty if it was made
 
   /// Orthographic camera straight above: table origin at the centre of the image.
   /// @param scale_px_per_m pixels per metre on the floor, > 0.
@@ -42,6 +44,11 @@ struct Camera {
   /// Distortion-free pinhole straight above the image centre, `height_m` over the floor, that shows
   /// `scale_px_per_m` on the floor.
   static Camera overhead(int width_px, int height_px, double scale_px_per_m, double height_m);
+
+  /// A camera that was calibrated for pictures of another size measures nothing in these.
+  /// @throws InputError naming the camera's file and the recording, unless its size is unknown.
+  void check_size(int recorded_width_px, int recorded_height_px,
+                  const std::string& recording) const;
 
   /// Projects a point of the table frame into the distorted image [px]. Any scalar type.
   template <class Scalar>

@@ -37,6 +37,11 @@ void write_camera(const Camera& camera, const std::filesystem::path& path);
 [[nodiscard]] Table read_table(const std::filesystem::path& path);
 void write_table(const Table& table, const std::filesystem::path& path);
 
+/// A file's text, refused beyond `limit_bytes` (an endless device, a video given as a table). Lines
+/// that end in \r alone throughout end in \n.
+/// @throws InputError naming the file if it is missing, a folder, unreadable or too large.
+[[nodiscard]] std::string read_text(const std::filesystem::path& path,
+                                    std::size_t limit_bytes = std::size_t{64} << 20);
 /// Writes `text` whole or not at all. @throws InputError if the folder cannot be written.
 void write_text(const std::string& text, const std::filesystem::path& path);
 /// Hex SHA-256 of a file's bytes.
