@@ -3,6 +3,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <utility>
 
 #include "report_parts.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -21,9 +22,7 @@ double usual_step_s(const data::Track& track) {
   for (std::size_t i = 1; i < track.samples.size(); ++i)
     steps.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
   if (steps.empty()) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return data::median(std::move(steps));
 }
 
 struct Row {
@@ -253,9 +252,7 @@ class Series {
       if (std::isfinite(measured[i] - predicted[i]))
         differences.push_back(measured[i] - predicted[i]);
     if (differences.empty()) return;
-    const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-    std::nth_element(differences.begin(), middle, differences.end());
-    const double shift = kTurn * std::round(*middle / kTurn);
+    const double shift = kTurn * std::round(data::median(std::move(differences)) / kTurn);
     for (double& value : predicted) value += shift;
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "canvas.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -37,9 +38,7 @@ double usual_step_s(const std::vector<ObservedPoint>& points) {
   for (std::size_t i = 1; i < points.size(); ++i)
     steps.push_back(points[i].t_s - points[i - 1].t_s);
   if (steps.empty()) return 0.0;
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                   steps.end());
-  return steps[steps.size() / 2];
+  return data::median(std::move(steps));
 }
 
 }  // namespace

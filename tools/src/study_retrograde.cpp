@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
@@ -12,6 +13,7 @@
 #include "scene_library.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/model/mean_path.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/steady.hpp"
@@ -102,9 +104,7 @@ double typical_rate(const model::MeanPath& path, int eighth) {
   const Eigen::Index size = path.heading_per_phi.size() / 8;
   const Eigen::VectorXd part = path.heading_per_phi.segment(eighth * size, size);
   std::vector<double> rates(part.begin(), part.end());
-  const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
-  std::nth_element(rates.begin(), middle, rates.end());
-  return *middle;
+  return data::median(std::move(rates));
 }
 
 void print_row(const Case& item, const Turn& turn) {

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "normal_table.hpp"
 #include "transfer_curve.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -323,9 +325,7 @@ double blur_step(const std::vector<Working>& all) {
     if (w.usable && w.blur_information > kLeastInformation)
       steps.push_back(std::clamp(w.blur_step, -kMost, kMost));
   if (steps.size() < kFewest) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return data::median(std::move(steps));
 }
 
 // Makes the edges of all looks wider.

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "arrow_system.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -97,12 +98,6 @@ struct Row {
     }
   }
 };
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 ArrowSystem prior_information(const PoseMotion::Step& prior_sd, bool directions) {
   const int n = static_cast<int>(prior_sd.size()), first = pose_at(directions);
@@ -223,9 +218,8 @@ double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
     e.residual_px = e.offset_px - rows[i].dot(x);
     sizes[i] = std::abs(e.residual_px) / std::sqrt(e.variance_px2);
   }
-  std::vector<double> copy = sizes;
   // Never below what the edges claim.
-  const double scale = std::max(1.4826 * median(copy), 1.0);
+  const double scale = std::max(1.4826 * data::median(sizes), 1.0);
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     const double bound = kTukey * std::max(scale, least_scale_px / std::sqrt(e.variance_px2));

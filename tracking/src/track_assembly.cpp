@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "trochoid/data/quantile.hpp"
 
@@ -125,9 +126,7 @@ double usual_radius_px(const BodyPath& path) {
   if (sizes.empty())
     for (const auto& [index, at] : path.frames) sizes.push_back(at.seen.rim.semi_major_px());
   if (sizes.empty()) return 0.0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return *middle;
+  return data::median(std::move(sizes));
 }
 
 data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,

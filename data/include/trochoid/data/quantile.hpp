@@ -7,6 +7,7 @@ namespace trochoid::data {
 /// NaN without values.
 [[nodiscard]] double quantile(std::vector<double> values, double share);
 
+/// The one in the middle; of an even number the mean of the two there. NaN without values.
 [[nodiscard]] double median(std::vector<double> values);
 
 }  // namespace trochoid::data
