@@ -172,6 +172,13 @@ py::dict dict_of(const data::TrackFile& file) {
   return dict;
 }
 
+std::vector<data::Track> tracks_of(const py::list& list) {
+  std::vector<data::Track> tracks;
+  for (const py::handle track : list)
+    tracks.push_back(track_of(track.cast<py::dict>(), fmt::format("track {}", tracks.size() + 1)));
+  return tracks;
+}
+
 data::TrackFile file_of(const py::dict& dict) {
   data::TrackFile file;
   file.source = dict["source"].cast<std::string>();
@@ -180,9 +187,7 @@ data::TrackFile file_of(const py::dict& dict) {
   file.made_by = dict["made_by"].cast<std::string>();
   file.angles_folded = dict["angles_folded"].cast<bool>();
   file.notes = dict["notes"].cast<std::vector<std::string>>();
-  int number = 0;  // counted as fits count them
-  for (const py::handle track : dict["tracks"])
-    file.tracks.push_back(track_of(track.cast<py::dict>(), fmt::format("track {}", ++number)));
+  file.tracks = tracks_of(dict["tracks"]);
   if (file.tracks.empty()) throw InputError("there is no track; give at least one");
   return file;
 }

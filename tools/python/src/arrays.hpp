@@ -19,6 +19,9 @@ namespace trochoid::python {
 /// @throws InputError naming `where` and the array that does not fit.
 [[nodiscard]] data::Track track_of(const pybind11::dict& arrays, const std::string& where);
 
+/// The same of several; errors count them from 1, as fits do.
+[[nodiscard]] std::vector<data::Track> tracks_of(const pybind11::list& list);
+
 /// A file's tracks and header as a dict, and back.
 [[nodiscard]] pybind11::dict dict_of(const data::TrackFile& file);
 [[nodiscard]] data::TrackFile file_of(const pybind11::dict& dict);

@@ -48,14 +48,6 @@ data::Scene checked(const data::Scene& scene) {
   }
 }
 
-std::vector<data::Track> tracks_of(const py::list& list) {
-  std::vector<data::Track> tracks;
-  for (const py::handle track : list)
-    tracks.push_back(
-        track_of(track.cast<py::dict>(), "track " + std::to_string(tracks.size() + 1)));
-  return tracks;
-}
-
 data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
               const py::dict& options, const std::map<std::string, std::string>& inputs) {
   const std::vector<data::Track> values = tracks_of(tracks);
