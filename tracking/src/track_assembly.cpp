@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Keeps an angle continuous: of all angle + k period the one nearest to where the last two lead.
+/// Keeps an angle continuous, from within half a turn of zero on: of all angle + k period the one
+/// nearest to where the last two lead.
 class Unwrapper {
  public:
   explicit Unwrapper(double period) : period_(period) {}
@@ -23,6 +24,8 @@ class Unwrapper {
       const double expected = last_ + (count_ > 1 ? rate_ * (t_s - last_t_) : 0.0);
       angle += period_ * std::round((expected - angle) / period_);
       if (t_s > last_t_) rate_ = (angle - last_) / (t_s - last_t_);
+    } else {
+      angle -= 2.0 * kPi * std::ceil((angle - kPi) / (2.0 * kPi));
     }
     last_ = angle;
     last_t_ = t_s;

@@ -1,0 +1,51 @@
+#include "track_assembly.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+// What the frames of a body become as a track.
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// A body that turns by 0.5 rad a frame about an axis of which the picture does not tell how it
+/// leans.
+BodyPath turning(double first_phi_rad, double first_psi_rad) {
+  BodyPath path;
+  for (int i = 0; i < 30; ++i) {
+    PoseMeasurement pose;
+    pose.pose.centre_m.setZero();
+    pose.pose.theta_rad = 0.01;
+    pose.pose.phi_rad = first_phi_rad;
+    pose.pose.psi_rad = std::remainder(first_psi_rad + 0.5 * i, 2.0 * kPi);
+    pose.covariance_m2 = Eigen::Matrix2d::Identity();
+    pose.centre_px.setZero();
+    pose.covariance_px2 = Eigen::Matrix2d::Identity();
+    pose.sigma_phi_rad = 0.5;
+    pose.sigma_psi_rad = 0.5;
+    BodyPath::At& at = path.frames[i];
+    at.t_s = 0.01 * i;
+    at.seen.pose = pose;
+  }
+  return path;
+}
+
+TEST(TrackAssembly, CountsAnglesFromWithinHalfATurnOfZero) {
+  for (const double phi_rad : {-3.0, 0.0, 3.0}) {
+    for (const bool on_pin : {false, true}) {
+      const BodyPath path = turning(phi_rad, 2.5);
+      const data::Track track = assemble_track(path, 0, {}, {.on_pin = on_pin});
+      ASSERT_TRUE(track.samples.front().psi && track.samples.back().psi);
+      const double first = track.samples.front().psi->value_rad;
+      EXPECT_LE(std::abs(first), kPi);
+      EXPECT_NEAR(std::remainder(first - (on_pin ? phi_rad : 0.0) - 2.5, 2.0 * kPi), 0.0, 1e-12);
+      EXPECT_NEAR(track.samples.back().psi->value_rad - first, 0.5 * 29, 1e-9);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
