@@ -29,10 +29,8 @@ void read_faces(TableReader& reader, SpinMark& mark) {
 SpinMark read_mark(const toml::node& node, const std::string& where) {
   TableReader reader(node.as_table(), "[[body.mark]]", where);
   if (!node.is_table())
-    throw InputError(
-        fmt::format("{}:{}: mark must be a table, e.g. {{ distance_m = 0.02, size_m = "
-                    "0.004 }}",
-                    where, node.source().begin.line));
+    throw SceneError(where, node.source().begin.line,
+                     "mark must be a table, e.g. { distance_m = 0.02, size_m = 0.004 }");
   SpinMark mark;
   mark_keys(into(reader, mark));
   std::optional<double> angle_deg;
@@ -128,8 +126,8 @@ Scene scene_of(const toml::table& root, const std::string& where) {
   const auto section = [&](const char* name) {
     const toml::node* node = top.find(name);
     if (node && !node->is_table())
-      throw InputError(fmt::format("{}:{}: {} must be a table: [{}]", where,
-                                   node->source().begin.line, name, name));
+      throw SceneError(where, node->source().begin.line,
+                       fmt::format("{} must be a table: [{}]", name, name));
     return node ? node->as_table() : nullptr;
   };
   Scene scene;
@@ -161,10 +159,10 @@ Scene scene_of(const toml::table& root, const std::string& where) {
       "fit", scene.fit, [](auto&& v) { fit_keys(v); }, unchecked);
   for (const auto& [key, node] : root)
     if (!node.is_table() && !node.is_array_of_tables())
-      throw InputError(
-          fmt::format("{}:{}: {} stands outside of every table; lengths belong under "
-                      "[body], for instance",
-                      where, key.source().begin.line, in_quotes(key.str())));
+      throw SceneError(where, key.source().begin.line,
+                       fmt::format("{} stands outside of every table; lengths belong under [body], "
+                                   "for instance",
+                                   in_quotes(key.str())));
   top.refuse_unknown();
   return scene;
 }
@@ -291,8 +289,8 @@ Scene parse_scene(const std::string& toml, const std::string& where) {
   try {
     return scene_of(toml::parse(toml, where), where);
   } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("{}:{}: not TOML: {}", where, error.source().begin.line,
-                                 one_line(error.description())));
+    throw SceneError(where, error.source().begin.line,
+                     "not TOML: " + one_line(error.description()));
   }
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "trochoid/data/moment.hpp"
-#include "trochoid/data/error.hpp"
+#include "trochoid/data/scene_error.hpp"
 
 namespace trochoid::data {
 
@@ -21,8 +21,9 @@ void TableReader::refuse_unknown() const {
     const std::string name(key.str());
     if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
     const auto line = key.source().begin.line;
-    throw InputError(fmt::format("{}:{}: {} is not a key of {}; did you mean {}?", where_, line,
-                                 in_quotes(name), name_, nearest(name, known_)));
+    throw SceneError(where_, line,
+                     fmt::format("{} is not a key of {}; did you mean {}?", in_quotes(name), name_,
+                                 nearest(name, known_)));
   }
 }
 
@@ -34,7 +35,7 @@ void TableReader::fail(std::string_view key, const std::string& what) const {
 }
 
 void TableReader::fail_at(const toml::node& node, const std::string& what) const {
-  throw InputError(fmt::format("{}:{}: {}", where_, node.source().begin.line, what));
+  throw SceneError(where_, node.source().begin.line, what);
 }
 
 double TableReader::number(const std::string& key, const toml::node& node,

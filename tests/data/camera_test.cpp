@@ -106,5 +106,21 @@ TEST(Camera, RefusesAPlaneItsRayDoesNotMeet) {
   EXPECT_THROW(static_cast<void>(camera.table_from_image({300.0, 200.0}, 2.0)), NumericalError);
 }
 
+TEST(CameraSize, ThatIsNotTheRecordingsIsRefusedWithBothNames) {
+  Camera camera = Camera::from_scale(640, 480, 2000.0);
+  EXPECT_NO_THROW(camera.check_size(640, 480, "ring.mp4"));
+  camera.file = "lens.json";
+  try {
+    camera.check_size(1280, 720, "ring.mp4");
+    FAIL() << "it is another size";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(),
+                 "lens.json: the camera is for 640 x 480 pictures, ring.mp4 has 1280 x "
+                 "720; calibrate the camera at this size");
+  }
+  camera.width_px = 0;  // not known
+  EXPECT_NO_THROW(camera.check_size(1280, 720, "ring.mp4"));
+}
+
 }  // namespace
 }  // namespace trochoid::data

@@ -4,6 +4,7 @@
 #include "files_for_tests.hpp"
 #include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/scene_error.hpp"
 
 namespace trochoid::data {
 namespace {
@@ -324,6 +325,17 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"LongUnknownKey", "[body]\n" + std::string(100000, 'a') + " = 1", ":2:", "..."},
         Refusal{"DeepNesting", "[fit]\nfree = " + std::string(100000, '['), ":2:", "not TOML"}),
     [](const auto& instance) { return instance.param.name; });
+
+// Whoever made the text can say what its line stands for, without reading the message.
+TEST(SceneFile, SaysOnWhichLineItIsWrongApartFromTheWords) {
+  try {
+    (void)parse_scene("[body]\nradius_m = 1\nradus_m = 2\n", "scene");
+    FAIL() << "it is wrong";
+  } catch (const SceneError& error) {
+    EXPECT_EQ(error.line(), 3U);
+    EXPECT_EQ(std::string(error.what()), "scene:3: " + error.words());
+  }
+}
 
 TEST(SceneFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
   const TestFolder folder;

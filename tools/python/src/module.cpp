@@ -14,6 +14,7 @@
 #include "trajectory_table.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/scene_error.hpp"
 #include "trochoid/model/simulate.hpp"
 #ifdef TROCHOID_HAS_TRACKING
 #include "overlay.hpp"
@@ -38,13 +39,21 @@ struct SceneValue {
 /// What was set from Python passes the same checks as a scene file. @throws InputError without the
 /// line: nobody has seen the text in which it would be counted.
 data::Scene checked(const data::Scene& scene) {
-  const std::string where = "scene";
   try {
-    return data::parse_scene(data::to_toml(scene), where);
-  } catch (const InputError& error) {
-    const std::string message = error.what();
-    if (!message.starts_with(where + ":")) throw;
-    throw InputError(where + message.substr(message.find(": ")));
+    return data::parse_scene(data::to_toml(scene), "scene");
+  } catch (const data::SceneError& error) {
+    throw InputError("scene: " + error.words());
+  }
+}
+
+/// A scene from tables whose text Python has written: `tables` names the one each line belongs to,
+/// and errors name it in place of the line.
+SceneValue scene_of_tables(const std::string& toml, const std::vector<std::string>& tables) {
+  try {
+    return {data::parse_scene(toml, "scene")};
+  } catch (const data::SceneError& error) {
+    if (error.line() < 1 || error.line() > tables.size()) throw;
+    throw InputError("scene['" + tables[error.line() - 1] + "']: " + error.words());
   }
 }
 
@@ -317,6 +326,7 @@ void add_scene(py::module_& module) {
                   [](const std::string& toml, const std::string& where) {
                     return SceneValue{data::parse_scene(toml, where)};
                   })
+      .def_static("of_tables", &scene_of_tables)
       .def("with_run",
            [](SceneValue value, std::optional<double> until_s, std::optional<double> rate_hz,
               std::optional<double> tolerance, const std::string& model,

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 import reprlib
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
@@ -115,13 +114,7 @@ def _scene_of_dict(tables: Mapping[str, Mapping[str, Any]]) -> "_core.SceneValue
             raise InputError(f"scene: '{name}' is not a table; give a dict of dicts")
         lines += [f"[{name}]"] + [f"{key} = {_toml_value(value)}" for key, value in table.items()]
         owners += [name] * (1 + len(table))
-    try:
-        return _core.SceneValue.parse("\n".join(lines) + "\n", "scene")
-    except InputError as error:  # the lines are not the caller's: says the table instead
-        line = re.match(r"scene:(\d+): ", str(error))
-        if not line or int(line[1]) > len(owners):
-            raise
-        raise InputError(f"scene[{owners[int(line[1]) - 1]!r}]: {str(error)[line.end():]}") from None
+    return _core.SceneValue.of_tables("\n".join(lines) + "\n", owners)
 
 
 class Scene:

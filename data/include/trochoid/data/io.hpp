@@ -18,6 +18,7 @@ void write_track(const TrackFile& file, const std::filesystem::path& path);
 
 [[nodiscard]] Scene read_scene(const std::filesystem::path& path);
 /// Parses TOML text; `where` stands for the file in messages.
+/// @throws SceneError (scene_error.hpp) where a line is wrong.
 [[nodiscard]] Scene parse_scene(const std::string& toml, const std::string& where);
 [[nodiscard]] std::string to_toml(const Scene& scene);
 
