@@ -148,16 +148,30 @@ struct GivenUp {
   }
 };
 
-GivenUp given_up(const Problem& problem) {
+GivenUp given_up(const Problem& problem, const Solution& solution) {
   constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
+  // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
+  constexpr double kNothing = 1e-5;
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
   GivenUp all;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     const ArcData& data = problem.arcs[arc];
+    Eigen::VectorXd residuals;
+    if (data.observable_index(model::Observable::x_m) < 0 ||
+        !evaluate(plain, arc, solution.u, residuals, nullptr))
+      continue;
+    const Eigen::MatrixX2d xy = data.positions_m();
+    const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
+    const double nothing_m =
+        kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
     const std::vector<int> consistent = consistent_samples(data);
     for (const Reading& reading : data.readings) {
       if (reading.channel != Channel::position) continue;
       ++all.of;
       if (robust_weight(problem, arc, reading) > kHardlyCounts ||
+          off.row(reading.sample).norm() < nothing_m ||
           !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
         continue;
       ++all.samples;
@@ -326,7 +340,7 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                               kChannelWords[static_cast<int>(worst.channel)], worst.times),
                   fit);
   constexpr double kTooMany = 0.1;
-  const GivenUp lost = given_up(problem);
+  const GivenUp lost = given_up(problem, solution);
   if (lost.more_than(kTooMany))
     return refuse("unexplained", "unexplained",
                   "the model does not explain the track: " + lost.words(), fit);

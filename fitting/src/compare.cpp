@@ -1,6 +1,7 @@
 #include "trochoid/fitting/compare.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "adequacy.hpp"
 #include "first_guess.hpp"
 #include "ladder.hpp"
+#include "problem.hpp"
 #include "rung.hpp"
 #include "rung_words.hpp"
 #include "trochoid/data/error.hpp"
@@ -50,12 +52,42 @@ std::string name_of(const Ladder& ladder, const std::set<int>& terms) {
   return name;
 }
 
+// Whether [fit] may call one of these parameters so; a group's name covers its components.
+bool names_one_of(const std::set<std::string>& parameters, const std::string& name) {
+  return std::any_of(parameters.begin(), parameters.end(), [&](const std::string& parameter) {
+    return parameter == name || parameter.starts_with(name + "[");
+  });
+}
+
+// What [fit] says of parameters that a rung does not have is meant for other rungs.
+void keep_own(data::Scene& scene) {
+  data::FitSettings& fit = scene.fit;
+  if (fit.free.empty() && fit.fixed.empty() && fit.bounds.empty()) return;
+  const std::set<std::string> own = parameters_of(scene);
+  std::erase_if(fit.free, [&](const std::string& name) { return !names_one_of(own, name); });
+  std::erase_if(fit.fixed, [&](const auto& item) { return !names_one_of(own, item.first); });
+  std::erase_if(fit.bounds, [&](const auto& item) { return !names_one_of(own, item.first); });
+}
+
+// Every rung frees the terms it has: a list made for one of them would hold the others' fixed. What
+// leaves the model its own choice of the rest stays.
+void free_all_terms(data::FitSettings& fit) {
+  const auto listed = [&](const char* name) {
+    return std::find(fit.free.begin(), fit.free.end(), name) != fit.free.end();
+  };
+  fit.free_pivot = fit.free_pivot || listed("pivot_x_m") || listed("pivot_y_m");
+  std::erase_if(fit.free, [](const std::string& name) {
+    return name != kReadout && name != kAngleDelay && name != kSlipScale;
+  });
+}
+
 Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
   Rung rung;
   rung.terms = terms;
   rung.name = name_of(ladder, terms);
   rung.scene = ladder.plain;
   for (const int term : terms) ladder.terms[static_cast<std::size_t>(term)].switch_on(rung.scene);
+  keep_own(rung.scene);
   return rung;
 }
 
@@ -63,6 +95,7 @@ Rung frictionless_rung(const Ladder& ladder) {
   Rung rung;
   rung.name = "smooth floor";
   rung.scene = *ladder.frictionless;
+  keep_own(rung.scene);
   return rung;
 }
 
@@ -267,6 +300,20 @@ std::set<std::string> parameters_of_any(const Ladder& ladder) {
   return names;
 }
 
+// @throws InputError for a name that means nothing to any of the models.
+void check_names(const data::FitSettings& fit, const std::set<std::string>& known) {
+  const auto check = [&](const char* key, const std::string& name) {
+    if (!names_one_of(known, name))
+      throw InputError(
+          fmt::format("[fit] {}: the models compared have no parameter '{}'; they have "
+                      "{}",
+                      key, name, fmt::join(known, ", ")));
+  };
+  for (const std::string& name : fit.free) check("free", name);
+  for (const auto& [name, value] : fit.fixed) check("fixed", name);
+  for (const auto& [name, bounds] : fit.bounds) check("bounds", name);
+}
+
 data::ModelScore table_row(const Rung& rung, bool recommended) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (!rung.fitted) return {rung.name, kNone, kNone, kNone, kNone, kNone, 0, false, rung.reason};
@@ -290,9 +337,11 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   // A body held at a pivot that leans there is a top, one that lies on it only turns.
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
   if (open && leaves_pivot(tracks, named)) named.model.name = "top";
+  free_all_terms(named.fit);
   const Ladder ladder = ladder_of(named);
-  if (!options.start.empty())
-    check_first_guess(options.start, "the models compared have", parameters_of_any(ladder));
+  const std::set<std::string> known = parameters_of_any(ladder);
+  check_names(scene.fit, known);
+  check_first_guess(options.start, "the models compared have", known);
   FitOptions plain = options;
   plain.profile = false;
   plain.bootstrap = 0;

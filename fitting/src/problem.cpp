@@ -238,6 +238,7 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
     if (info.name == asked_for) return true;
   if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
     return settings.free_pivot || listed(settings.free, info.name);
+  if (info.name == kSlipScale && settings.prior.contains(info.name)) return true;
   // Freeing the clock, or how friction sets in, leaves the model its own choice of the rest.
   const bool chosen =
       std::any_of(settings.free.begin(), settings.free.end(), [](const std::string& name) {

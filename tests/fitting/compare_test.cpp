@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -259,6 +260,23 @@ TEST(Compare, SaysWhatTurnsARingRetrograde) {
   const Comparison found = compare_one(track_of(truth, start, 2.5, 200, 2e-4, 6), ring());
   EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("turns retrograde at t ="));
   EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("pivoting friction explains it"));
+}
+
+// A scene made for one model may be compared with others.
+TEST(Compare, HeedsWhatIsSaidOfParametersThatOnlySomeOfTheModelsHave) {
+  data::Scene scene = spin_down();
+  scene.model.spin_down_dry_rad_s2 = 1.0;
+  const data::Track track =
+      track_of(scene, {{"w3_rad_s", 20.0}, {"spin_down_dry_rad_s2", 1.0}}, 4.0, 200, 1e-3, 3);
+  scene.fit.free = {"spin_down_dry_rad_s2"};
+  scene.fit.bounds = {{"spin_down_viscous_1_s", {0.0, 0.5}}};
+  const Comparison found = compare_one(track, scene);
+  EXPECT_EQ(found.fit.model, "pivot");
+  EXPECT_NEAR(found.fit.find("spin_down_dry_rad_s2")->value, 1.0, 0.01);
+  scene.fit.free = {"spin_down_dri"};
+  EXPECT_THAT([&] { (void)compare_one(track, scene); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr(
+                  "[fit] free: the models compared have no parameter 'spin_down_dri'")));
 }
 
 }  // namespace

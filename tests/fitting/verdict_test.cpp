@@ -177,6 +177,15 @@ TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
   EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
 }
 
+// What integrating leaves is no noise: of a simulated track nothing stands out.
+TEST(Verdict, IsGoodForASimulatedTrackWithoutNoise) {
+  data::Track track = track_of(nutating_top(), [] { return 0.0; });
+  for (data::TrackSample& sample : track.samples) sample.covariance_m2.setConstant(NAN);
+  std::set<int> many;
+  for (int i = 0; i < kSamples; i += 4) many.insert(i);
+  EXPECT_EQ(verdict_at(track, kNutating, false, many), "good");
+}
+
 // Of a short track one or two are soon a tenth.
 TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
   data::Track track = track_of(nutating_top(), white(kSigma_m, 12));

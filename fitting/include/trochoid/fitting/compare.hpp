@@ -20,14 +20,15 @@ struct Comparison {
 /// quadratic air couple, gap layer, rolling, pivoting and contour friction, and sliding; pivot:
 /// drag; puck: air force; spin-down: dry, viscous and quadratic couple, a weight out of balance,
 /// and dry friction that weakens with speed). Terms the scene names beforehand give starting values
-/// only.
+/// only, and every rung frees the terms it has, whatever [fit] free lists.
 /// Every rung is judged by AICc and BIC (both allow for residuals that hang together), whiteness of
 /// residuals and the prediction of the last third of the track from the first two. Recommended is
 /// the rung with the fewest parameters within 6 of the least BIC; its error bars allow for what
 /// rungs with other terms that are not ruled out make of its parameters. Where the fitted ring or
 /// disc turns retrograde, the recommendation says which losses explain that and whether the track
 /// can tell.
-/// @throws InputError as fit() does for the model without losses.
+/// @throws InputError as fit() does for the model without losses; for names under [fit] that none
+///         of the models has.
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
                                  const FitOptions& options = {});
 
