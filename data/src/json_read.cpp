@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "text.hpp"
+#include "trochoid/data/io.hpp"
 
 namespace trochoid::data {
 

@@ -5,6 +5,7 @@
 #include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/moment.hpp"
+#include "trochoid/data/scene_error.hpp"
 
 // Scene TOML: docs/formats.md. The keys are listed in scene_keys.hpp.
 namespace trochoid::data {
