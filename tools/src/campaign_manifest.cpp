@@ -10,6 +10,7 @@
 #include "campaign.hpp"
 #include "track_options.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
 
 namespace trochoid::tools {
 namespace {
