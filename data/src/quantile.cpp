@@ -16,6 +16,13 @@ double quantile(std::vector<double> values, double share) {
   return rest > 0.0 ? std::lerp(*low, *std::min_element(low + 1, values.end()), rest) : *low;
 }
 
+double upper_median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 double median(std::vector<double> values) {
   return quantile(std::move(values), 0.5);
 }

@@ -14,10 +14,14 @@ TEST(Quantile, LiesBetweenNeighboursInOrder) {
   EXPECT_DOUBLE_EQ(quantile(values, 0.9), 3.7);
   EXPECT_DOUBLE_EQ(quantile(values, 1.0), 4.0);
   EXPECT_DOUBLE_EQ(median({7.0, 5.0, 6.0}), 6.0);
+  EXPECT_DOUBLE_EQ(median(values), 2.5);
+  EXPECT_DOUBLE_EQ(upper_median(values), 3.0);
+  EXPECT_DOUBLE_EQ(upper_median({7.0, 5.0, 6.0}), 6.0);
 }
 
 TEST(Quantile, OfNothingIsNotANumber) {
   EXPECT_TRUE(std::isnan(median({})));
+  EXPECT_TRUE(std::isnan(upper_median({})));
 }
 
 }  // namespace

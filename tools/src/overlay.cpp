@@ -203,6 +203,7 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
       tracking::decode_ahead(tracking::open_video(input.video, source_options(input, options)));
   const tracking::VideoInfo info = source->info();
   const OverlayContent content(input, info.width_px, info.height_px);
+  content.check_pictures(info.width_px, info.height_px, input.video.string());
   OverlayFrames written;
   written.slowed = options.slow > 0.0
                        ? options.slow

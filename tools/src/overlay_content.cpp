@@ -65,10 +65,14 @@ std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks, int
   return camera;
 }
 
+void OverlayContent::check_pictures(int width_px, int height_px,
+                                    const std::string& recording) const {
+  if (camera_) camera_->check_size(width_px, height_px, recording);
+}
+
 OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int height_px)
     : tracks_(input.tracks), scene_(scene_of(input)), camera_(input.camera) {
   if (!camera_ && scene_) camera_ = camera_of(*scene_);
-  if (camera_) camera_->check_size(width_px, height_px, input.video.string());
   if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
   if (input.fit && !input.fit->parameters.empty())
     prediction_ = replay(*input.fit, tracks_, input.fit_track);

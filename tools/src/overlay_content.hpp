@@ -47,9 +47,10 @@ struct ObjectPaths {
 class OverlayContent {
  public:
   /// @param width_px, height_px of the upright recording.
-  /// @throws InputError if the track has neither pixels nor a camera to make them, or the camera is
-  ///         for pictures of another size.
+  /// @throws InputError if the track has neither pixels nor a camera to make them.
   OverlayContent(const OverlayInput& input, int width_px, int height_px);
+  /// @throws InputError if the camera is for pictures of another size than the recording's.
+  void check_pictures(int width_px, int height_px, const std::string& recording) const;
 
   [[nodiscard]] const std::vector<ObjectPaths>& objects() const { return objects_; }
   [[nodiscard]] const PredictedPath& prediction() const { return prediction_; }

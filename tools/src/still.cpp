@@ -149,6 +149,7 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
   tracking::VideoInfo info;
   const cv::Mat frame = first_tracked_frame(input, options, info);
   const OverlayContent content(input, frame.cols, frame.rows);
+  content.check_pictures(frame.cols, frame.rows, input.video.string());
   Enlargement view{cutting_of(content, frame.size()), 1.0};
   view.factor = std::min(kMostEnlarged, static_cast<double>(kStillWidthPx) / view.cutting.width);
   cv::Mat picture = view.picture(frame);

@@ -325,7 +325,7 @@ double blur_step(const std::vector<Working>& all) {
     if (w.usable && w.blur_information > kLeastInformation)
       steps.push_back(std::clamp(w.blur_step, -kMost, kMost));
   if (steps.size() < kFewest) return 0.0;
-  return data::median(std::move(steps));
+  return data::upper_median(std::move(steps));
 }
 
 // Makes the edges of all looks wider.

@@ -219,7 +219,7 @@ double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
     sizes[i] = std::abs(e.residual_px) / std::sqrt(e.variance_px2);
   }
   // Never below what the edges claim.
-  const double scale = std::max(1.4826 * data::median(sizes), 1.0);
+  const double scale = std::max(1.4826 * data::upper_median(sizes), 1.0);
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     const double bound = kTukey * std::max(scale, least_scale_px / std::sqrt(e.variance_px2));

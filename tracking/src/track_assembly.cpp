@@ -129,7 +129,7 @@ double usual_radius_px(const BodyPath& path) {
   if (sizes.empty())
     for (const auto& [index, at] : path.frames) sizes.push_back(at.seen.rim.semi_major_px());
   if (sizes.empty()) return 0.0;
-  return data::median(std::move(sizes));
+  return data::upper_median(std::move(sizes));
 }
 
 data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,

@@ -10,4 +10,8 @@ namespace trochoid::data {
 /// The one in the middle; of an even number the mean of the two there. NaN without values.
 [[nodiscard]] double median(std::vector<double> values);
 
+/// The one in the middle; of an even number the upper one there, so that it is one of the values.
+/// NaN without values.
+[[nodiscard]] double upper_median(std::vector<double> values);
+
 }  // namespace trochoid::data
