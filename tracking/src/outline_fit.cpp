@@ -171,6 +171,38 @@ double moved_px(const Scenery& scenery, const Refined& refined, const data::Pose
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(refined.samples.size())));
 }
 
+// How much farther out the rim is seen than the body's size and this pose put it.
+double larger_px(const Refined& refined) {
+  double sum_px = 0.0, rim_px = 0.0;
+  for (size_t i = 0; i < refined.equations.size(); ++i) {
+    const EdgeEquation& e = refined.equations[i];
+    if (e.weight < 0.5 || !refined.samples[i].silhouette || e.swell < 0.0 || e.colour) continue;
+    sum_px += e.arc_px * (refined.solution.swell_px + e.polarity * refined.solution.polarity_px);
+    rim_px += e.arc_px;
+  }
+  return rim_px > 0.0 ? sum_px / rim_px : 0.0;
+}
+
+// Where the body seems too small, what was outlined may be its face alone: a face in the light
+// beside a wall in the shade. A pose at which the body has its size, and for which about as much
+// speaks, is the better one, though the edges of its wall are seen less clearly.
+std::optional<Fitted> of_its_size(const Scenery& scenery, std::optional<Fitted> fitted) {
+  constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85;
+  if (!fitted || scenery.motion.rotation() < 0) return fitted;
+  const double seen_px = larger_px(fitted->refined);
+  if (seen_px > -kTooSmallPx) return fitted;
+  const double outline_px = fitted->refined.outline_px;
+  std::optional<Fitted> best;
+  for (const data::Pose<>& start :
+       faces_outlined_like(scenery.body, scenery.camera, scenery.motion, fitted->refined.pose)) {
+    auto other = fit_exactly(scenery, start, outline_px, fitted->blur_px);
+    if (other && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx &&
+        other->evidence > kAsGood * fitted->evidence && (!best || other->evidence > best->evidence))
+      best = std::move(other);
+  }
+  return best ? best : fitted;
+}
+
 // A prediction is mostly right to the blur: looking from farther would only let shadows and the
 // body's other edges mislead it. Where it was not, or little then speaks for it, the wider looks
 // have their say.
@@ -186,7 +218,7 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
   }
   if (!fitted || fitted->score < kSure)
     fitted = better(std::move(fitted), fit_from(scenery, scenery.blurred(kNearBlurPx), predicted));
-  return of_near_tilts(scenery, std::move(fitted));
+  return of_near_tilts(scenery, of_its_size(scenery, std::move(fitted)));
 }
 
 // From afar: each start is drawn towards edges, those that then lie on edges are fitted.
@@ -267,20 +299,15 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.blur_px = fitted.blur_px;
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
+  m.larger_px = larger_px(r);
   ShadingMemory shading;
-  double rim_px = 0.0;
   for (size_t i = 0; i < r.equations.size(); ++i) {
     const EdgeEquation& e = r.equations[i];
     if (e.weight < 0.5) continue;
-    if (r.samples[i].silhouette && e.swell > 0.0 && !e.colour) {
-      m.larger_px += e.arc_px * (r.solution.swell_px + e.polarity * r.solution.polarity_px);
-      rim_px += e.arc_px;
-    }
     shading.add(r.shading[i]);
     m.edges.push_back({r.samples[i].image_px + e.offset_px * r.samples[i].normal_px,
                        r.samples[i].normal_px, std::sqrt(e.variance_px2), e.residual_px});
   }
-  if (rim_px > 0.0) m.larger_px /= rim_px;
   m.shading = std::make_shared<ShadingMemory>(std::move(shading));
   return m;
 }

@@ -235,4 +235,31 @@ data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
   return placed ? *placed : pose;
 }
 
+std::vector<data::Pose<>> faces_outlined_like(const data::Body& body, const data::Camera& camera,
+                                              const PoseMotion& motion, const data::Pose<>& pose) {
+  const double h = body.half_thickness_m();
+  const Eigen::Vector3d towards = direction_to(camera, pose.centre_m);
+  const Eigen::Vector3d near = axis_towards(camera, pose);
+  // An ellipse with this minor axis over the major one is outlined.
+  const double facing = near.dot(towards), tilted = std::sqrt(std::max(0.0, 1.0 - facing * facing));
+  const double share = std::min(1.0, facing + h / body.radius_m * tilted);
+  if (!(tilted > 0.0)) return {};
+  const Eigen::Vector3d aside = (near - facing * towards) / tilted;
+  std::vector<data::Pose<>> poses;
+  for (const double way : {1.0, -1.0}) {
+    const Eigen::Vector3d axis = share * towards + way * std::sqrt(1.0 - share * share) * aside;
+    data::Pose<> other = pose;
+    set_axis(axis_of(pose).dot(near) > 0.0 ? axis : Eigen::Vector3d(-axis), other);
+    other.centre_m = pose.centre_m - h * axis;
+    if (motion.pivoted()) {
+      poses.push_back(motion.settled(other));
+      break;
+    }
+    if (const auto placed =
+            on_ray(camera, motion, other, camera.image_from_table<double>(other.centre_m)))
+      poses.push_back(*placed);
+  }
+  return poses;
+}
+
 }  // namespace trochoid::tracking

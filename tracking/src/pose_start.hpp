@@ -21,4 +21,11 @@ namespace trochoid::tracking {
 [[nodiscard]] data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
                                     const data::Pose<>& pose);
 
+/// Attitudes whose near face alone is outlined as the whole body is at this pose: what is taken for
+/// the body's outline is its face's where the wall beside it is about as bright as the floor.
+[[nodiscard]] std::vector<data::Pose<>> faces_outlined_like(const data::Body& body,
+                                                            const data::Camera& camera,
+                                                            const PoseMotion& motion,
+                                                            const data::Pose<>& pose);
+
 }  // namespace trochoid::tracking
