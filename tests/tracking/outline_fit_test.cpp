@@ -430,12 +430,14 @@ TEST(OutlineFitter, AContactShadowAsDarkAsTheDiscHardlyPullsIt) {
   }
 }
 
+constexpr double kCb = 118.0, kCr = 110.0;  // greenish
+
 // A greenish ellipse in chroma planes of half the size.
 void draw_on_chroma(cv::Mat& cb, cv::Mat& cr, const Eigen::Vector2d& centre_px, double a_px,
                     double b_px) {
   const Eigen::Vector2d at = 0.5 * (centre_px - Eigen::Vector2d(0.5, 0.5));
-  draw_disc(cb, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, 118.0);
-  draw_disc(cr, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, 110.0);
+  draw_disc(cb, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, kCb);
+  draw_disc(cr, at.x(), at.y(), 0.5 * a_px, 0.5 * b_px, 0.0, kCr);
 }
 
 cv::Mat merged_chroma(const cv::Mat& cb, const cv::Mat& cr) {
@@ -482,22 +484,55 @@ TEST(OutlineFitter, AShadowAsDarkAsTheDiscIsToldFromItByItsColour) {
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
 }
 
+// A tilted disc with its wall in the shade, drawn as slices of the wall's level below the face.
+void draw_cylinder(cv::Mat& picture, const Eigen::Vector2d& centre_px, double radius_px,
+                   double half_thickness_px, double theta_rad, double wall, double face) {
+  constexpr int kSlices = 8;
+  for (int k = -kSlices; k <= kSlices; ++k)
+    draw_disc(picture, centre_px.x(),
+              centre_px.y() + k * half_thickness_px * std::sin(theta_rad) / kSlices, radius_px,
+              radius_px * std::cos(theta_rad), 0.0, k < kSlices ? wall : face);
+}
+
+// The bright face stands out so much more than the wall beside it that the outline settles on its
+// rim, as that of a disc that tilts more.
+TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
+  FlatDisc disc;
+  disc.body.thickness_m = 0.008;
+  constexpr double kTheta = 0.4, kFloor = 130.0, kWall = 80.0, kFace = 230.0;
+  const Eigen::Vector2d centre(80.2, 70.4);
+  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
+  draw_cylinder(picture, centre, 30.0, 4.0, kTheta, kWall, kFace);
+  std::mt19937 random(15);
+  const cv::Mat luma = developed(picture, 2.0, random);
+  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  data::Pose<> predicted;
+  predicted.theta_rad = 0.55;  // cos 0.55 + 4 / 30 sin 0.55 = cos 0.4
+  predicted.centre_m = disc.camera.table_from_image(
+      centre + Eigen::Vector2d(0.0, 4.0 * std::sin(kTheta)),
+      data::height_on_floor_m(0.55, disc.body.radius_m, disc.body.half_thickness_m()));
+  const auto seen =
+      fitter.measure({.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
+  ASSERT_TRUE(seen);
+  constexpr double kTolerance_rad = 0.05, kTolerance_px = 0.4;
+  EXPECT_NEAR(seen->pose.theta_rad, kTheta, kTolerance_rad);
+  EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
+}
+
 // A tilted disc whose wall lies in the shade and is as bright as the floor: the outline of its
 // bright face alone is that of a disc tilted the other way.
 TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {
   FlatDisc disc;
   disc.body.thickness_m = 0.008;
   constexpr double kTheta = 0.35, kRadius_px = 30.0, kFloor = 150.0, kFace = 210.0;
-  const Eigen::Vector2d centre(80.2, 70.4), face(0.0, 1e3 * 0.004 * std::sin(kTheta));
+  const Eigen::Vector2d centre(80.2, 70.4);
   cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor)), cb(70, 80, CV_64F, cv::Scalar(128.0)),
       cr = cb.clone();
-  constexpr int kSlices = 8;
-  for (int k = -kSlices; k <= kSlices; ++k) {
-    const Eigen::Vector2d at = centre + k / static_cast<double>(kSlices) * face;
-    const double minor_px = kRadius_px * std::cos(kTheta);
-    draw_disc(picture, at.x(), at.y(), kRadius_px, minor_px, 0.0, k < kSlices ? kFloor : kFace);
-    draw_on_chroma(cb, cr, at, kRadius_px, minor_px);
-  }
+  draw_cylinder(picture, centre, kRadius_px, 4.0, kTheta, kFloor, kFace);
+  const Eigen::Vector2d half = 0.5 * (centre - Eigen::Vector2d(0.5, 0.5));
+  draw_cylinder(cb, half, 0.5 * kRadius_px, 2.0, kTheta, kCb, kCb);
+  draw_cylinder(cr, half, 0.5 * kRadius_px, 2.0, kTheta, kCr, kCr);
   const cv::Mat chroma = merged_chroma(cb, cr);
   std::mt19937 random(13);
   const cv::Mat luma = developed(picture, 2.0, random);

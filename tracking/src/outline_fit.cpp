@@ -129,20 +129,24 @@ void find_uncertainty(const Scenery& scenery, Fitted& fitted) {
   fitted.refined.solution.covariance += fitted.attitudes;
 }
 
+// Cosine of the angle at which the near face is seen: 1 from straight above it.
+double facing(const data::Camera& camera, const data::Pose<>& pose) {
+  return axis_towards(camera, pose).dot(direction_to(camera, pose.centre_m));
+}
+
 // Seen nearly face on, the attitude mirrored at the line of sight is so near that a prediction may
 // lead to either, and so is the one seen from straight above.
 std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted> fitted) {
   constexpr double kNoticeably = 1.04, kNearly_rad = 0.25;
   if (!fitted || scenery.motion.rotation() < 0 || scenery.motion.pivoted()) return fitted;
   const data::Pose<> pose = fitted->refined.pose;
-  const double facing =
-      axis_towards(scenery.camera, pose).dot(direction_to(scenery.camera, pose.centre_m));
-  if (facing < std::cos(steepest_alike(scenery.body))) return fitted;
+  const double cosine = facing(scenery.camera, pose);
+  if (cosine < std::cos(steepest_alike(scenery.body))) return fitted;
   const double outline_px = fitted->refined.outline_px;
   std::vector<Fitted> others;
   const auto mirror = mirrored(scenery.camera, scenery.motion, pose);
   if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px)) {
-    if (facing > std::cos(kNearly_rad) && other->evidence > kNoticeably * fitted->evidence)
+    if (cosine > std::cos(kNearly_rad) && other->evidence > kNoticeably * fitted->evidence)
       std::swap(*fitted, *other);
     others.push_back(std::move(*other));
   }
@@ -183,21 +187,28 @@ double larger_px(const Refined& refined) {
   return rim_px > 0.0 ? sum_px / rim_px : 0.0;
 }
 
-// Where the body seems too small, what was outlined may be its face alone: a face in the light
-// beside a wall in the shade. A pose at which the body has its size, and for which about as much
-// speaks, is the better one, though the edges of its wall are seen less clearly.
-std::optional<Fitted> of_its_size(const Scenery& scenery, std::optional<Fitted> fitted) {
-  constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85;
-  if (!fitted || scenery.motion.rotation() < 0) return fitted;
-  const double seen_px = larger_px(fitted->refined);
-  if (seen_px > -kTooSmallPx) return fitted;
-  const double outline_px = fitted->refined.outline_px;
+// What was outlined may be the face alone, in the light beside a wall in the shade: the body seems
+// too small then, or the edges of its wall are missing. A pose for which clearly more speaks, or
+// about as much while the body has its size, is the better one, though the outer edges of the wall
+// are less clear than those of the face. Seen from aside, wall and face are too different for that.
+std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted> fitted) {
+  constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85, kBetter = 1.15;
+  constexpr double kFewEdges = 1.05, kLeastFacing = 0.75;
+  if (!fitted || scenery.motion.rotation() < 0 ||
+      facing(scenery.camera, fitted->refined.pose) < kLeastFacing)
+    return fitted;
+  const double seen_px = larger_px(fitted->refined), outline_px = fitted->refined.outline_px;
+  const bool too_small = seen_px < -kTooSmallPx;
+  if (!too_small && fitted->evidence > kFewEdges * outline_px) return fitted;
   std::optional<Fitted> best;
   for (const data::Pose<>& start :
        faces_outlined_like(scenery.body, scenery.camera, scenery.motion, fitted->refined.pose)) {
     auto other = fit_exactly(scenery, start, outline_px, fitted->blur_px);
-    if (other && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx &&
-        other->evidence > kAsGood * fitted->evidence && (!best || other->evidence > best->evidence))
+    if (!other) continue;
+    const bool right_size =
+        too_small && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx;
+    if (other->evidence > (right_size ? kAsGood : kBetter) * fitted->evidence &&
+        (!best || other->evidence > best->evidence))
       best = std::move(other);
   }
   return best ? best : fitted;
@@ -218,7 +229,7 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
   }
   if (!fitted || fitted->score < kSure)
     fitted = better(std::move(fitted), fit_from(scenery, scenery.blurred(kNearBlurPx), predicted));
-  return of_near_tilts(scenery, of_its_size(scenery, std::move(fitted)));
+  return of_near_tilts(scenery, with_its_wall(scenery, std::move(fitted)));
 }
 
 // From afar: each start is drawn towards edges, those that then lie on edges are fitted.

@@ -26,6 +26,8 @@ class PoseMotion {
   [[nodiscard]] int rotation() const { return rotation_; }
   /// The axis goes through a pivot.
   [[nodiscard]] bool pivoted() const { return support_.kind == data::SupportKind::pivot; }
+  /// That pivot.
+  [[nodiscard]] const Eigen::Vector3d& pivot_m() const { return *support_.pivot_m; }
   /// Standard deviation [m or rad] of what a parameter could be at most; keeps the fit regular
   /// where the picture says nothing.
   [[nodiscard]] double scale(int parameter) const;

@@ -235,28 +235,46 @@ data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
   return placed ? *placed : pose;
 }
 
+namespace {
+
+// A body whose axis through the pivot is turned, moved along it until its near face is seen where
+// its middle was.
+data::Pose<> turned_about(const Eigen::Vector3d& pivot_m, const Eigen::Vector3d& axis,
+                          const Eigen::Vector3d& towards, double half_thickness_m,
+                          data::Pose<> pose) {
+  const auto across = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+    return v - v.dot(towards) * towards;
+  };
+  const Eigen::Vector3d middle = across(pose.centre_m - pivot_m), along = across(axis);
+  const double face_m = middle.dot(along) / along.squaredNorm();
+  pose.centre_m = pivot_m + (face_m - half_thickness_m) * axis;
+  return pose;
+}
+
+}  // namespace
+
 std::vector<data::Pose<>> faces_outlined_like(const data::Body& body, const data::Camera& camera,
                                               const PoseMotion& motion, const data::Pose<>& pose) {
   const double h = body.half_thickness_m();
   const Eigen::Vector3d towards = direction_to(camera, pose.centre_m);
   const Eigen::Vector3d near = axis_towards(camera, pose);
-  // An ellipse with this minor axis over the major one is outlined.
   const double facing = near.dot(towards), tilted = std::sqrt(std::max(0.0, 1.0 - facing * facing));
-  const double share = std::min(1.0, facing + h / body.radius_m * tilted);
-  if (!(tilted > 0.0)) return {};
+  // The minor axis over the major one of the ellipse that is outlined.
+  const double share = facing + h / body.radius_m * tilted;
+  if (!(share < 1.0)) return {};
   const Eigen::Vector3d aside = (near - facing * towards) / tilted;
   std::vector<data::Pose<>> poses;
   for (const double way : {1.0, -1.0}) {
-    const Eigen::Vector3d axis = share * towards + way * std::sqrt(1.0 - share * share) * aside;
-    data::Pose<> other = pose;
-    set_axis(axis_of(pose).dot(near) > 0.0 ? axis : Eigen::Vector3d(-axis), other);
-    other.centre_m = pose.centre_m - h * axis;
+    const Eigen::Vector3d face = share * towards + way * std::sqrt(1.0 - share * share) * aside;
     if (motion.pivoted()) {
-      poses.push_back(motion.settled(other));
+      poses.push_back(motion.settled(turned_about(motion.pivot_m(), face, towards, h, pose)));
       break;
     }
+    data::Pose<> other = pose;
+    set_axis(axis_of(pose).dot(near) > 0.0 ? face : Eigen::Vector3d(-face), other);
+    const Eigen::Vector3d centre_m = pose.centre_m - h * face;
     if (const auto placed =
-            on_ray(camera, motion, other, camera.image_from_table<double>(other.centre_m)))
+            on_ray(camera, motion, other, camera.image_from_table<double>(centre_m)))
       poses.push_back(*placed);
   }
   return poses;
