@@ -211,7 +211,7 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
         (!best || other->evidence > best->evidence))
       best = std::move(other);
   }
-  return best ? best : fitted;
+  return best ? std::move(best) : std::move(fitted);
 }
 
 // A prediction is mostly right to the blur: looking from farther would only let shadows and the

@@ -238,15 +238,17 @@ data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
 namespace {
 
 // A body whose axis through the pivot is turned, moved along it until its near face is seen where
-// its middle was.
-data::Pose<> turned_about(const Eigen::Vector3d& pivot_m, const Eigen::Vector3d& axis,
-                          const Eigen::Vector3d& towards, double half_thickness_m,
-                          data::Pose<> pose) {
+// its middle was; nothing where that is on the other side of the pivot, as on a pin.
+std::optional<data::Pose<>> turned_about(const Eigen::Vector3d& pivot_m,
+                                         const Eigen::Vector3d& axis,
+                                         const Eigen::Vector3d& towards, double half_thickness_m,
+                                         data::Pose<> pose) {
   const auto across = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
     return v - v.dot(towards) * towards;
   };
   const Eigen::Vector3d middle = across(pose.centre_m - pivot_m), along = across(axis);
   const double face_m = middle.dot(along) / along.squaredNorm();
+  if (!(face_m > half_thickness_m)) return std::nullopt;
   pose.centre_m = pivot_m + (face_m - half_thickness_m) * axis;
   return pose;
 }
@@ -267,7 +269,8 @@ std::vector<data::Pose<>> faces_outlined_like(const data::Body& body, const data
   for (const double way : {1.0, -1.0}) {
     const Eigen::Vector3d face = share * towards + way * std::sqrt(1.0 - share * share) * aside;
     if (motion.pivoted()) {
-      poses.push_back(motion.settled(turned_about(motion.pivot_m(), face, towards, h, pose)));
+      if (const auto turned = turned_about(motion.pivot_m(), face, towards, h, pose))
+        poses.push_back(motion.settled(*turned));
       break;
     }
     data::Pose<> other = pose;
