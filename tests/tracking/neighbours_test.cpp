@@ -57,6 +57,22 @@ TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {
   EXPECT_TRUE(std::isinf(glimpses[30].seen->pose->sigma_phi_rad));
 }
 
+TEST_F(Neighbours, AStretchThatSatElsewhereIsFollowedBackFromWhereItEnds) {
+  const auto wrong = [](int i) { return i >= 15 && i < 40; };
+  const Oracle oracle([](int i) { return i % 3 == 0 ? -5.0 : 10.0; });
+  auto glimpses = tracked(oracle, wrong);
+  mend_from_one_side(background_, oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+}
+
+TEST_F(Neighbours, AStretchStaysForWhichNoLessSpeaks) {
+  const auto wrong = [](int i) { return i >= 15 && i < 40; };
+  const Oracle oracle([](int) { return -1.0; });
+  auto glimpses = tracked(oracle, wrong);
+  mend_from_one_side(background_, oracle, glimpses);
+  EXPECT_GE(count_wrong(glimpses), 25);
+}
+
 TEST_F(Neighbours, ABodyThatRocksOverItsFaceIsExpectedOnTheWayBetween) {
   // Tilt and precession do not change evenly there: the one turns round, the other leaps.
   const auto axis_at = [](double t_s) {

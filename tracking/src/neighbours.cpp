@@ -1,5 +1,7 @@
 #include "neighbours.hpp"
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -293,6 +295,132 @@ class Mending {
   double usual_ = 0.0;  ///< worth of a sighting
 };
 
+/// Value at time 0 of the parabola that fits values at these times best.
+template <class Value>
+Value led_to(const std::vector<double>& times, const std::vector<Value>& values) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  for (const double t : times) {
+    const Eigen::Vector3d row(1.0, t, t * t);
+    normal += row * row.transpose();
+  }
+  const Eigen::Vector3d first = normal.ldlt().solve(Eigen::Vector3d::UnitX());
+  Value sum = 0.0 * values[0];
+  for (std::size_t k = 0; k < times.size(); ++k)
+    sum += first.dot(Eigen::Vector3d(1.0, times[k], times[k] * times[k])) * values[k];
+  return sum;
+}
+
+/// Where the frames right after frame i (side 1) or right before it (side -1) lead; nothing if the
+/// body was not seen in all of them.
+std::optional<Sighting> led_to(const BodyFinder& finder, const std::vector<Glimpse>& glimpses,
+                               std::size_t i, int side) {
+  constexpr int kFrames = 5;
+  std::vector<double> steps;
+  std::vector<Eigen::Vector3d> centres, axes;
+  const Glimpse* nearest = nullptr;
+  for (int step = 1; step <= kFrames; ++step) {
+    const auto k = static_cast<std::ptrdiff_t>(i) + side * step;
+    if (k < 0 || k >= std::ssize(glimpses)) return std::nullopt;
+    const Glimpse& g = glimpses[static_cast<std::size_t>(k)];
+    if (!g.posed()) return std::nullopt;
+    if (nearest == nullptr) nearest = &g;
+    steps.push_back((g.frame->t_s - glimpses[i].frame->t_s) /
+                    std::abs(nearest->frame->t_s - glimpses[i].frame->t_s));
+    centres.push_back(g.pose().centre_m);
+    axes.push_back(axis_of(g.pose()));
+    if (finder.faces_look_alike() && axes.back().dot(axes.front()) < 0.0) axes.back() *= -1.0;
+  }
+  Sighting expected = *nearest->seen;
+  expected.pose->pose.centre_m = led_to(steps, centres);
+  set_axis(led_to(steps, axes).normalized(), expected.pose->pose);
+  finder.place(expected);
+  return expected;
+}
+
+/// Follows the body from one side into frames in which it was seen elsewhere, and keeps what it
+/// finds as far as more speaks for that, taken together.
+class Branch {
+ public:
+  Branch(const Background& background, const BodyFinder& finder, std::vector<Glimpse>& glimpses,
+         int side)
+      : measure_(background, finder),
+        finder_(finder),
+        glimpses_(glimpses),
+        as_led_(glimpses),
+        side_(side) {
+    std::vector<double> usual;
+    for (std::size_t i = 0; i < glimpses.size(); ++i)
+      if (const auto off = leaves(i)) usual.push_back(off->second);
+    // What a parabola through five noisy poses misses by as a rule is no break.
+    constexpr double kLeast_rad = 0.1, kOfUsual = 3.0;
+    apart_rad_ = std::max(kLeast_rad, usual.empty() ? 0.0 : kOfUsual * data::median(usual));
+  }
+
+  void run() {
+    const std::size_t n = glimpses_.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t i = side_ > 0 ? n - 1 - k : k;
+      if (!goes_on(i)) close();
+    }
+    close();
+  }
+
+ private:
+  /// Where the frames on its side put the body of frame i, and how far that is from what was seen.
+  [[nodiscard]] std::optional<std::pair<Sighting, double>> leaves(std::size_t i) const {
+    if (!glimpses_[i].posed()) return std::nullopt;
+    auto expected = led_to(finder_, as_led_, i, side_);
+    if (!expected) return std::nullopt;
+    const double off = off_rad(*glimpses_[i].seen, *expected, finder_.faces_look_alike());
+    return std::pair{std::move(*expected), off};
+  }
+
+  /// False where both are one again, or nothing is found, or too little speaks for it.
+  [[nodiscard]] bool goes_on(std::size_t i) {
+    // One frame's evidence scatters by a tenth or two: a stretch is given up at half of what it
+    // had.
+    constexpr double kGiveUp = 0.7, kOne = 0.5;
+    const auto expected = leaves(i);
+    if (!expected || expected->second < (led_.empty() ? 1.0 : kOne) * apart_rad_) return false;
+    const Glimpse& next = as_led_[i + static_cast<std::size_t>(side_)];
+    auto seen = measure_(*glimpses_[i].frame, expected->first, next.pose());
+    if (!seen || !seen->pose ||
+        off_rad(*seen, expected->first, finder_.faces_look_alike()) > 0.5 * expected->second)
+      return false;
+    seen->turned_rad = glimpses_[i].seen->turned_rad;
+    // Not how plainly: the rim of a face in the light is plainer than that of a wall in the shade.
+    constexpr double kLeast = 1e-9;
+    gain_ += std::log(std::max(kLeast, seen->pose->evidence) /
+                      std::max(kLeast, glimpses_[i].seen->pose->evidence));
+    as_led_[i].seen = std::move(seen);
+    led_.push_back(i);
+    if (gain_ > best_) best_ = gain_, kept_ = led_.size();
+    return gain_ > best_ - kGiveUp;
+  }
+
+  void close() {
+    constexpr double kClearly = 0.1;  // as for a frame that its neighbours mend
+    const std::size_t kept = best_ > kClearly ? kept_ : 0;
+    for (std::size_t k = 0; k < led_.size(); ++k) {
+      auto &was = glimpses_[led_[k]].seen, &now = as_led_[led_[k]].seen;
+      (k < kept ? was : now) = k < kept ? now : was;
+    }
+    led_.clear();
+    gain_ = best_ = 0.0;
+    kept_ = 0;
+  }
+
+  Measuring measure_;
+  const BodyFinder& finder_;
+  std::vector<Glimpse>& glimpses_;
+  std::vector<Glimpse> as_led_;  ///< with the branch in place of what was seen
+  int side_;
+  double apart_rad_ = 0.0;
+  std::vector<std::size_t> led_;  ///< frames of the branch
+  double gain_ = 0.0, best_ = 0.0;
+  std::size_t kept_ = 0;  ///< frames of the branch up to the best
+};
+
 /// What the frames around still contradict may be where they say instead: its covariance holds
 /// both.
 void doubt(const Expected& expected, Sighting& seen) {
@@ -330,6 +458,11 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
            mended[i] && k < std::min(was.size(), i + kReach + 1); ++k)
         open[k] = 1;
   }
+}
+
+void mend_from_one_side(const Background& background, const BodyFinder& finder,
+                        std::vector<Glimpse>& glimpses) {
+  for (const int side : {1, -1}) Branch(background, finder, glimpses, side).run();
 }
 
 void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,

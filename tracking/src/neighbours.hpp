@@ -11,6 +11,12 @@ namespace trochoid::tracking {
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
                           std::vector<Glimpse>& glimpses);
 
+/// Follows the body back from where the path breaks, and on from there: for a stretch of frames the
+/// fit may have sat on another edge of the body, its face for the whole of it, and those beyond
+/// know better. What is found so replaces what was seen as far as clearly more speaks for it.
+void mend_from_one_side(const Background& background, const BodyFinder& finder,
+                        std::vector<Glimpse>& glimpses);
+
 /// Measures frames again from where they are, and more closely, with what the frames around them
 /// know: how the body moves during the exposure, the light beside its outline and how sharp the
 /// picture is. While it was followed only the past was known. At a gap or an end the one neighbour
