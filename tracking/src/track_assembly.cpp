@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "path_scatter.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -169,6 +170,9 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     if (sample.psi) sample.psi->value_rad = psi(sample.psi->value_rad, sample.t_s);
     track.samples.push_back(std::move(sample));
   }
+  // What one picture says of its errors, the path may contradict.
+  const std::vector<double> scatter = unclaimed_scatter(track);
+  for (std::size_t i = 0; i < scatter.size(); ++i) track.samples[i].covariance_m2 *= scatter[i];
   return track;
 }
 
