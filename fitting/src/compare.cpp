@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
+#include <optional>
 #include <tuple>
 
 #include "adequacy.hpp"
@@ -19,6 +22,9 @@
 
 namespace trochoid::fitting {
 namespace {
+
+constexpr std::size_t kMostTerms = 3;
+constexpr double kNoFriction = 1e-3;  // a hundredth of what the slipperiest floors have
 
 const Rung* least_bic(const std::vector<Rung>& rungs) {
   const Rung* best = nullptr;
@@ -47,9 +53,15 @@ const Rung* simplest_sufficient(const Ladder& ladder, const std::vector<Rung>& r
 }
 
 std::string name_of(const Ladder& ladder, const std::set<int>& terms) {
-  std::string name = ladder.law;
-  for (const int term : terms) name += " + " + ladder.terms[static_cast<std::size_t>(term)].name;
-  return name;
+  std::string name = ladder.law, added;
+  for (const int index : terms) {
+    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    if (term.smooth)
+      name = "smooth floor";
+    else
+      added += " + " + term.name;
+  }
+  return name + added;
 }
 
 // Whether [fit] may call one of these parameters so; a group's name covers its components.
@@ -91,12 +103,11 @@ Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
   return rung;
 }
 
-Rung frictionless_rung(const Ladder& ladder) {
-  Rung rung;
-  rung.name = "smooth floor";
-  rung.scene = *ladder.frictionless;
-  keep_own(rung.scene);
-  return rung;
+// Index of the term that is a floor without friction, if the ladder has it.
+std::optional<int> smooth_term(const Ladder& ladder) {
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index)
+    if (ladder.terms[static_cast<std::size_t>(index)].smooth) return index;
+  return std::nullopt;
 }
 
 // For one of several rungs that are fitted side by side; what is said of it names it.
@@ -123,7 +134,7 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
     const Term& term = ladder.terms[static_cast<std::size_t>(index)];
     std::set<int> terms = rungs[current].terms;
-    if (term.last_resort != last_resort || !terms.insert(index).second) continue;
+    if (term.last_resort != last_resort || term.smooth || !terms.insert(index).second) continue;
     rungs.push_back(rung_with(ladder, terms));
     added.push_back(&term);
   }
@@ -146,10 +157,19 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
   bool resort = false;
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
     const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    if (term.smooth) continue;
     resort = resort || term.last_resort;
     if (term.last_resort || term.usual) terms.insert(index);
   }
   return resort ? terms : std::set<int>{};
+}
+
+// The same but the last resort.
+std::set<int> usual_losses(const Ladder& ladder) {
+  std::set<int> terms;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index)
+    if (ladder.terms[static_cast<std::size_t>(index)].usual) terms.insert(index);
+  return terms;
 }
 
 // Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
@@ -194,25 +214,6 @@ std::vector<std::set<int>> with_one_more(const Ladder& ladder, const std::set<in
   return sets;
 }
 
-// Everything but the last resort was added before it was known what that explains: terms the data
-// do not need any more are left out again, one at a time, as long as that costs no strong evidence.
-void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
-               std::size_t current, std::vector<Rung>& rungs) {
-  while (rungs[current].fitted && rungs[current].fit.converged) {
-    const std::size_t first = rungs.size();
-    const std::set<int> terms = rungs[current].terms;
-    add_neighbours(ladder, tracks, options, with_one_less(ladder, terms, terms), current, rungs);
-    std::size_t best = current;
-    for (std::size_t i = first; i < rungs.size(); ++i)
-      if (rungs[i].fitted && rungs[i].fit.converged &&
-          rungs[i].bic < rungs[current].bic + kStrong &&
-          (best == current || rungs[i].bic < rungs[best].bic))
-        best = i;
-    if (best == current) return;
-    current = best;
-  }
-}
-
 // Whether a fitted rung's losses that a smaller one lacks may be zero, by their error bars.
 bool may_do_without(const Rung& rung, const Rung& smaller) {
   constexpr double kSurely = 4.0;  // sigmas, which curvature may misjudge
@@ -224,6 +225,30 @@ bool may_do_without(const Rung& rung, const Rung& smaller) {
     const data::FitParameter* loss = rung.fit.find(name);
     return loss != nullptr && std::abs(loss->value) < kSurely * loss->sigma;
   });
+}
+
+// Everything but the last resort was added before it was known what that explains: terms the data
+// do not need any more are left out again, one at a time, as long as that costs no strong evidence;
+// those whose error bars say that it would are not tried.
+void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
+               std::size_t current, std::vector<Rung>& rungs) {
+  while (rungs[current].fitted && rungs[current].fit.converged) {
+    const std::size_t first = rungs.size();
+    const std::set<int> terms = rungs[current].terms;
+    std::vector<std::set<int>> smaller = with_one_less(ladder, terms, terms);
+    std::erase_if(smaller, [&](const std::set<int>& fewer) {
+      return !may_do_without(rungs[current], rung_with(ladder, fewer));
+    });
+    add_neighbours(ladder, tracks, options, smaller, current, rungs);
+    std::size_t best = current;
+    for (std::size_t i = first; i < rungs.size(); ++i)
+      if (rungs[i].fitted && rungs[i].fit.converged &&
+          rungs[i].bic < rungs[current].bic + kStrong &&
+          (best == current || rungs[i].bic < rungs[best].bic))
+        best = i;
+    if (best == current) return;
+    current = best;
+  }
 }
 
 // Terms are added one at a time, by what is gained at once, and those of a last resort all
@@ -243,23 +268,89 @@ void exchange_terms(const Ladder& ladder, std::span<const data::Track> tracks,
   add_neighbours(ladder, tracks, options, exchanged, current, rungs);
 }
 
-// The plainest model and, one more term at a time, all extensions of the best so far.
-std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
-                        const FitOptions& options) {
-  constexpr std::size_t kMostTerms = 3;
-  std::vector<Rung> rungs;
-  // References to rungs stay valid while more are added.
-  const std::size_t terms = ladder.terms.size();
-  rungs.reserve(3 + (kMostTerms + 1) * terms + terms * (terms + 1) / 2);
-  rungs.push_back(rung_with(ladder, {}));
-  fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
-  std::size_t current = 0;
+// A friction that may be nothing is none: the same losses on a smooth floor, and fewer of them,
+// beside a rung that slides.
+void let_go_of_friction(const Ladder& ladder, std::span<const data::Track> tracks,
+                        const FitOptions& options, std::vector<Rung>& rungs) {
+  constexpr double kSurely = 4.0;  // sigmas
+  const std::optional<int> smooth = smooth_term(ladder);
+  const Rung* best = simplest_sufficient(ladder, rungs);
+  if (!smooth || best == nullptr || !best->fit.converged || best->fit.model != "sliding") return;
+  const data::FitParameter* friction = best->fit.find("friction");
+  if (friction == nullptr || friction->value > kSurely * friction->sigma + kNoFriction) return;
+  std::set<int> terms = best->terms;
+  std::erase_if(
+      terms, [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].last_resort; });
+  terms.insert(*smooth);
+  add_neighbours(ladder, tracks, options, {terms}, static_cast<std::size_t>(best - rungs.data()),
+                 rungs);
+  const auto added = std::find_if(rungs.begin(), rungs.end(),
+                                  [&](const Rung& rung) { return rung.terms == terms; });
+  step_down(ladder, tracks, options, static_cast<std::size_t>(added - rungs.begin()), rungs);
+}
+
+// One more term at a time, from rungs[current] on, while each is worth it. @returns the last one's
+// index.
+std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Track> tracks,
+                                const FitOptions& options, std::size_t current,
+                                std::vector<Rung>& rungs) {
   for (std::size_t size = 1; size <= std::min(kMostTerms, ladder.terms.size()); ++size) {
     const std::size_t best = step_up(ladder, tracks, options, false, current, rungs);
     const bool worth = best != current && rungs[best].bic < rungs[current].bic - kStrong;
     if (!worth) break;
     current = best;
   }
+  return current;
+}
+
+// Where the plainest model explains nothing its solution leads nowhere, and neither does that of
+// one with a single loss if several act: all usual losses together, then fewer of them. Where that
+// explains a first part of the track alone, another loss acts as well, or the body slides from
+// there on. @returns whether one of these explains the track.
+bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
+                const FitOptions& options, const std::function<bool(std::size_t)>& explains,
+                std::vector<Rung>& rungs) {
+  const std::set<int> usual = usual_losses(ladder);
+  if (usual.empty()) return false;
+  const std::size_t all = rungs.size();
+  rungs.push_back(rung_with(ladder, usual));
+  fit_rung(tracks, nullptr, nullptr, options_for(rungs[all], options), rungs[all]);
+  if (explains(all)) {
+    step_down(ladder, tracks, options, all, rungs);
+    return true;
+  }
+  const std::map<std::string, double> first_part = rungs[all].first_part;
+  if (first_part.empty()) return false;
+  std::vector<std::set<int>> sets = with_one_more(ladder, usual);
+  sets.push_back(all_that_usually_acts(ladder, {}));
+  std::vector<Rung> tried;
+  for (const std::set<int>& terms : sets) tried.push_back(rung_with(ladder, terms));
+  FitOptions one = options;
+  one.threads = 1;
+  in_parallel(static_cast<int>(tried.size()), options.threads, [&](int i) {
+    Rung& rung = tried[static_cast<std::size_t>(i)];
+    fit_from_first_part(tracks, first_part, options_for(rung, one), rung);
+  });
+  const Rung* best = least_bic(tried);
+  if (best == nullptr) return false;
+  rungs.push_back(*best);  // of the others a search of their own may make more
+  if (explains(rungs.size() - 1)) {
+    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+    return true;
+  }
+  rungs.pop_back();
+  return false;
+}
+
+// The plainest model and, one more term at a time, all extensions of the best so far.
+std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
+                        const FitOptions& options) {
+  std::vector<Rung> rungs;
+  // References to rungs stay valid while more are added.
+  const std::size_t terms = ladder.terms.size();
+  rungs.reserve(4 + (3 * kMostTerms + 3) * terms + (kMostTerms + 1) * terms * (terms + 1));
+  rungs.push_back(rung_with(ladder, {}));
+  fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   // Residuals that hang together but hardly exceed the track's own noise are the tracker's.
   constexpr double kTrackersOwn = 1.3;
   const auto explains = [&](std::size_t i) {
@@ -267,11 +358,16 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
     return rungs[i].fitted && verdict != "doubtful" && verdict != "unexplained" &&
            (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= kTrackersOwn);
   };
+  if (!explains(0) && climb_down(ladder, tracks, options, explains, rungs)) return rungs;
+  const std::size_t current = step_up_while_worth(ladder, tracks, options, 0, rungs);
   if (explains(current)) return rungs;
-  if (ladder.frictionless) {
-    rungs.push_back(frictionless_rung(ladder));
+  if (const std::optional<int> none = smooth_term(ladder)) {
+    std::size_t smooth = rungs.size();
+    rungs.push_back(rung_with(ladder, {*none}));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
-    if (rungs.back().fit.converged && explains(rungs.size() - 1)) return rungs;
+    if (rungs[smooth].fitted && rungs[smooth].bic < rungs[current].bic)
+      smooth = step_up_while_worth(ladder, tracks, options, smooth, rungs);
+    if (rungs[smooth].fit.converged && explains(smooth)) return rungs;
   }
   // Where nothing leads anywhere, the last resort alone does not either.
   if (rungs[current].fit.converged) {
@@ -294,7 +390,6 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
 
 std::set<std::string> parameters_of_any(const Ladder& ladder) {
   std::set<std::string> names = parameters_of(ladder.plain);
-  if (ladder.frictionless) names.merge(parameters_of(*ladder.frictionless));
   for (int term = 0; term < static_cast<int>(ladder.terms.size()); ++term)
     names.merge(parameters_of(rung_with(ladder, {term}).scene));
   return names;
@@ -347,8 +442,14 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   plain.bootstrap = 0;
   plain.model.clear();
   std::vector<Rung> rungs = climb(ladder, tracks, plain);
+  let_go_of_friction(ladder, tracks, plain, rungs);
   const Rung* chosen = simplest_sufficient(ladder, rungs);
-  if (chosen != nullptr && chosen->fit.converged) {
+  // A term found that way asks for the others anew.
+  const Rung* before = nullptr;
+  for (std::size_t round = 0;
+       round < kMostTerms && chosen != before && chosen != nullptr && chosen->fit.converged;
+       ++round) {
+    before = chosen;
     exchange_terms(ladder, tracks, plain, static_cast<std::size_t>(chosen - rungs.data()), rungs);
     chosen = simplest_sufficient(ladder, rungs);
   }

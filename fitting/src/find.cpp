@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "first_guess.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/parallel.hpp"
 
@@ -181,6 +183,130 @@ Found search_path(const Problem& problem, const Quest& quest) {
   return best;
 }
 
+// How many samples a rolling body's values explain, from the first one on.
+int explained_samples(const Problem& problem) {
+  constexpr double kLonger = 1.1;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  int explained = 0;
+  for (int window = std::min(24, all);;
+       window = std::min(static_cast<int>(kLonger * window), all)) {
+    const Problem part = windowed(problem, window);
+    Eigen::VectorXd residuals;
+    if (!evaluate(part, 0, part.start(), residuals, nullptr) ||
+        residuals.squaredNorm() > chi2_gate(part.rows()) * part.rows())
+      return explained;
+    explained = window;
+    if (window == all) return explained;
+  }
+}
+
+// Coefficients of friction in the order of what they leave unexplained of a problem: where its body
+// rolls to the end, or slides from another instant on, derivatives do not lead to the right one.
+std::vector<double> frictions_by_misfit(const Problem& part) {
+  constexpr double kLeast = 0.02, kMost = 0.9, kStep = 1.25;
+  std::vector<std::pair<double, double>> scored;
+  const auto try_friction = [&](double friction) {
+    Problem at = part;
+    apply({"", {{"friction", friction}}}, at);
+    Eigen::VectorXd residuals;
+    if (evaluate(at, 0, at.start(), residuals, nullptr))
+      scored.emplace_back(residuals.squaredNorm(), friction);
+    std::sort(scored.begin(), scored.end());
+  };
+  for (double friction = kLeast; friction < kMost; friction *= kStep) try_friction(friction);
+  // A few per cent of friction decide at which turn a body first slides.
+  for (const double finer : {0.12, 0.06, 0.03, 0.015, 0.007}) {
+    if (scored.empty()) break;
+    const double friction = scored.front().second;
+    try_friction(friction * (1.0 - finer));
+    try_friction(friction * (1.0 + finer));
+  }
+  std::vector<double> frictions;
+  for (const auto& [chi2, friction] : scored) frictions.push_back(friction);
+  return frictions;
+}
+
+// Follows a body that rolls for `window` samples on into sliding, first to a little more than the
+// sample `beyond`: windows grow by a few samples, and where the path is lost the friction is looked
+// for anew.
+Found grow_into_sliding(const Problem& problem, const Start& start, int window, int beyond) {
+  constexpr int kLeastStep = 3, kMostLosses = 12;
+  constexpr double kFollowed = 2.0, kWellBeyond = 1.1;  // of the gate; of the samples that roll
+  constexpr double kFaster = 1.5, kNear = 10.0,
+                   kApart = 0.04;  // of the step; of the gate; of friction
+  constexpr std::size_t kTried = 2;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  Problem current = problem;
+  apply(start, current);
+  int step = beyond - window + std::max(2 * kLeastStep, beyond / 25);
+  bool slides = false;
+  for (int losses = 0; window < all && losses < kMostLosses && !exhausted(problem, {});) {
+    const int next = std::min(window + step, all);
+    Problem part = windowed(current, next);
+    const auto reduced = [&](const Solution& s) {
+      return s.usable ? s.chi2 / std::max(1, part.rows() - static_cast<int>(part.free.size()))
+                      : std::numeric_limits<double>::infinity();
+    };
+    const SolveOptions options{.iterations = 25, .function_tolerance = 1e-3};
+    // The first slips settle the friction; later ones are followed over their ripples.
+    const double most = (next > kWellBeyond * beyond ? kFollowed : 1.0) * chi2_gate(part.rows());
+    Solution best;
+    if (slides) best = seek(part, part.start(), options);
+    if (reduced(best) > most) {
+      std::vector<double> tried;
+      for (const double friction : frictions_by_misfit(part)) {
+        if (tried.size() == kTried) break;
+        if (std::any_of(tried.begin(), tried.end(),
+                        [&](double other) { return std::abs(friction - other) < kApart * other; }))
+          continue;
+        tried.push_back(friction);
+        Problem trial = part;
+        apply({"", {{"friction", friction}}}, trial);
+        Solution found = seek(trial, trial.start(), options);
+        if (reduced(found) < reduced(best)) best = std::move(found);
+      }
+    }
+    // Short slips that come and go with every parameter make ripples.
+    if (reduced(best) > most && reduced(best) < kNear * most)
+      best = hop(part, judged(part, std::move(best), start.path), 2).solution;
+    if (reduced(best) > most) {
+      if (step <= kLeastStep) return {};
+      step = std::max(kLeastStep, step / 2);
+      ++losses;
+      continue;
+    }
+    part.set_base(best.u);
+    current.base = part.base;
+    step = slides ? static_cast<int>(kFaster * step) : std::max(2 * kLeastStep, beyond / 25);
+    window = next;
+    slides = true;
+  }
+  return window < all ? Found{} : judged(current, solve_to_the_end(current), start.path);
+}
+
+// From a given start that rolls, for a while.
+Found rolls_first(const Problem& problem, const Quest& quest) {
+  if (quest.relatives.empty()) return {};
+  Problem rolling = eased(problem, *quest.relatives.front().model);
+  apply({"rolls_first", quest.options->start}, rolling);
+  const int window = explained_samples(rolling);
+  // The first slips bend the rolling body's values before they make them fail.
+  for (const double share : {1.0, 0.85, 0.7, 0.55}) {
+    const int before = static_cast<int>(share * window);
+    constexpr int kFewest = 16;
+    if (before < kFewest) break;
+    Problem part = windowed(rolling, before);
+    const Solution solution =
+        seek(part, part.start(), {.iterations = 20, .function_tolerance = 1e-3});
+    if (!solution.usable) continue;
+    part.set_base(solution.u);
+    rolling.base = part.base;
+    Found found = grow_into_sliding(problem, start_from(rolling, "rolls_first"), before, window);
+    if (found.solution.usable) return look_about(problem, std::move(found));
+  }
+  return {};
+}
+
 // Where nothing passed, losses that start weaker or stronger may lead elsewhere: a top's nutation
 // is lost with its phase. Only where a search takes milliseconds.
 Found with_other_losses(const Problem& problem, const Quest& quest, Found best) {
@@ -219,6 +345,7 @@ Found find_arc(Problem problem, const Quest& quest) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   if (options.strategy == "single") return grow(problem, given, all);
   if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
+  if (options.strategy == kRollsFirst) return rolls_first(problem, quest);
   if (options.strategy == "integral") return from_best_start(problem, quest.starter);
   if (options.strategy == "multiple") return shoot_top(problem, given);
   if (options.strategy != "auto")

@@ -18,7 +18,13 @@ void check_first_guess(const std::map<std::string, double>& guess, const std::st
 
 /// fit() for one of several models that share a first guess: of what is not this model's the guess
 /// is silently ignored.
+/// @param first_part  null, or receives the values that explain the longest first part of a single
+///                    arc that the search came across, if more than a fifth.
 [[nodiscard]] data::Fit fit_one_of_several(std::span<const data::Track> tracks,
-                                           const data::Scene& scene, const FitOptions& options);
+                                           const data::Scene& scene, const FitOptions& options,
+                                           std::map<std::string, double>* first_part = nullptr);
+
+/// Strategy of a sliding model whose given start is that of a body that rolls at first.
+inline constexpr const char* kRollsFirst = "rolls_first";
 
 }  // namespace trochoid::fitting

@@ -257,9 +257,11 @@ void give_friction_a_start(data::Scene& scene) {
   if (needed && !scene.model.friction) scene.model.friction = kTypical;
 }
 
+using FirstPart = std::map<std::string, double>;
+
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
                    const std::vector<Relative>& relatives, const data::Scene& given_scene,
-                   const FitOptions& options) {
+                   const FitOptions& options, FirstPart* first_part = nullptr) {
   if (tracks.empty()) throw TrackError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
@@ -273,10 +275,19 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   Stages stages(options);
   if (stages.wanted()) problem.log = [&](const std::string& words) { stages.line(words); };
   stages.enter("looking for the path");
+  if (first_part != nullptr && problem.arcs.size() == 1)
+    problem.partial = std::make_shared<Partial>();
   const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
   const Found found = search_without_outliers(
       problem, {starter_for(predictor, scene), &options, start_given, relatives});
   fit.start_path = found.path;
+  // Any start explains a few samples.
+  constexpr double kWorthwhile = 0.2;
+  if (problem.partial &&
+      problem.partial->samples > kWorthwhile * static_cast<double>(problem.arcs[0].t_s.size()))
+    for (std::size_t i = 0; i < predictor.parameters().size(); ++i)
+      (*first_part)[predictor.parameters()[i].name] =
+          problem.partial->values[static_cast<Eigen::Index>(i)];
   if (!found.solution.usable) return refuse(problem, problem.shortfalls->words(), fit);
 
   stages.enter("weighing the samples");
@@ -331,14 +342,15 @@ void check_given_start(const FitOptions& options, const model::Predictor& predic
 }
 
 data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predictor& predictor,
-                        const data::Scene& scene, const FitOptions& options) {
+                        const data::Scene& scene, const FitOptions& options,
+                        FirstPart* first_part = nullptr) {
   const auto relatives = relatives_of(scene);
   std::vector<Relative> plain;
   for (const OwnedRelative& owned : relatives) {
     plain.push_back({owned.model.get(), {}});
     for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
   }
-  data::Fit fit = fit_with(tracks, predictor, plain, scene, options);
+  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, first_part);
   tell_idle_terms(scene, fit);
   return fit;
 }
@@ -373,9 +385,9 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
-                             const FitOptions& options) {
+                             const FitOptions& options, FirstPart* first_part) {
   const data::Scene scene = completed(given, options);
-  return fit_completed(tracks, *model::make_predictor(scene), scene, options);
+  return fit_completed(tracks, *model::make_predictor(scene), scene, options, first_part);
 }
 
 }  // namespace trochoid::fitting

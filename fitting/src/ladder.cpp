@@ -50,11 +50,13 @@ void add_floor_terms(const Scene& scene, Ladder& ladder) {
     ladder.terms.back().usual = true;
     ladder.terms.push_back(air_couple("quadratic air couple", &ModelSettings::air_quadratic_N_m_s2,
                                       scene, kTypical * unit_N_m_s / rate_rad_s));
+    ladder.terms.push_back(single("air force", &ModelSettings::air_force_N_s_m, scene,
+                                  kTypical * inertia.mass_kg * rate_rad_s));
     constexpr double kAir_Pa_s = 1.8e-5;
     ladder.terms.push_back(
         single("gap layer", &ModelSettings::gap_viscosity_Pa_s, scene, kAir_Pa_s));
   } else {
-    ladder.left_out.push_back("air couples and the gap layer (need body.mass_kg)");
+    ladder.left_out.push_back("air couples, air force and the gap layer (need body.mass_kg)");
   }
   const auto friction = [&](const char* name, std::optional<double> ModelSettings::*field) {
     ladder.terms.push_back(single(name, field, scene, kTypical * R));
@@ -73,6 +75,9 @@ void add_floor_terms(const Scene& scene, Ladder& ladder) {
   };
   sliding.last_resort = true;
   ladder.terms.push_back(std::move(sliding));
+  Term smooth{"no friction", [](Scene& s) { s.model.name = "smooth"; }, {}};
+  smooth.last_resort = smooth.smooth = true;
+  ladder.terms.push_back(std::move(smooth));
 }
 
 void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
@@ -111,8 +116,6 @@ Ladder ladder_of(const Scene& scene) {
   ladder.plain.model = without_losses(scene.model, ladder.law);
   if (ladder.law == "rolling") {
     add_floor_terms(scene, ladder);
-    ladder.frictionless = scene;
-    ladder.frictionless->model = without_losses(scene.model, "smooth");
   } else if (ladder.law == "puck") {
     ladder.plain.model.friction = scene.model.friction.value_or(0.2);
     if (scene.body->mass_kg)

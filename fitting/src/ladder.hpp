@@ -17,6 +17,8 @@ struct Term {
   bool last_resort = false;  ///< costly: tried only where nothing else explains the track
   /// Acts on nearly every body: tried with the last resort where that fails, and preferred.
   bool usual = false;
+  /// A floor without any friction instead of the law: no rolling at all. A last resort of its own.
+  bool smooth = false;
 };
 
 /// A scene's possible models: the plainest one and the terms it may take on.
@@ -24,8 +26,6 @@ struct Ladder {
   std::string law;  ///< name of the plainest model
   data::Scene plain;
   std::vector<Term> terms;
-  /// For bodies on a floor: one without any friction, no rolling at all.
-  std::optional<data::Scene> frictionless;
   std::vector<std::string> left_out;  ///< why a term that belongs here is not tried
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "rung.hpp"
@@ -12,6 +13,7 @@ namespace {
 struct Rival {
   const Rung* rung = nullptr;
   double weight = 0.0;  // by AICc, of all that are not ruled out together 1
+  bool larger = false;  // has further terms beside all of the chosen rung's
 };
 
 // Of the same law, and not ruled out.
@@ -21,13 +23,19 @@ bool in_question(const Rung& rung, const Rung& chosen) {
          rung.bic <= chosen.bic + kVeryStrong;
 }
 
-// The chosen rung's own weight is not listed.
+// The chosen rung's own weight is not listed. One with further terms is a rival where BIC says
+// hardly anything against it: it was left out for being larger, not for being wrong. Not so where
+// residuals hang together: a further term may then only follow the tracker's errors.
 std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen) {
+  constexpr double kBareMention = 2.0;  // of BIC (Kass and Raftery)
+  const double most = chosen.fit.whiteness_p < kWhite ? -std::numeric_limits<double>::infinity()
+                                                      : chosen.bic + kBareMention;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
-    if (!in_question(rung, chosen) || has_all_terms_of(rung, chosen)) continue;
-    rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc))});
+    const bool larger = has_all_terms_of(rung, chosen);
+    if (!in_question(rung, chosen) || (larger && rung.bic > most)) continue;
+    rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc)), larger});
     all += rivals.back().weight;
   }
   for (Rival& rival : rivals) rival.weight /= all;
@@ -41,17 +49,32 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
   return here.unit == "rad" ? std::remainder(change, 2.0 * std::numbers::pi) : change;
 }
 
-void widen(const Rival& rival, data::Fit& fit) {
+// Variance of a parameter in a rung with further terms beyond that in the chosen one, which does
+// not allow for those terms.
+double further_variance(const Rival& rival, const std::string& name, const data::Fit& chosen) {
+  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(name) : nullptr;
+  if (there == nullptr || !std::isfinite(there->sigma)) return 0.0;
+  const double here = chosen.find(name)->sigma;
+  return std::max(0.0, there->sigma * there->sigma - here * here);
+}
+
+void widen(const Rival& rival, const data::Fit& chosen, data::Fit& fit) {
   Eigen::VectorXd shift(fit.covariance.rows());
   for (Eigen::Index i = 0; i < shift.size(); ++i) {
     const std::string& name = fit.covariance_names[static_cast<std::size_t>(i)];
     shift[i] = shift_of(*fit.find(name), rival.rung->fit);
   }
   fit.covariance += rival.weight * shift * shift.transpose();
-  const double share = std::sqrt(rival.weight);
+  for (Eigen::Index i = 0; i < shift.size(); ++i)
+    fit.covariance(i, i) +=
+        rival.weight *
+        further_variance(rival, fit.covariance_names[static_cast<std::size_t>(i)], chosen);
   for (data::FitParameter& parameter : fit.parameters)
     if (parameter.status != data::ParameterStatus::fixed)
-      parameter.sigma = std::hypot(parameter.sigma, share * shift_of(parameter, rival.rung->fit));
+      parameter.sigma =
+          std::sqrt(std::pow(parameter.sigma, 2) +
+                    rival.weight * (std::pow(shift_of(parameter, rival.rung->fit), 2) +
+                                    further_variance(rival, parameter.name, chosen)));
 }
 
 void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::FitParameter>& before,
@@ -112,7 +135,8 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
   const std::vector<data::FitParameter> before = fit.parameters;
   const std::vector<Rival> rivals = rivals_of(rungs, chosen);
-  for (const Rival& rival : rivals) widen(rival, fit);
+  const data::Fit chosen_fit = fit;
+  for (const Rival& rival : rivals) widen(rival, chosen_fit, fit);
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);
 }

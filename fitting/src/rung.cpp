@@ -215,13 +215,37 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
       else
-        keep_better(fit_one_of_several(tracks, rung.scene, own), rung);
+        keep_better(fit_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
     }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   } catch (const NumericalError& error) {
     rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
+    rung.reason = error.what();
+  }
+  conclude(rung);
+}
+
+void fit_from_first_part(std::span<const data::Track> tracks,
+                         const std::map<std::string, double>& first_part, const FitOptions& options,
+                         Rung& rung) {
+  FitOptions own = options;
+  own.start = first_part;
+  own.strategy = rung.scene.model.name == "sliding" ? kRollsFirst : "growing";
+  try {
+    rung.fit = fit_one_of_several(tracks, rung.scene, own);
+    if (usable(rung.fit) && rung.fit.converged && rung.fit.whiteness_p < kWhite &&
+        softness_is_open(rung)) {
+      own.start = values_of(rung.fit);
+      own.strategy = "single";
+      fit_softly(tracks, own, rung);
+    }
+    rung.fitted = usable(rung.fit);
+    if (rung.fitted && rung.fit.converged)
+      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
+  } catch (const NumericalError& error) {
+    rung.fitted = usable(rung.fit);
     rung.reason = error.what();
   }
   conclude(rung);

@@ -28,6 +28,8 @@ struct Rung {
   std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
+  /// What explains the longest first part of the track that a search for it came across.
+  std::map<std::string, double> first_part;
   double aicc = std::numeric_limits<double>::infinity();
   double bic = std::numeric_limits<double>::infinity();
 };
@@ -43,8 +45,10 @@ struct Rung {
 
 /// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
 /// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
-/// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out. A
-/// loss that a rung lacks is zero there. Warns where a bar grows noticeably. What rungs with
+/// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
+/// those with further terms against which BIC says hardly anything, whose own error bars count too
+/// (not where residuals hang together: those terms may follow the tracker's errors).
+/// A loss that a rung lacks is zero there. Warns where a bar grows noticeably. What rungs with
 /// further terms that nothing asks for would change is said, and not allowed for.
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
 
@@ -53,6 +57,13 @@ void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::
 /// @param below  the fitted rung this one extends by one term; null for the plainest.
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung);
+
+/// Fits a rung from the values that explain a first part of the track. A sliding one rolls at first
+/// and slides by Coulomb's law from where that ends; softly where that law leaves something to be
+/// asked.
+void fit_from_first_part(std::span<const data::Track> tracks,
+                         const std::map<std::string, double>& first_part, const FitOptions& options,
+                         Rung& rung);
 
 /// Fits a rung that has a term more or less than `known`, from the solution of that alone. Predicts
 /// the held-back third where BIC does not rule it out beside that one.

@@ -27,7 +27,7 @@ std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chos
   std::string acting, alike, out, nowhere;
   for (const int index : chosen.terms) acting += (acting.empty() ? "" : " and ") + term(index);
   for (const Rung& rung : rungs) {
-    if (rung.terms.size() != 1 || &rung == &chosen) continue;
+    if (rung.terms.size() != 1 || &rung == &chosen || rung.fit.model == "smooth") continue;
     if (!rung.fitted) {
       nowhere += (nowhere.empty() ? "" : ", ") + term(*rung.terms.begin());
       continue;

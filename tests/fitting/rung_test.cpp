@@ -153,6 +153,27 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
       << fit.warnings[0];
 }
 
+// It was left out for being larger, not for being wrong.
+TEST(Rivals, WithATermMoreThatBicHardlyOpposesWidenTheErrorBarsOfWhiteResiduals) {
+  std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              95.0, 101.0)};
+  const double weight = std::exp(2.5) / (1.0 + std::exp(2.5));
+  const double expected = std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.5 * 0.5 + 0.6 * 0.6));
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit white = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], white);
+  EXPECT_NEAR(white.parameters[0].sigma, expected, 1e-12);
+  EXPECT_NEAR(white.covariance(0, 0), expected * expected, 1e-12);
+  EXPECT_EQ(white.warnings.size(), 1u);
+  // A tracker's common errors ask for further terms as well.
+  rungs[0].fit.whiteness_p = 1e-6;
+  data::Fit correlated = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], correlated);
+  EXPECT_DOUBLE_EQ(correlated.parameters[0].sigma, 0.1);
+}
+
 // Which may be another one than the likeliest.
 TEST(Rivals, ThatMoveAParameterMostAreNamedBesideIt) {
   std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),

@@ -161,7 +161,7 @@ def write_case(folder, rig, run, angles, random):
         columns += seen + [np.full(len(xy), sigma_rad)] * 2
         names += ",theta_rad,phi_rad,sigma_theta_rad,sigma_phi_rad"
     with open(folder / "track.csv", "w") as file:
-        file.write("# trochoid track 1\n# units: s, m, m^2, rad\n" + names + "\n")
+        file.write("# trochoid track 1\n# units: s, m, m^2, px, rad\n" + names + "\n")
         for row in zip(*columns):
             file.write(f"{row[0]}," + ",".join(f"{value:.12g}" for value in row[1:]) + "\n")
     body = rig.body

@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
 """Fits the cases of make_tracks.py and compares with their truth.
 
-    score.py TROCHOID FOLDER... [--limit SECONDS] [--jobs N]
+    score.py TROCHOID FOLDER... [--limit SECONDS_OF_PROCESSOR] [--jobs N]
 
-One line per case: outcome, verdict, seconds, chosen model, the parameter farthest off in its own error bars. Outcomes:
+One line per case: outcome, verdict, processor seconds, chosen model, the parameter farthest off in its own error bars. Outcomes:
 
-    right    called good, and every parameter it prints lies within 4 sigma of the truth
-    WRONG    called good, and one does not (a coefficient whose term the truth lacks is compared with zero)
-    told     not called good: weak, doubtful, unexplained, no feature, an error
-    late     not done within the limit
+    right   called good, and every parameter it prints lies within 4 sigma of the truth
+    WRONG   called good, and one does not (a coefficient whose term the truth lacks is compared with zero)
+    told    not called good: weak, doubtful, unexplained, no feature, an error
+    late    not done within the limit
 """
 import argparse
 import json
 import math
+import os
+import resource
+import signal
 import subprocess
-import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -50,14 +52,16 @@ def score(program, folder, limit_s):
     fit_file = folder / "fit.json"
     fit_file.unlink(missing_ok=True)
     command = [program, "fit", folder / "track.csv", "--scene", folder / "scene.toml", "-o", fit_file]
-    started = time.monotonic()
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit_s)
-    except subprocess.TimeoutExpired:
-        return "late", f"after {limit_s:.0f} s"
-    spent_s = time.monotonic() - started
+    with open(folder / "fit.log", "w") as log:
+        child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log,
+                                 preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 1)))
+        _, status, used = os.wait4(child.pid, 0)
+    spent_s = used.ru_utime + used.ru_stime
+    if os.WIFSIGNALED(status):
+        ended = signal.Signals(os.WTERMSIG(status))
+        return ("late" if ended == signal.SIGXCPU else "told"), f"{ended.name} after {spent_s:.0f} s"
     if not fit_file.exists():
-        return "told", f"error: {done.stderr.strip().splitlines()[-1:]}"
+        return "told", f"error: {(folder / 'fit.log').read_text().strip()[-200:]}"
     fit = json.loads(fit_file.read_text())
     chosen = next((m["model"] for m in fit["comparison"] if m["recommended"]), fit["model"])
     off = deviations(fit, truth)
@@ -72,7 +76,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=lambda name: Path(name).resolve())
     parser.add_argument("folders", nargs="+", type=Path)
-    parser.add_argument("--limit", type=float, default=120.0)
+    parser.add_argument("--limit", type=int, default=120, help="processor seconds of one fit")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
     cases = sorted(track.parent for folder in given.folders for track in folder.rglob("track.csv"))
