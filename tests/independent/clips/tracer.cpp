@@ -340,21 +340,32 @@ class Light {
   V thing(const Pose* pose, const Hit& hit, V o, V d, const Draw& u, Random& random, int depth) const {
     const V p = o + hit.t * d;
     const V albedo = colour(hit);
-    V E;
+    const double gleam = s_.mirror.x + s_.mirror.y + s_.mirror.z, c = std::max(0.0, -dot(hit.n, d));
+    const V mirrored = unit(d + 2 * c * hit.n);
+    const auto lobe_density = [&](V way) {
+      return (s_.lobe + 1) / (2 * kPi) * std::pow(std::max(0.0, dot(mirrored, way)), s_.lobe);
+    };
+    // A lamp seen in the gloss is looked for both by lamp and by lobe, each weighed by its density; without
+    // that a small lamp in a wide lobe is a rain of sparks. Caustics, which have them too, are left out.
+    V E, glint;
     for (int k = 0; k < 2; ++k) {
-      const auto [light, to] = from_lamp(s_.lamps[k], p, hit.n, u[kLampU + 2 * k], u[kLampV + 2 * k]);
-      if (light.x + light.y + light.z > 0 && !blocked(pose, p, unit(to))) E = E + light;
+      const Lamp& l = s_.lamps[k];
+      const auto [light, to] = from_lamp(l, p, hit.n, u[kLampU + 2 * k], u[kLampV + 2 * k]);
+      if (light.x + light.y + light.z <= 0 || blocked(pose, p, unit(to))) continue;
+      E = E + light;
+      const double density = lobe_density(unit(to));
+      glint = glint + (density / (density + lamp_density(l, to))) * l.radiance;
     }
     const V bounce = Frame(hit.n).lobe(u[kSkyU], u[kSkyV], 1);
-    V out = (1 / kPi) * (albedo * (E + kPi * arriving(pose, p, bounce, random, depth, false)));
-    const double gleam = s_.mirror.x + s_.mirror.y + s_.mirror.z;
+    V out = (1 / kPi) * (albedo * (E + kPi * arriving(pose, p, bounce, random, depth, 0)));
     if (gleam > 0 && hit.part != kPost && depth < 2) {
-      const double c = std::max(0.0, -dot(hit.n, d));
-      const V r = Frame(unit(d + 2 * c * hit.n)).lobe(u[kLobeU], u[kLobeV], s_.lobe);
+      const V r = Frame(mirrored).lobe(u[kLobeU], u[kLobeV], s_.lobe);
       const double rise = std::pow(1 - c, 5);
       const V fresnel{s_.mirror.x + (1 - s_.mirror.x) * rise, s_.mirror.y + (1 - s_.mirror.y) * rise,
                       s_.mirror.z + (1 - s_.mirror.z) * rise};
-      if (dot(r, hit.n) > 0) out = out + fresnel * arriving(pose, p, r, random, depth, true);
+      if (dot(r, hit.n) > 0)
+        out = out + fresnel * arriving(pose, p, r, random, depth, depth == 0 ? lobe_density(r) : 0);
+      if (depth == 0) out = out + fresnel * glint;
     }
     return out;
   }
@@ -370,7 +381,14 @@ class Light {
   }
   bool blocked(const Pose* pose, V p, V d) const { return hit_things(s_, pose, p, d).part != kNothing; }
 
-  V arriving(const Pose* pose, V p, V d, Random& random, int depth, bool lamps) const {
+  /// Density with which from_lamp() picks this way to a lamp, per solid angle.
+  static double lamp_density(const Lamp& l, V to) {
+    const double d2 = dot(to, to);
+    return d2 * std::sqrt(d2) / (l.area * std::max(1e-12, -dot(l.normal, to)));
+  }
+
+  /// @param density with which the way was chosen, if lamps count on it; else 0.
+  V arriving(const Pose* pose, V p, V d, Random& random, int depth, double density) const {
     const Hit hit = hit_things(s_, pose, p, d);
     if (hit.part != kNothing)
       return depth < 2 ? thing(pose, hit, p, d, random, depth + 1) : 0.3 * (colour(hit) * sky(s_, {0, 0, 1}));
@@ -381,12 +399,12 @@ class Light {
       for (double& value : u) value = random();
       return floor(pose, {q.x, q.y, 0}, s_.floor, d, u, random, depth + 1);
     }
-    if (lamps)
+    if (density > 0)
       for (const Lamp& l : s_.lamps) {
         const double t = dot(l.centre - p, l.normal) / dot(d, l.normal);
         const V off = p + t * d - l.centre;
         if (t > 0 && std::abs(dot(off, l.u)) < dot(l.u, l.u) && std::abs(dot(off, l.v)) < dot(l.v, l.v))
-          return l.radiance;
+          return (density / (density + lamp_density(l, t * d))) * l.radiance;
       }
     return sky(s_, d);
   }
