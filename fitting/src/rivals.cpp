@@ -23,19 +23,20 @@ bool in_question(const Rung& rung, const Rung& chosen) {
          rung.bic <= chosen.bic + kVeryStrong;
 }
 
-// The chosen rung's own weight is not listed. One with further terms is a rival where BIC says
-// hardly anything against it: it was left out for being larger, not for being wrong. Not so where
-// residuals hang together: a further term may then only follow the tracker's errors.
+// The chosen rung's own weight is not listed. One with further terms is a rival where BIC's
+// evidence against it is not strong, by the odds that BIC gives it: it was left out for being
+// larger, not for being wrong. Not so where residuals hang together: a further term may then only
+// follow the tracker's errors.
 std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen) {
-  constexpr double kBareMention = 2.0;  // of BIC (Kass and Raftery)
   const double most = chosen.fit.whiteness_p < kWhite ? -std::numeric_limits<double>::infinity()
-                                                      : chosen.bic + kBareMention;
+                                                      : chosen.bic + kStrong;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
     if (!in_question(rung, chosen) || (larger && rung.bic > most)) continue;
-    rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc)), larger});
+    const double lead = larger ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
+    rivals.push_back({&rung, std::exp(0.5 * lead), larger});
     all += rivals.back().weight;
   }
   for (Rival& rival : rivals) rival.weight /= all;

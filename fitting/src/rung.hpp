@@ -46,10 +46,10 @@ struct Rung {
 /// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
 /// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
 /// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
-/// those with further terms against which BIC says hardly anything, whose own error bars count too
-/// (not where residuals hang together: those terms may follow the tracker's errors).
-/// A loss that a rung lacks is zero there. Warns where a bar grows noticeably. What rungs with
-/// further terms that nothing asks for would change is said, and not allowed for.
+/// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
+/// whose own error bars count too (not where residuals hang together: those terms may follow the
+/// tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
+/// What rungs with further terms that nothing asks for would change is said, and not allowed for.
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
 
 /// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back

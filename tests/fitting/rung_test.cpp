@@ -154,12 +154,12 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
 }
 
 // It was left out for being larger, not for being wrong.
-TEST(Rivals, WithATermMoreThatBicHardlyOpposesWidenTheErrorBarsOfWhiteResiduals) {
+TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals) {
   std::vector<Rung> rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               95.0, 101.0)};
-  const double weight = std::exp(2.5) / (1.0 + std::exp(2.5));
+  const double weight = std::exp(-0.5) / (1.0 + std::exp(-0.5));  // by BIC
   const double expected = std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.5 * 0.5 + 0.6 * 0.6));
   rungs[0].fit.whiteness_p = 0.5;
   data::Fit white = rungs[0].fit;
