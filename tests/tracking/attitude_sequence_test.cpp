@@ -5,20 +5,25 @@
 namespace trochoid::tracking {
 namespace {
 
-using AttitudeSequence = GlimpsedSequence;
+class AttitudeSequence : public GlimpsedSequence {
+ protected:
+  void decide(const Oracle& oracle, std::vector<Glimpse>& glimpses) const {
+    doubt_attitudes(decide_attitudes(background_, oracle, glimpses), glimpses);
+  }
+};
 
 TEST_F(AttitudeSequence, AStretchThatFlippedIsTurnedBackByWhatTheRestSays) {
   const Oracle oracle([](int) { return 10.0; });
   auto glimpses = tracked(oracle, [](int i) { return i >= 20 && i < 40; });
   ASSERT_EQ(count_wrong(glimpses), 20);
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   EXPECT_EQ(count_wrong(glimpses), 0);
 }
 
 TEST_F(AttitudeSequence, FramesThatSpeakForTheMirrorImageAreOverruled) {
   const Oracle oracle([](int i) { return i % 5 == 0 ? -10.0 : 10.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   // The first and the last frame have neighbours on one side only.
   EXPECT_LE(count_wrong(glimpses), 1);
 }
@@ -26,18 +31,38 @@ TEST_F(AttitudeSequence, FramesThatSpeakForTheMirrorImageAreOverruled) {
 TEST_F(AttitudeSequence, WhatNothingTellsIsDoubtful) {
   const Oracle oracle([](int) { return 0.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   for (const Glimpse& g : glimpses) {
     EXPECT_TRUE(g.seen->attitude_doubtful);
     EXPECT_TRUE(std::isinf(g.seen->pose->sigma_phi_rad));
   }
 }
 
+// What measures once more with all that neighbours tell comes before the doubts.
+TEST_F(AttitudeSequence, DoubtsAreToldBeforeAnyFrameIsMarkedWithThem) {
+  const Oracle oracle([](int) { return 0.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  const auto doubts = decide_attitudes(background_, oracle, glimpses);
+  EXPECT_EQ(doubts.size(), glimpses.size());
+  for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful);
+}
+
+// Of a body turned over, the middle may be at either of two places.
+TEST_F(AttitudeSequence, TheCovarianceOfADoubtedFrameHoldsBothPlaces) {
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  const double before = glimpses[3].seen->pose->covariance_m2(0, 0);
+  doubt_attitudes({{.at = 3, .off_px = {2.0, 0.0}, .off_m = {0.002, 0.0}}}, glimpses);
+  EXPECT_NEAR(glimpses[3].seen->pose->covariance_m2(0, 0), before + 0.002 * 0.002, 1e-12);
+  EXPECT_TRUE(glimpses[3].seen->attitude_doubtful);
+  EXPECT_FALSE(glimpses[4].seen->attitude_doubtful);
+}
+
 // All pictures of a body share the error of a wall that is not what it is taken for.
 TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
   const Oracle oracle([](int) { return 1.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
 }
 
@@ -45,7 +70,7 @@ TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
 TEST_F(AttitudeSequence, WhatHardlyTellsStillChooses) {
   const Oracle oracle([](int) { return 1.0; });
   auto glimpses = tracked(oracle, [](int) { return true; });
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   EXPECT_EQ(count_wrong(glimpses), 0);
   for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
 }
@@ -54,7 +79,7 @@ TEST_F(AttitudeSequence, WhatHardlyTellsStillChooses) {
 TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatKeepsTheSizeOfTheBodyIsRight) {
   const Oracle oracle([](int) { return -1.0; }, [](int i) { return 0.4 * std::sin(0.2 * i); });
   auto glimpses = tracked(oracle, [](int i) { return i >= 20 && i < 50; });
-  decide_attitudes(background_, oracle, glimpses);
+  decide(oracle, glimpses);
   EXPECT_EQ(count_wrong(glimpses), 0);
   for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful);
 }

@@ -62,8 +62,8 @@ class Chain {
     frame_s_ = data::median(std::move(steps));
   }
 
-  void decide() {
-    if (nodes_.size() < 3) return;
+  [[nodiscard]] std::vector<AttitudeDoubt> decide() {
+    if (nodes_.size() < 3) return {};
     weigh(first_choice());
     compare_sizes();
     solve();
@@ -74,7 +74,7 @@ class Chain {
     discount();
     solve();
     keep_to(chosen);
-    apply();
+    return apply();
   }
 
  private:
@@ -332,8 +332,9 @@ class Chain {
     }
   }
 
-  void apply() {
+  std::vector<AttitudeDoubt> apply() {
     constexpr double kDoubtful = 2.0;
+    std::vector<std::optional<AttitudeDoubt>> doubts(nodes_.size());
     on_both_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
@@ -345,13 +346,15 @@ class Chain {
         seen.swap(other);
       }
       if (!seen || !seen->pose || std::abs(margin_[i]) >= kDoubtful) return;
-      seen->attitude_doubtful = true;
-      seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
+      doubts[i] = AttitudeDoubt{node.at};
       if (!other) return;
-      // Either of two places: half their distance is the standard deviation.
-      allow_for(0.5 * (other->centre_px - seen->centre_px),
-                0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>(), *seen);
+      doubts[i]->off_px = 0.5 * (other->centre_px - seen->centre_px);
+      doubts[i]->off_m = 0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>();
     });
+    std::vector<AttitudeDoubt> out;
+    for (const auto& doubt : doubts)
+      if (doubt) out.push_back(*doubt);
+    return out;
   }
 
   const Background& background_;
@@ -365,9 +368,19 @@ class Chain {
 
 }  // namespace
 
-void decide_attitudes(const Background& background, const BodyFinder& finder,
-                      std::vector<Glimpse>& glimpses) {
-  Chain(background, finder, glimpses).decide();
+std::vector<AttitudeDoubt> decide_attitudes(const Background& background, const BodyFinder& finder,
+                                            std::vector<Glimpse>& glimpses) {
+  return Chain(background, finder, glimpses).decide();
+}
+
+void doubt_attitudes(const std::vector<AttitudeDoubt>& doubts, std::vector<Glimpse>& glimpses) {
+  for (const AttitudeDoubt& doubt : doubts) {
+    auto& seen = glimpses[doubt.at].seen;
+    if (!seen || !seen->pose || seen->attitude_doubtful) continue;
+    seen->attitude_doubtful = true;
+    seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
+    allow_for(doubt.off_px, doubt.off_m, *seen);
+  }
 }
 
 }  // namespace trochoid::tracking

@@ -300,10 +300,11 @@ class Tracking {
         glimpses.back().seen = std::move(at->second.seen);
     }
     forget_what_the_path_jumps_to(glimpses);
-    decide_attitudes(background_, *finder_, glimpses);
+    const auto doubts = decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     mend_from_one_side(background_, *finder_, glimpses);
     if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
+    doubt_attitudes(doubts, glimpses);
     measure_what_lies(background_, *finder_, glimpses);
     doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
