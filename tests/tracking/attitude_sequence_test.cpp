@@ -28,6 +28,17 @@ TEST_F(AttitudeSequence, FramesThatSpeakForTheMirrorImageAreOverruled) {
   EXPECT_LE(count_wrong(glimpses), 1);
 }
 
+// Pictures of nearly the same attitude err alike: many of them are few witnesses against a jump
+// of the axis by more than a radian.
+TEST_F(AttitudeSequence, AStretchThatErrsAlikeDoesNotOutweighTheJumpItTakes) {
+  constexpr int kErring = 25;
+  const Oracle oracle([](int i) { return i < kErring ? -10.0 : 10.0; });
+  auto glimpses = tracked(oracle, [](int i) { return i < kErring; });
+  ASSERT_EQ(count_wrong(glimpses), kErring);
+  decide(oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+}
+
 TEST_F(AttitudeSequence, WhatNothingTellsIsDoubtful) {
   const Oracle oracle([](int) { return 0.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });

@@ -288,14 +288,38 @@ class Chain {
            kPerRadian * between_axes(to, is, alike_);
   }
 
+  /// Pictures of nearly the same attitude share their errors: a node that was weighed tells as much
+  /// of its own as the axis turns from one such node to the next, in the reading that takes less.
+  [[nodiscard]] std::vector<double> turned_anew() const {
+    constexpr double kAnother_rad = 0.3, kLeast = 0.05;
+    std::vector<std::size_t> weighed;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      if (nodes_[i].weighed) weighed.push_back(i);
+    const auto turn_rad = [&](std::size_t k) {
+      const Eigen::Vector3d axis = axis_of(nodes_[weighed[k]].poses[0]);
+      const auto& [one, other] = nodes_[weighed[k + 1]].poses;
+      return std::min(between_axes(axis, axis_of(one), alike_),
+                      between_axes(axis, axis_of(other), alike_));
+    };
+    std::vector<double> share(nodes_.size(), 1.0);
+    for (std::size_t k = 0; weighed.size() > 1 && k < weighed.size(); ++k) {
+      const double after = turn_rad(std::min(k, weighed.size() - 2));
+      const double before = k > 0 ? turn_rad(k - 1) : after;
+      share[weighed[k]] = std::clamp(0.5 * (before + after) / kAnother_rad, kLeast, 1.0);
+    }
+    return share;
+  }
+
   /// Best sequences through every reading of every node, both ways; pairs of readings are the
   /// states.
   void solve() {
     using Costs = std::array<double, 4>;  // 2 * reading before + reading now
     const std::size_t n = nodes_.size();
     std::vector<Costs> until(n), beyond(n, Costs{});
+    const std::vector<double> share = turned_anew();
     const auto own = [&](std::size_t i, int s) {
-      return 0.5 * (s == 0 ? -nodes_[i].speaks : nodes_[i].speaks);
+      const double speaks = share[i] * nodes_[i].speaks;
+      return 0.5 * (s == 0 ? -speaks : speaks);
     };
     for (int s = 0; s < 4; ++s)
       until[1][static_cast<std::size_t>(s)] = own(0, s / 2) + own(1, s % 2);
