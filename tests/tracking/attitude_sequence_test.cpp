@@ -95,5 +95,13 @@ TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatKeepsTheSizeOfTheBodyIsRight) {
   for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful);
 }
 
+// Sizes that tell a little in every frame share their errors as edges do.
+TEST_F(AttitudeSequence, SizesThatHardlyTellLeaveItDoubtful) {
+  const Oracle oracle([](int) { return 0.0; }, [](int i) { return 0.08 * std::sin(0.2 * i); });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  decide(oracle, glimpses);
+  for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

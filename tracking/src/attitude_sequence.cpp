@@ -28,6 +28,7 @@ struct Node {
   bool weighed = false;
   double shows = 0.0;               ///< how much the edges in the picture speak for the first
   double speaks = 0.0;              ///< how much all of it does
+  double could = 0.0;               ///< how much it could, told in full
   std::optional<Sighting> again{};  ///< the first measured afresh, where more speaks for it then
   std::optional<Sighting> other{};  ///< the second
 
@@ -139,15 +140,18 @@ class Chain {
     std::vector<double> larger_px;
     for (Node& node : nodes_) {
       node.speaks = node.shows;
+      node.could = node.wall();
       if (shows_size(node, whole))
         larger_px.insert(larger_px.end(),
                          {first_of(node).pose->larger_px, node.other->pose->larger_px});
     }
     if (larger_px.size() < 2 * kFewest) return;
     const auto [usual_px, spread_px] = where_half_agree(std::move(larger_px));
-    for (Node& node : nodes_)
-      if (shows_size(node, whole))
-        node.speaks += size_speaks(node, usual_px, std::max(kLeastSd_px, spread_px));
+    for (Node& node : nodes_) {
+      if (!shows_size(node, whole)) continue;
+      node.speaks += size_speaks(node, usual_px, std::max(kLeastSd_px, spread_px));
+      node.could += 1.0;
+    }
   }
 
   /// How much its size speaks for the first reading of a node.
@@ -199,13 +203,18 @@ class Chain {
   /// they speak for the chosen sequence by no more than that, it is not known, however many.
   void discount() {
     constexpr double kShared = 0.15, kSure = 0.38;
-    double speaks = 0.0, wall = 1e-9;
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
-      if (nodes_[i].weighed) {
-        speaks += std::copysign(nodes_[i].speaks, nodes_[i].speaks * margin_[i]);
-        wall += nodes_[i].wall();
-      }
-    const double trust = std::clamp((speaks / wall - kShared) / (kSure - kShared), 0.0, 1.0);
+    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      if (!nodes_[i].weighed) continue;
+      const double chosen = std::copysign(1.0, margin_[i]);
+      shows += chosen * nodes_[i].shows;
+      wall += nodes_[i].wall();
+      speaks += chosen * nodes_[i].speaks;
+      could += nodes_[i].could;
+    }
+    // By the edges alone or together with the sizes, whichever is clearer.
+    const double share = std::max(shows / wall, speaks / could);
+    const double trust = std::clamp((share - kShared) / (kSure - kShared), 0.0, 1.0);
     for (Node& node : nodes_) node.speaks *= trust;
   }
 
