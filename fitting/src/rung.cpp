@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "arcs.hpp"
@@ -192,12 +193,30 @@ void conclude(Rung& rung) {
   rung.bic = rung.fit.bic;
 }
 
+// Runs an attempt at a rung and scores it. What has no answer, or more parameters than the track
+// has measurements, is no reason to give up the other rungs; without the plainest there are none.
+void try_rung(Rung& rung, const std::function<void()>& fit) {
+  const auto give_up = [&](const Error& error) {
+    rung.fitted = usable(rung.fit);
+    rung.reason = error.what();
+  };
+  try {
+    fit();
+  } catch (const NumericalError& error) {
+    give_up(error);
+  } catch (const TrackError& error) {
+    if (rung.terms.empty()) throw;
+    give_up(error);
+  }
+  conclude(rung);
+}
+
 }  // namespace
 
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  try {
+  try_rung(rung, [&] {
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
     if (extends) {
       own.start = extended_start(*below, rung);
@@ -220,11 +239,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
-  } catch (const NumericalError& error) {
-    rung.fitted = usable(rung.fit);  // this attempt has no answer; another may have
-    rung.reason = error.what();
-  }
-  conclude(rung);
+  });
 }
 
 void fit_from_first_part(std::span<const data::Track> tracks,
@@ -233,7 +248,7 @@ void fit_from_first_part(std::span<const data::Track> tracks,
   FitOptions own = options;
   own.start = first_part;
   own.strategy = rung.scene.model.name == "sliding" ? kRollsFirst : "growing";
-  try {
+  try_rung(rung, [&] {
     rung.fit = fit_one_of_several(tracks, rung.scene, own);
     if (usable(rung.fit) && rung.fit.converged && rung.fit.whiteness_p < kWhite &&
         softness_is_open(rung)) {
@@ -244,11 +259,7 @@ void fit_from_first_part(std::span<const data::Track> tracks,
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
-  } catch (const NumericalError& error) {
-    rung.fitted = usable(rung.fit);
-    rung.reason = error.what();
-  }
-  conclude(rung);
+  });
 }
 
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
@@ -258,7 +269,7 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     own.start = extended_start(known, rung);
     own.strategy = "single";
   }
-  try {
+  try_rung(rung, [&] {
     if (softness_is_open(rung) && !softness_is_open(known))
       fit_softly(tracks, own, rung);
     else
@@ -267,11 +278,7 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     const bool in_question = rung.fit.bic < known.fit.bic + kVeryStrong;
     if (rung.fitted && rung.fit.converged && in_question)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
-  } catch (const NumericalError& error) {
-    rung.fitted = usable(rung.fit);
-    rung.reason = error.what();
-  }
-  conclude(rung);
+  });
 }
 
 }  // namespace trochoid::fitting

@@ -3,7 +3,10 @@
 
 #include <cmath>
 #include <map>
+#include <span>
+#include <string>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/compare.hpp"
 
@@ -11,10 +14,21 @@
 namespace trochoid::fitting {
 namespace {
 
+std::string folder_of(const std::string& name) {
+  return TROCHOID_SOURCE_DIR "/tests/independent/cases/" + name;
+}
+
+data::Track track_of(const std::string& name) {
+  return data::read_track(folder_of(name) + "/track.csv").tracks.front();
+}
+
+data::Scene scene_of(const std::string& name) {
+  return data::read_scene(folder_of(name) + "/scene.toml");
+}
+
 Comparison comparison_of(const std::string& name) {
-  const std::string folder = TROCHOID_SOURCE_DIR "/tests/independent/cases/" + name;
-  const data::TrackFile file = data::read_track(folder + "/track.csv");
-  return compare(file.tracks, data::read_scene(folder + "/scene.toml"));
+  const data::Track track = track_of(name);
+  return compare(std::span(&track, 1), scene_of(name));
 }
 
 constexpr double kSigmas = 4.0;
@@ -36,6 +50,19 @@ TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
   EXPECT_EQ(found.fit.verdict, "good");
   expect_found(found.fit, {{"air_force_N_s_m", 0.003979246288779953},
                            {"pivoting_friction_m", 2.5386966524556133e-05}});
+}
+
+// Three frames make twelve measurements, for which the plainest model has few enough parameters.
+TEST(Independent, ModelsWithMoreParametersThanMeasurementsAreToldAndDoNotEndTheComparison) {
+  data::Track track = track_of("air_force");
+  track.samples.resize(3);
+  const Comparison found = compare(std::span(&track, 1), scene_of("air_force"));
+  EXPECT_GT(found.fit.comparison.size(), 2U);
+  EXPECT_THAT(found.fit.comparison,
+              testing::Contains(testing::Field(&data::ModelScore::reason,
+                                               testing::HasSubstr("cannot determine"))));
+  track.samples.resize(1);
+  EXPECT_THROW((void)compare(std::span(&track, 1), scene_of("air_force")), TrackError);
 }
 
 }  // namespace
