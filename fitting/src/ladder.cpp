@@ -37,7 +37,7 @@ ModelSettings without_losses(const ModelSettings& model, const std::string& law)
   return plain;
 }
 
-void add_floor_terms(const Scene& scene, Ladder& ladder) {
+void add_floor_losses(const Scene& scene, Ladder& ladder) {
   const model::CentralInertia inertia = model::central_inertia(*scene.body);
   const double R = scene.body->radius_m;
   const double rate_rad_s = std::sqrt(scene.model.gravity_m_s2 / R);
@@ -68,6 +68,10 @@ void add_floor_terms(const Scene& scene, Ladder& ladder) {
     ladder.terms.back().usual = true;
   }
   friction("contour friction", &ModelSettings::contour_friction_m);
+}
+
+// What a floor may do instead of letting the body roll.
+void add_floors(const Scene& scene, Ladder& ladder) {
   Term sliding = single("sliding", &ModelSettings::friction, scene, 0.3);
   sliding.switch_on = [set = sliding.switch_on](Scene& s) {
     set(s);
@@ -114,8 +118,9 @@ Ladder ladder_of(const Scene& scene) {
   if (ladder.law == "sliding") ladder.law = "rolling";
   ladder.plain = scene;
   ladder.plain.model = without_losses(scene.model, ladder.law);
+  if (ladder.law == "rolling" || ladder.law == "smooth") add_floor_losses(scene, ladder);
   if (ladder.law == "rolling") {
-    add_floor_terms(scene, ladder);
+    add_floors(scene, ladder);
   } else if (ladder.law == "puck") {
     ladder.plain.model.friction = scene.model.friction.value_or(0.2);
     if (scene.body->mass_kg)

@@ -52,6 +52,18 @@ TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
                            {"pivoting_friction_m", 2.5386966524556133e-05}});
 }
 
+// Who knows that the floor is smooth has its losses compared all the same.
+TEST(Independent, LossesAreComparedOnAFloorThatIsNamedSmooth) {
+  const data::Track track = track_of("smooth_floor");
+  data::Scene scene = scene_of("smooth_floor");
+  scene.model.name = "smooth";
+  const Comparison found = compare(std::span(&track, 1), scene);
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  expect_found(found.fit, {{"air_force_N_s_m", 0.0002313339421224178}});
+  for (const data::ModelScore& score : found.fit.comparison)
+    EXPECT_THAT(score.model, testing::StartsWith("smooth"));
+}
+
 // Three frames make twelve measurements, for which the plainest model has few enough parameters.
 TEST(Independent, ModelsWithMoreParametersThanMeasurementsAreToldAndDoNotEndTheComparison) {
   data::Track track = track_of("air_force");
