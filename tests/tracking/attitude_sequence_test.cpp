@@ -49,6 +49,16 @@ TEST_F(AttitudeSequence, WhatNothingTellsIsDoubtful) {
   }
 }
 
+TEST_F(AttitudeSequence, OneOrTwoFramesAloneDoNotTell) {
+  const Oracle oracle([](int) { return 10.0; });
+  for (const std::size_t frames : {0u, 1u, 2u}) {
+    auto glimpses = tracked(oracle, [](int) { return false; });
+    glimpses.resize(frames);
+    decide(oracle, glimpses);
+    for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful) << frames;
+  }
+}
+
 // What measures once more with all that neighbours tell comes before the doubts.
 TEST_F(AttitudeSequence, DoubtsAreToldBeforeAnyFrameIsMarkedWithThem) {
   const Oracle oracle([](int) { return 0.0; });

@@ -64,7 +64,7 @@ class Chain {
   }
 
   [[nodiscard]] std::vector<AttitudeDoubt> decide() {
-    if (nodes_.size() < 3) return {};
+    if (nodes_.size() < 3) return undecided();
     weigh(first_choice());
     compare_sizes();
     solve();
@@ -80,6 +80,15 @@ class Chain {
 
  private:
   static constexpr double kLeastTilt = 0.06;  // below, both readings are one
+
+  /// Two frames do not show how the body goes on, and no single picture is sure.
+  [[nodiscard]] std::vector<AttitudeDoubt> undecided() {
+    std::vector<std::size_t> all(nodes_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    weigh(all);
+    margin_.assign(nodes_.size(), 0.0);
+    return apply();
+  }
 
   /// Every eighth, and those about which the sequence as tracked does not go on as before.
   [[nodiscard]] std::vector<std::size_t> first_choice() const {
