@@ -34,7 +34,7 @@ def fold(values):
 
 def deviations(fit, truth):
     """By name, in sigmas, of what the fit estimated."""
-    estimated = {p["name"]: p for p in fit["parameters"] if p["status"] == "free" and isinstance(p["sigma"], float)}
+    estimated = {p["name"]: p for p in fit["parameters"] if p["status"] == "free" and isinstance(p["sigma"], (int, float))}
     values = fold({name: p["value"] for name, p in estimated.items()})
     off = {}
     for name, value in values.items():

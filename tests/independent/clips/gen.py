@@ -5,7 +5,7 @@
 
 writes OUT/LO .. OUT/HI-1, each with video.mp4, truth.csv, camera.json, object.json and scene.json, in the layout that
 `trochoid study tracking OUT/*` reads. What is filmed, how it moves and through which camera is drawn from --seed and the
-clip's number. Light comes from tracer.cpp beside this file (compiled beside OUT on first use), motion from ../rig.py, the
+clip's number. Light comes from tracer.cpp beside this file (compiled beside OUT when it is newer), motion from ../rig.py, the
 sensor (blur, exposure, transfer curve, noise) and H.264 from here. Needs numpy, scipy, g++, ffmpeg.
 """
 import argparse, json, subprocess, sys
@@ -223,14 +223,17 @@ def film(rng, clip, look, tracer, folder, seed, samples):
     file = subprocess.Popen(encode, stdin=subprocess.PIPE)
     gain = None
     for i in range(clip["frames"]):
-        light = np.frombuffer(eyes.stdout.read(12 * w * h), np.float32).reshape(h, w, 3)
+        light = np.frombuffer(eyes.stdout.read(12 * w * h), np.float32)
+        if light.size < 3 * w * h:
+            break
+        light = light.reshape(h, w, 3)
         gain = gain or sensor["floor_level"] / np.median(light)
         light = gaussian_filter(light, (sensor["psf_sigma_px"],) * 2 + (0,)) * gain * (1 + sensor["drift"] * i / clip["frames"])
         light = light + rng.normal(0, 1, light.shape) * sensor["shot_noise"] * np.sqrt(np.maximum(light, 0))
         coded = 255 * np.clip(light, 0, 1) ** sensor["gamma"] + rng.normal(0, sensor["read_noise_8bit"], light.shape)
         file.stdin.write(np.clip(np.rint(coded), 0, 255).astype(np.uint8).tobytes())
     file.stdin.close()
-    if file.wait() or eyes.wait():
+    if file.wait() or eyes.wait() or light.size < 3 * w * h:
         raise SystemExit(f"{folder}: tracer or ffmpeg failed")
     return sensor
 
@@ -259,9 +262,10 @@ def main():
     options.add_argument("--tracer", type=Path)
     o = options.parse_args()
     o.out.mkdir(parents=True, exist_ok=True)
-    tracer = o.tracer or o.out.parent / "tracer"
-    if not tracer.exists():
-        subprocess.run(["g++", "-std=c++20", "-O3", "-march=native", "-fopenmp", "-o", tracer, HERE / "tracer.cpp"], check=True)
+    source = HERE / "tracer.cpp"
+    tracer = (o.tracer or o.out.parent / "tracer").resolve()
+    if not o.tracer and not (tracer.exists() and tracer.stat().st_mtime > source.stat().st_mtime):
+        subprocess.run(["g++", "-std=c++20", "-O3", "-march=native", "-fopenmp", "-o", tracer, source], check=True)
     for number in range(o.lo, o.hi):
         rng = np.random.default_rng([o.seed, number])
         while (clip := draw(rng)) is None:
