@@ -226,15 +226,37 @@ std::vector<double> frictions_by_misfit(const Problem& part) {
   return frictions;
 }
 
+double reduced_chi2(const Problem& problem, const Solution& solution) {
+  return solution.usable ? solution.chi2 / free_rows(problem)
+                         : std::numeric_limits<double>::infinity();
+}
+
+// The best of `known` and what is found from a few clearly different coefficients of friction.
+Solution seek_friction(const Problem& part, Solution known, const SolveOptions& options) {
+  constexpr std::size_t kMost = 2;
+  constexpr double kApart = 0.04;  // of friction
+  std::vector<double> tried;
+  for (const double friction : frictions_by_misfit(part)) {
+    if (tried.size() == kMost) break;
+    if (std::any_of(tried.begin(), tried.end(),
+                    [&](double other) { return std::abs(friction - other) < kApart * other; }))
+      continue;
+    tried.push_back(friction);
+    Problem trial = part;
+    apply({"", {{"friction", friction}}}, trial);
+    Solution found = seek(trial, trial.start(), options);
+    if (reduced_chi2(part, found) < reduced_chi2(part, known)) known = std::move(found);
+  }
+  return known;
+}
+
 // Follows a body that rolls for `window` samples on into sliding, first to a little more than the
 // sample `beyond`: windows grow by a few samples, and where the path is lost the friction is looked
 // for anew.
 Found grow_into_sliding(const Problem& problem, const Start& start, int window, int beyond) {
   constexpr int kLeastStep = 3, kMostLosses = 12;
   constexpr double kFollowed = 2.0, kWellBeyond = 1.1;  // of the gate; of the samples that roll
-  constexpr double kFaster = 1.5, kNear = 10.0,
-                   kApart = 0.04;  // of the step; of the gate; of friction
-  constexpr std::size_t kTried = 2;
+  constexpr double kFaster = 1.5, kNear = 10.0;         // of the step; of the gate
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem current = problem;
   apply(start, current);
@@ -243,33 +265,16 @@ Found grow_into_sliding(const Problem& problem, const Start& start, int window, 
   for (int losses = 0; window < all && losses < kMostLosses && !exhausted(problem, {});) {
     const int next = std::min(window + step, all);
     Problem part = windowed(current, next);
-    const auto reduced = [&](const Solution& s) {
-      return s.usable ? s.chi2 / std::max(1, part.rows() - static_cast<int>(part.free.size()))
-                      : std::numeric_limits<double>::infinity();
-    };
     const SolveOptions options{.iterations = 25, .function_tolerance = 1e-3};
     // The first slips settle the friction; later ones are followed over their ripples.
     const double most = (next > kWellBeyond * beyond ? kFollowed : 1.0) * chi2_gate(part.rows());
     Solution best;
     if (slides) best = seek(part, part.start(), options);
-    if (reduced(best) > most) {
-      std::vector<double> tried;
-      for (const double friction : frictions_by_misfit(part)) {
-        if (tried.size() == kTried) break;
-        if (std::any_of(tried.begin(), tried.end(),
-                        [&](double other) { return std::abs(friction - other) < kApart * other; }))
-          continue;
-        tried.push_back(friction);
-        Problem trial = part;
-        apply({"", {{"friction", friction}}}, trial);
-        Solution found = seek(trial, trial.start(), options);
-        if (reduced(found) < reduced(best)) best = std::move(found);
-      }
-    }
+    if (reduced_chi2(part, best) > most) best = seek_friction(part, std::move(best), options);
     // Short slips that come and go with every parameter make ripples.
-    if (reduced(best) > most && reduced(best) < kNear * most)
+    if (const double off = reduced_chi2(part, best); off > most && off < kNear * most)
       best = hop(part, judged(part, std::move(best), start.path), 2).solution;
-    if (reduced(best) > most) {
+    if (reduced_chi2(part, best) > most) {
       if (step <= kLeastStep) return {};
       step = std::max(kLeastStep, step / 2);
       ++losses;

@@ -12,10 +12,6 @@ namespace {
 
 constexpr int kThinned = 300;  // samples an exploratory fit looks at
 
-int free_rows(const Problem& problem) {
-  return std::max(1, problem.rows() - static_cast<int>(problem.free.size()));
-}
-
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
 // are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
 void leash(Problem& problem) {
@@ -28,6 +24,10 @@ void leash(Problem& problem) {
 }
 
 }  // namespace
+
+int free_rows(const Problem& problem) {
+  return std::max(1, problem.rows() - static_cast<int>(problem.free.size()));
+}
 
 Problem windowed(const Problem& problem, int samples) {
   Problem part = problem;

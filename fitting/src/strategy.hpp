@@ -31,6 +31,9 @@ void apply(const Start& start, Problem& problem);
 /// deviations of the chi-square distribution above 1 and a tenth for imperfect sigmas.
 [[nodiscard]] double chi2_gate(int rows);
 
+/// Rows of residuals beyond the free parameters, at least one.
+[[nodiscard]] int free_rows(const Problem& problem);
+
 /// Chi-square of knowing nothing: positions about their mean, turning angles anywhere in a turn.
 [[nodiscard]] double null_chi2(const ArcData& arc);
 
