@@ -444,11 +444,12 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   std::vector<Rung> rungs = climb(ladder, tracks, plain);
   let_go_of_friction(ladder, tracks, plain, rungs);
   const Rung* chosen = simplest_sufficient(ladder, rungs);
-  // A term found that way asks for the others anew.
+  // A term found that way asks for the others anew, unless even then the model lacks something.
   const Rung* before = nullptr;
   for (std::size_t round = 0;
        round < kMostTerms && chosen != before && chosen != nullptr && chosen->fit.converged;
        ++round) {
+    if (round > 0 && chosen->fit.verdict == "unexplained") break;
     before = chosen;
     exchange_terms(ladder, tracks, plain, static_cast<std::size_t>(chosen - rungs.data()), rungs);
     chosen = simplest_sufficient(ladder, rungs);
