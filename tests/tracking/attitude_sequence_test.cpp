@@ -79,6 +79,31 @@ TEST_F(AttitudeSequence, TheCovarianceOfADoubtedFrameHoldsBothPlaces) {
   EXPECT_FALSE(glimpses[4].seen->attitude_doubtful);
 }
 
+// A frame in which the likelier reading is not found is brought back by its neighbours later.
+TEST_F(AttitudeSequence, AFrameLostOverItsReadingIsStillInDoubt) {
+  class Blink final : public Oracle {
+   public:
+    using Oracle::Oracle;
+    [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+      return look.frame.index == 30 ? std::nullopt : Oracle::find(look);
+    }
+  };
+  const auto hardly = [](int) { return 1.0; };
+  auto glimpses = tracked(Oracle(hardly), [](int) { return true; });
+  const auto doubts = decide_attitudes(background_, Blink(hardly), glimpses);
+  EXPECT_FALSE(glimpses[30].seen);
+  EXPECT_EQ(doubts.size(), glimpses.size());
+}
+
+// Nor is its tilt known better than between those of the two readings.
+TEST_F(AttitudeSequence, TheTiltOfADoubtedFrameHoldsBothReadings) {
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  glimpses[3].seen->pose->sigma_theta_rad = 0.03;
+  doubt_attitudes({{.at = 3, .off_theta_rad = 0.04}}, glimpses);
+  EXPECT_NEAR(glimpses[3].seen->pose->sigma_theta_rad, 0.05, 1e-12);
+}
+
 // All pictures of a body share the error of a wall that is not what it is taken for.
 TEST_F(AttitudeSequence, WhatHardlyTellsIsDoubtfulHoweverOftenItIsTold) {
   const Oracle oracle([](int) { return 1.0; });

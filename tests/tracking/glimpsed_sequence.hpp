@@ -19,7 +19,7 @@ inline double phi_at(double t_s) {
 
 /// A finder that always finds what is predicted and finds the truth a little more convincing, but
 /// for some frames that speak for the mirror image.
-class Oracle final : public BodyFinder {
+class Oracle : public BodyFinder {
  public:
   /// @param mirrored_larger_px  by how much the rim of a frame's mirror image should look smaller,
   ///                            being farther from the camera, than it does.

@@ -255,6 +255,14 @@ class Chain {
     return std::nullopt;
   }
 
+  /// Half of what lies between two tilts.
+  [[nodiscard]] double between_tilts(double one_rad, double other_rad) const {
+    const auto folded = [&](double tilt) {
+      return alike_ ? std::min(tilt, std::numbers::pi - tilt) : tilt;
+    };
+    return 0.5 * std::abs(folded(one_rad) - folded(other_rad));
+  }
+
   /// A reading of node i measured afresh; nothing if the picture leads elsewhere.
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
                                                  std::size_t reading) const {
@@ -387,11 +395,14 @@ class Chain {
         if (!other) other = measured(measure, i, 1);
         seen.swap(other);
       }
-      if (!seen || !seen->pose || std::abs(margin_[i]) >= kDoubtful) return;
+      if (std::abs(margin_[i]) >= kDoubtful) return;
+      // What the picture does not bear out now, its neighbours may bring back.
       doubts[i] = AttitudeDoubt{node.at};
-      if (!other) return;
+      if (!seen || !seen->pose || !other) return;
       doubts[i]->off_px = 0.5 * (other->centre_px - seen->centre_px);
       doubts[i]->off_m = 0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>();
+      doubts[i]->off_theta_rad =
+          between_tilts(seen->pose->pose.theta_rad, other->pose->pose.theta_rad);
     });
     std::vector<AttitudeDoubt> out;
     for (const auto& doubt : doubts)
@@ -421,6 +432,7 @@ void doubt_attitudes(const std::vector<AttitudeDoubt>& doubts, std::vector<Glimp
     if (!seen || !seen->pose || seen->attitude_doubtful) continue;
     seen->attitude_doubtful = true;
     seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
+    seen->pose->sigma_theta_rad = std::hypot(seen->pose->sigma_theta_rad, doubt.off_theta_rad);
     allow_for(doubt.off_px, doubt.off_m, *seen);
   }
 }

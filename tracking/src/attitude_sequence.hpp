@@ -11,6 +11,7 @@ struct AttitudeDoubt {
   /// Half of what lies between the two centres, their standard deviation then: in the picture and
   /// on the floor.
   Eigen::Vector2d off_px = Eigen::Vector2d::Zero(), off_m = Eigen::Vector2d::Zero();
+  double off_theta_rad = 0.0;  ///< and between the two tilts
 };
 
 /// Decides over a sequence which of a tilt and its mirror image at the line of sight was seen.
@@ -22,7 +23,7 @@ struct AttitudeDoubt {
                                                           const BodyFinder& finder,
                                                           std::vector<Glimpse>& glimpses);
 
-/// Sets Sighting::attitude_doubtful; the covariance of the centre holds both attitudes.
+/// Sets Sighting::attitude_doubtful; the errors of centre and tilt hold both attitudes.
 void doubt_attitudes(const std::vector<AttitudeDoubt>& doubts, std::vector<Glimpse>& glimpses);
 
 }  // namespace trochoid::tracking

@@ -5,11 +5,13 @@
 
 namespace trochoid::tracking {
 
-/// By what factors the variances of a track's centres are too small for how these scatter about
-/// the path, at least 1, for each sample. Differences of the third to eighth order over equal steps
-/// leave noise and no path; of a path too lively for the lower ones the highest tells most, and the
-/// least of them counts. Errors that go on from frame to frame, most of what frames have in common,
-/// do not show. Gaps, uneven frames and single outliers do not count.
-[[nodiscard]] std::vector<double> unclaimed_scatter(const data::Track& track);
+enum class Measured { centre, theta, phi, psi };
+
+/// By what factors the variances of what a track measures are too small for how it scatters about
+/// its own course, at least 1, for each sample. Differences of the third to eighth order over equal
+/// steps leave noise and no course; of a motion too lively for the lower ones the highest tells
+/// most, and the least of them counts. Errors that go on from frame to frame, most of what frames
+/// have in common, do not show. Gaps, uneven frames and single outliers do not count.
+[[nodiscard]] std::vector<double> unclaimed_scatter(const data::Track& track, Measured what);
 
 }  // namespace trochoid::tracking

@@ -121,6 +121,19 @@ std::vector<double> smoothed_inflations(const BodyPath& path) {
   return smoothed;
 }
 
+/// What one picture says of its errors, the path may contradict.
+void allow_for_scatter(data::Track& track) {
+  const std::vector<double> centre = unclaimed_scatter(track, Measured::centre);
+  for (std::size_t i = 0; i < centre.size(); ++i) track.samples[i].covariance_m2 *= centre[i];
+  for (const auto& [what, angle] : {std::pair{Measured::theta, &data::TrackSample::theta},
+                                    {Measured::phi, &data::TrackSample::phi},
+                                    {Measured::psi, &data::TrackSample::psi}}) {
+    const std::vector<double> scatter = unclaimed_scatter(track, what);
+    for (std::size_t i = 0; i < scatter.size(); ++i)
+      if (auto& seen = track.samples[i].*angle) seen->sigma_rad *= std::sqrt(scatter[i]);
+  }
+}
+
 }  // namespace
 
 double usual_radius_px(const BodyPath& path) {
@@ -170,9 +183,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     if (sample.psi) sample.psi->value_rad = psi(sample.psi->value_rad, sample.t_s);
     track.samples.push_back(std::move(sample));
   }
-  // What one picture says of its errors, the path may contradict.
-  const std::vector<double> scatter = unclaimed_scatter(track);
-  for (std::size_t i = 0; i < scatter.size(); ++i) track.samples[i].covariance_m2 *= scatter[i];
+  allow_for_scatter(track);
   return track;
 }
 
