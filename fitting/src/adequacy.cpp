@@ -353,6 +353,11 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   accept(problem, solution, error, worst, lost, fit);
 }
 
+bool explains(const Problem& problem, const Solution& solution) {
+  const Squares sum = squares(problem, solution);
+  return explains_path(sum) && misfit(problem, sum).times <= kDoubtful;
+}
+
 double straying_m(std::span<const data::Track> tracks) {
   double squares = 0.0, rows = 0.0;
   for (const data::Track& track : tracks) {

@@ -37,6 +37,9 @@ struct Squares {
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
 
+/// Whether a path is neither unexplained nor doubtful for its residuals.
+[[nodiscard]] bool explains(const Problem& problem, const Solution& solution);
+
 /// How far the centre of a body held at a pivot strays from its mean place [m] (rms of a
 /// coordinate); 0 without positions in metres.
 [[nodiscard]] double straying_m(std::span<const data::Track> tracks);

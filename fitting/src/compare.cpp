@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -23,7 +22,7 @@
 namespace trochoid::fitting {
 namespace {
 
-constexpr std::size_t kMostTerms = 3;
+constexpr std::size_t kMostTerms = 3, kMostRounds = 6;
 constexpr double kNoFriction = 1e-3;  // a hundredth of what the slipperiest floors have
 
 const Rung* least_bic(const std::vector<Rung>& rungs) {
@@ -127,7 +126,7 @@ FitOptions options_for(const Rung& rung, const FitOptions& options) {
 // All extensions of rungs[current] by one term, tried at the same time. @returns the index of the
 // best rung now known.
 std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
-                    const FitOptions& options, bool last_resort, std::size_t current,
+                    const FitOptions& options, bool last_resort, Reach reach, std::size_t current,
                     std::vector<Rung>& rungs) {
   const std::size_t first = rungs.size();
   std::vector<const Term*> added;
@@ -143,7 +142,7 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   in_parallel(static_cast<int>(added.size()), options.threads, [&](int i) {
     const auto n = static_cast<std::size_t>(i);
     Rung& rung = rungs[first + n];
-    fit_rung(tracks, &rungs[current], added[n], options_for(rung, one), rung);
+    fit_rung(tracks, &rungs[current], added[n], options_for(rung, one), rung, reach);
   });
   std::size_t best = current;
   for (std::size_t i = first; i < rungs.size(); ++i)
@@ -251,21 +250,88 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
   }
 }
 
-// Terms are added one at a time, by what is gained at once, and those of a last resort all
-// together: what never stood beside the others may do as well as one of them. Every term left is
-// added to a rung, and put in the place of those that are not sure beside it.
-void exchange_terms(const Ladder& ladder, std::span<const data::Track> tracks,
-                    const FitOptions& options, std::size_t current, std::vector<Rung>& rungs) {
-  const std::set<int> terms = rungs[current].terms;
-  const auto larger = with_one_more(ladder, terms);
-  add_neighbours(ladder, tracks, options, larger, current, rungs);
-  std::vector<std::set<int>> exchanged;
-  for (const Rung& rung : rungs) {
-    if (std::find(larger.begin(), larger.end(), rung.terms) == larger.end()) continue;
-    for (std::set<int>& others : with_one_less(ladder, rung.terms, terms))
-      if (may_do_without(rung, rung_with(ladder, others))) exchanged.push_back(std::move(others));
+// Parameters that a rung has and one without a term of its has not.
+std::set<std::string> parameters_of_term(const Ladder& ladder, const std::set<int>& terms,
+                                         int term) {
+  std::set<int> fewer = terms;
+  fewer.erase(term);
+  std::set<std::string> own = parameters_of(rung_with(ladder, terms).scene);
+  for (const std::string& name : parameters_of(rung_with(ladder, fewer).scene)) own.erase(name);
+  return own;
+}
+
+// Whether a fit with so many more parameters, which promises this chi-square, may come to something
+// beside a known rung. One that hardly follows the track has to be mended for a good part: all else
+// would only follow the tracker's errors. Where what is left hangs together, a further term may be
+// what is missing, and all that it takes away counts; what takes the place of another, or stands
+// beside a rung that leaves noise, may do as well as that.
+bool worth_a_fit(const Rung& known, const Promise& promise, double chi2, int more, bool larger) {
+  constexpr double kGoodPart = 0.25;
+  const double gain = promise.before - chi2, price = more * std::log(promise.rows);
+  if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
+    return gain > kGoodPart * promise.before;
+  if (larger && known.fit.whiteness_p < kWhite) return gain > price;
+  return price - gain / promise.dilution < kVeryStrong;
+}
+
+// Sets with one more term than a known rung's, and with one more in the place of another, the most
+// promising first.
+std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
+                                            std::span<const data::Track> tracks,
+                                            const FitOptions& options, const Rung& known) {
+  std::map<int, std::set<std::string>> others;
+  for (const int term : known.terms)
+    if (!ladder.terms[static_cast<std::size_t>(term)].last_resort)
+      others[term] = parameters_of_term(ladder, known.terms, term);
+  const std::vector<std::set<int>> larger = with_one_more(ladder, known.terms);
+  std::vector<Promise> promises(larger.size());
+  in_parallel(static_cast<int>(larger.size()), options.threads, [&](int i) {
+    const auto n = static_cast<std::size_t>(i);
+    promises[n] = promised(tracks, known, options, rung_with(ladder, larger[n]), others);
+  });
+  std::vector<std::pair<double, std::set<int>>> worth;  // by what BIC is promised to change by
+  const auto consider = [&](const Promise& promise, double chi2, int more, bool is_larger,
+                            std::set<int> terms) {
+    if (worth_a_fit(known, promise, chi2, more, is_larger))
+      worth.emplace_back(chi2 - promise.before + more * std::log(promise.rows), std::move(terms));
+  };
+  for (std::size_t i = 0; i < larger.size(); ++i) {
+    const Promise& promise = promises[i];
+    if (promise.rows == 0) {
+      worth.emplace_back(0.0, larger[i]);
+      continue;
+    }
+    consider(promise, promise.with, promise.further, true, larger[i]);
+    for (const auto& [term, names] : others) {
+      std::set<int> exchanged = larger[i];
+      exchanged.erase(term);
+      consider(promise, promise.instead.at(term), promise.further - static_cast<int>(names.size()),
+               false, std::move(exchanged));
+    }
   }
-  add_neighbours(ladder, tracks, options, exchanged, current, rungs);
+  std::stable_sort(worth.begin(), worth.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::set<int>> sets;
+  for (auto& [bic, terms] : worth) sets.push_back(std::move(terms));
+  return sets;
+}
+
+// Terms are added one at a time, by what is gained at once, and those of a last resort all
+// together: what never stood beside the others may do as well as one of them. @returns the rung to
+// go on from.
+const Rung* exchange_terms(const Ladder& ladder, std::span<const data::Track> tracks,
+                           const FitOptions& options, const Rung& known, std::vector<Rung>& rungs) {
+  constexpr std::size_t kFirst = 2;
+  const auto index = static_cast<std::size_t>(&known - rungs.data());
+  std::vector<std::set<int>> worth = worth_exchanging(ladder, tracks, options, known);
+  // Where something is missing, what promises most leads on, and changes what the others promise.
+  if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
+    add_neighbours(ladder, tracks, options, {worth.begin(), worth.begin() + kFirst}, index, rungs);
+    const Rung* best = simplest_sufficient(ladder, rungs);
+    if (best->fit.converged && best->bic < known.bic - kVeryStrong) return best;
+  }
+  add_neighbours(ladder, tracks, options, worth, index, rungs);
+  return simplest_sufficient(ladder, rungs);
 }
 
 // A friction that may be nothing is none: the same losses on a smooth floor, and fewer of them,
@@ -292,10 +358,10 @@ void let_go_of_friction(const Ladder& ladder, std::span<const data::Track> track
 // One more term at a time, from rungs[current] on, while each is worth it. @returns the last one's
 // index.
 std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Track> tracks,
-                                const FitOptions& options, std::size_t current,
+                                const FitOptions& options, Reach reach, std::size_t current,
                                 std::vector<Rung>& rungs) {
   for (std::size_t size = 1; size <= std::min(kMostTerms, ladder.terms.size()); ++size) {
-    const std::size_t best = step_up(ladder, tracks, options, false, current, rungs);
+    const std::size_t best = step_up(ladder, tracks, options, false, reach, current, rungs);
     const bool worth = best != current && rungs[best].bic < rungs[current].bic - kStrong;
     if (!worth) break;
     current = best;
@@ -308,14 +374,13 @@ std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Trac
 // explains a first part of the track alone, another loss acts as well, or the body slides from
 // there on. @returns whether one of these explains the track.
 bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
-                const FitOptions& options, const std::function<bool(std::size_t)>& explains,
-                std::vector<Rung>& rungs) {
+                const FitOptions& options, std::vector<Rung>& rungs) {
   const std::set<int> usual = usual_losses(ladder);
   if (usual.empty()) return false;
   const std::size_t all = rungs.size();
   rungs.push_back(rung_with(ladder, usual));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[all], options), rungs[all]);
-  if (explains(all)) {
+  if (explains(rungs[all])) {
     step_down(ladder, tracks, options, all, rungs);
     return true;
   }
@@ -334,7 +399,7 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
   const Rung* best = least_bic(tried);
   if (best == nullptr) return false;
   rungs.push_back(*best);  // of the others a search of their own may make more
-  if (explains(rungs.size() - 1)) {
+  if (explains(rungs.back())) {
     step_down(ladder, tracks, options, rungs.size() - 1, rungs);
     return true;
   }
@@ -348,31 +413,27 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   std::vector<Rung> rungs;
   // References to rungs stay valid while more are added.
   const std::size_t terms = ladder.terms.size();
-  rungs.reserve(4 + (3 * kMostTerms + 3) * terms + (kMostTerms + 1) * terms * (terms + 1));
+  rungs.reserve(4 + (3 * kMostTerms + 3) * terms + (kMostRounds + 1) * terms * (terms + 1));
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
-  // Residuals that hang together but hardly exceed the track's own noise are the tracker's.
-  constexpr double kTrackersOwn = 1.3;
-  const auto explains = [&](std::size_t i) {
-    const std::string& verdict = rungs[i].fit.verdict;
-    return rungs[i].fitted && verdict != "doubtful" && verdict != "unexplained" &&
-           (rungs[i].fit.whiteness_p >= kWhite || rungs[i].fit.noise_scale <= kTrackersOwn);
-  };
-  if (!explains(0) && climb_down(ladder, tracks, options, explains, rungs)) return rungs;
-  const std::size_t current = step_up_while_worth(ladder, tracks, options, 0, rungs);
-  if (explains(current)) return rungs;
+  const bool searched = !explains(rungs[0]) && !usual_losses(ladder).empty();
+  if (searched && climb_down(ladder, tracks, options, rungs)) return rungs;
+  // Where a search with all usual losses led nowhere, one with fewer does not either.
+  const Reach reach = searched ? Reach::from_below : Reach::search;
+  const std::size_t current = step_up_while_worth(ladder, tracks, options, reach, 0, rungs);
+  if (explains(rungs[current])) return rungs;
   if (const std::optional<int> none = smooth_term(ladder)) {
     std::size_t smooth = rungs.size();
     rungs.push_back(rung_with(ladder, {*none}));
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
     if (rungs[smooth].fitted && rungs[smooth].bic < rungs[current].bic)
-      smooth = step_up_while_worth(ladder, tracks, options, smooth, rungs);
-    if (rungs[smooth].fit.converged && explains(smooth)) return rungs;
+      smooth = step_up_while_worth(ladder, tracks, options, Reach::search, smooth, rungs);
+    if (rungs[smooth].fit.converged && explains(rungs[smooth])) return rungs;
   }
   // Where nothing leads anywhere, the last resort alone does not either.
   if (rungs[current].fit.converged) {
-    const std::size_t last = step_up(ladder, tracks, options, true, current, rungs);
-    if (last != current && explains(last)) {
+    const std::size_t last = step_up(ladder, tracks, options, true, Reach::search, current, rungs);
+    if (last != current && explains(rungs[last])) {
       step_down(ladder, tracks, options, last, rungs);
       return rungs;
     }
@@ -447,12 +508,11 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   // A term found that way asks for the others anew, unless even then the model lacks something.
   const Rung* before = nullptr;
   for (std::size_t round = 0;
-       round < kMostTerms && chosen != before && chosen != nullptr && chosen->fit.converged;
+       round < kMostRounds && chosen != before && chosen != nullptr && chosen->fit.converged;
        ++round) {
     if (round > 0 && chosen->fit.verdict == "unexplained") break;
     before = chosen;
-    exchange_terms(ladder, tracks, plain, static_cast<std::size_t>(chosen - rungs.data()), rungs);
-    chosen = simplest_sufficient(ladder, rungs);
+    chosen = exchange_terms(ladder, tracks, plain, *chosen, rungs);
   }
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};

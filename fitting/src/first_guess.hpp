@@ -16,12 +16,21 @@ namespace trochoid::fitting {
 void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
                        const std::set<std::string>& known);
 
+/// The scene as its model takes it: with a start for a friction that is to be found, and with what
+/// priors say for what is given.
+[[nodiscard]] data::Scene completed(const data::Scene& given, const FitOptions& options);
+
+/// Which error bars are wanted: those of the values, or those by the curvature alone where
+/// chi-square has a flatter side that takes several minimisations to follow.
+enum class Bars { full, by_curvature };
+
 /// fit() for one of several models that share a first guess: of what is not this model's the guess
 /// is silently ignored.
 /// @param first_part  null, or receives the values that explain the longest first part of a single
 ///                    arc that the search came across, if more than a fifth.
 [[nodiscard]] data::Fit fit_one_of_several(std::span<const data::Track> tracks,
                                            const data::Scene& scene, const FitOptions& options,
+                                           Bars bars = Bars::full,
                                            std::map<std::string, double>* first_part = nullptr);
 
 /// Strategy of a sliding model whose given start is that of a body that rolls at first.

@@ -178,20 +178,12 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
         "and does not see what is common to all of it; the error bars count");
 }
 
-// Median time between samples.
-double frame_time_s(std::span<const data::Track> tracks) {
-  std::vector<double> steps_s;
-  for (const data::Track& track : tracks)
-    for (std::size_t i = 1; i < track.samples.size(); ++i)
-      steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
-  return median(std::move(steps_s));
-}
-
 // The error bar of friction reaches as far as chi-square does on its flatter side; what goes with
 // friction goes farther with it.
 void heed_far_side(const Problem& problem, const Solution& solution, const FitOptions& options,
                    Uncertainty& error, data::Fit& fit) {
   constexpr double kWorthWords = 1.3;
+  if (!explains(problem, solution)) return;  // a bar about another path means nothing
   const auto far = far_side_of_friction(problem, solution, error, options.threads);
   if (!far) return;
   const double variance = error.covariance(far->index, far->index);
@@ -261,7 +253,8 @@ using FirstPart = std::map<std::string, double>;
 
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
                    const std::vector<Relative>& relatives, const data::Scene& given_scene,
-                   const FitOptions& options, FirstPart* first_part = nullptr) {
+                   const FitOptions& options, Bars bars = Bars::full,
+                   FirstPart* first_part = nullptr) {
   if (tracks.empty()) throw TrackError("no track to fit");
   data::Scene scene = given_scene;
   scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
@@ -300,7 +293,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     // A finer tolerance can run into the step limit where a coarse one did not.
     return refuse(problem, failure.what(), fit);
   }
-  heed_far_side(problem, solution, options, error, fit);
+  if (bars == Bars::full) heed_far_side(problem, solution, options, error, fit);
   heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
   heed_pivot(problem, scene, fit);
   describe(problem, solution, error, scene, fit);
@@ -315,15 +308,6 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   }
   add_what_was_asked_for(problem, solution, error, options, fit);
   return fit;
-}
-
-// The scene as its model takes it.
-data::Scene completed(const data::Scene& given, const FitOptions& options) {
-  data::Scene scene = given;
-  if (!options.model.empty()) scene.model.name = options.model;
-  give_friction_a_start(scene);
-  take_priors_for_given(scene);
-  return scene;
 }
 
 std::set<std::string> names_in(const model::Predictor& plain, data::Scene scene) {
@@ -342,7 +326,7 @@ void check_given_start(const FitOptions& options, const model::Predictor& predic
 }
 
 data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predictor& predictor,
-                        const data::Scene& scene, const FitOptions& options,
+                        const data::Scene& scene, const FitOptions& options, Bars bars = Bars::full,
                         FirstPart* first_part = nullptr) {
   const auto relatives = relatives_of(scene);
   std::vector<Relative> plain;
@@ -350,12 +334,20 @@ data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predic
     plain.push_back({owned.model.get(), {}});
     for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
   }
-  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, first_part);
+  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, bars, first_part);
   tell_idle_terms(scene, fit);
   return fit;
 }
 
 }  // namespace
+
+data::Scene completed(const data::Scene& given, const FitOptions& options) {
+  data::Scene scene = given;
+  if (!options.model.empty()) scene.model.name = options.model;
+  give_friction_a_start(scene);
+  take_priors_for_given(scene);
+  return scene;
+}
 
 std::set<std::string> parameters_of(const data::Scene& given) {
   const data::Scene scene = completed(given, {});
@@ -385,9 +377,9 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
-                             const FitOptions& options, FirstPart* first_part) {
+                             const FitOptions& options, Bars bars, FirstPart* first_part) {
   const data::Scene scene = completed(given, options);
-  return fit_completed(tracks, *model::make_predictor(scene), scene, options, first_part);
+  return fit_completed(tracks, *model::make_predictor(scene), scene, options, bars, first_part);
 }
 
 }  // namespace trochoid::fitting

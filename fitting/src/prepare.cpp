@@ -139,6 +139,14 @@ void start_decay_within_sight(Problem& problem) {
 
 }  // namespace
 
+double frame_time_s(std::span<const data::Track> tracks) {
+  std::vector<double> steps_s;
+  for (const data::Track& track : tracks)
+    for (std::size_t i = 1; i < track.samples.size(); ++i)
+      steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
+  return median(std::move(steps_s));
+}
+
 Problem prepare(std::span<const data::Track> tracks, const model::Predictor& predictor,
                 const data::Scene& scene, const FitOptions& options) {
   const std::string& model = predictor.model_name();

@@ -8,6 +8,9 @@
 
 namespace trochoid::fitting {
 
+/// Median time between samples.
+[[nodiscard]] double frame_time_s(std::span<const data::Track> tracks);
+
 /// The tracks' arcs, what may vary and where it starts, noise scales and the integrator's
 /// tolerance: all that is known before the search.
 /// @throws InputError if a track is unusable or has fewer measurements than there are parameters.

@@ -27,6 +27,13 @@ bool usable(const data::Fit& fit) {
   return !fit.parameters.empty() && std::isfinite(fit.chi2);
 }
 
+bool explains(const Rung& rung) {
+  constexpr double kTrackersOwn = 1.3;
+  const std::string& verdict = rung.fit.verdict;
+  return rung.fitted && verdict != "doubtful" && verdict != "unexplained" &&
+         (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
+}
+
 std::map<std::string, double> values_of(const data::Fit& fit) {
   const bool single = fit.arcs.size() < 2;
   const auto predictor_like = [&](const data::FitParameter& parameter) {
@@ -137,7 +144,7 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
     options.progress = [say = options.progress](const std::string& stage) {
       say(fmt::format("without the last third, {}", stage));
     };
-  const data::Fit early = fit_one_of_several(tracks, rung.scene, options);
+  const data::Fit early = fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature);
   if (!usable(early)) return kInfinity;
   Squares seen, unseen;
   bool sigma_known = true;
@@ -167,15 +174,17 @@ double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& ru
   }
 }
 
-// Parameters that `known` does not have start at a fiftieth of their typical size: near the known
-// solution.
-std::map<std::string, double> extended_start(const Rung& known, const Rung& rung) {
-  constexpr double kLittle = 0.02;
+// Of the typical size of a parameter: near the solution without it; and what no residual sees.
+constexpr double kLittle = 0.02, kNext = 1e-6;
+
+// Parameters that `known` does not have start at a share of their typical size.
+std::map<std::string, double> extended_start(const Rung& known, const Rung& rung,
+                                             double share = kLittle) {
   std::map<std::string, double> start = values_of(known.fit);
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())
     if (info.role == model::ParameterInfo::Role::dynamics && known.fit.find(info.name) == nullptr)
-      start[info.name] = kLittle * info.value;
+      start[info.name] = share * info.value;
   return start;
 }
 
@@ -214,7 +223,7 @@ void try_rung(Rung& rung, const std::function<void()>& fit) {
 }  // namespace
 
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
-              const FitOptions& options, Rung& rung) {
+              const FitOptions& options, Rung& rung, Reach reach) {
   FitOptions own = options;
   try_rung(rung, [&] {
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
@@ -226,7 +235,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     // Near a solution that explains nothing there is nothing to be found.
     const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
                       rung.fit.chi2 <= below->fit.chi2 * (1.0 + 1e-6);
-    if (!near && (!usable(rung.fit) || rung.fit.whiteness_p < kWhite)) {
+    if (reach == Reach::search && !near && (!usable(rung.fit) || rung.fit.whiteness_p < kWhite)) {
       own.start = options.start;
       if (term != nullptr)
         for (const auto& [name, value] : term->start) own.start[name] = value;
@@ -234,12 +243,25 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
       else
-        keep_better(fit_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+        keep_better(fit_one_of_several(tracks, rung.scene, own, Bars::full, &rung.first_part),
+                    rung);
     }
     rung.fitted = usable(rung.fit);
     if (rung.fitted && rung.fit.converged)
       rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   });
+}
+
+Promise promised(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+                 const Rung& larger, const std::map<int, std::set<std::string>>& others) {
+  FitOptions at = options;
+  at.start = extended_start(known, larger, kNext);
+  data::Scene scene = larger.scene;
+  scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
+  std::set<std::string> further;
+  for (const auto& [name, value] : at.start)
+    if (known.fit.find(name) == nullptr) further.insert(name);
+  return promised(tracks, scene, at, further, others);
 }
 
 void fit_from_first_part(std::span<const data::Track> tracks,

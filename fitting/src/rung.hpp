@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ladder.hpp"
+#include "promise.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::fitting {
@@ -52,11 +53,24 @@ struct Rung {
 /// What rungs with further terms that nothing asks for would change is said, and not allowed for.
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
 
+/// Whether a rung's verdict is not that its path is only followed or not even that, and what is
+/// left looks like noise or hardly exceeds the track's own: then it hangs together for the tracker.
+[[nodiscard]] bool explains(const Rung& rung);
+
+/// How a rung is looked for: searched for where the solution below does not lead to it, or not.
+enum class Reach { search, from_below };
+
 /// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back
 /// third.
 /// @param below  the fitted rung this one extends by one term; null for the plainest.
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
-              const FitOptions& options, Rung& rung);
+              const FitOptions& options, Rung& rung, Reach reach = Reach::search);
+
+/// What a known rung's tangent plane says of a larger one.
+/// @param others  parameters of each of the known rung's terms that may be left out.
+[[nodiscard]] Promise promised(std::span<const data::Track> tracks, const Rung& known,
+                               const FitOptions& options, const Rung& larger,
+                               const std::map<int, std::set<std::string>>& others);
 
 /// Fits a rung from the values that explain a first part of the track. A sliding one rolls at first
 /// and slides by Coulomb's law from where that ends; softly where that law leaves something to be

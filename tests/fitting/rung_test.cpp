@@ -3,8 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
+#include <set>
+#include <string>
+#include <vector>
 
+#include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
 
@@ -195,6 +200,53 @@ TEST(Rivals, WithATermMoreMayDoWithoutAParameter) {
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_TRUE(fit.warnings.empty());
+}
+
+// A ring of tests/independent that rolls, held back by air and by pivoting friction.
+class Promised : public testing::Test {
+ protected:
+  [[nodiscard]] Rung rung_with(const std::set<std::string>& losses) const {
+    Rung rung;
+    rung.scene = data::read_scene(folder_ + "/scene.toml");
+    rung.scene.model.name = "rolling";
+    if (losses.contains("air")) rung.scene.model.air_force_N_s_m = 3e-3;
+    if (losses.contains("pivoting")) rung.scene.model.pivoting_friction_m = 5e-5;
+    if (losses.contains("rolling")) rung.scene.model.rolling_friction_m = 5e-5;
+    return rung;
+  }
+  [[nodiscard]] Rung fitted(const std::set<std::string>& losses) const {
+    Rung rung = rung_with(losses);
+    fit_rung(tracks_, nullptr, nullptr, {}, rung);
+    EXPECT_TRUE(rung.fitted) << rung.reason;
+    return rung;
+  }
+
+  const std::string folder_ = TROCHOID_SOURCE_DIR "/tests/independent/cases/air_force";
+  const std::vector<data::Track> tracks_{data::read_track(folder_ + "/track.csv").tracks};
+};
+
+TEST_F(Promised, IsWhatAMissingLossThenGains) {
+  const Rung known = fitted({"air"}), with = fitted({"air", "pivoting"});
+  const Promise promise = promised(tracks_, known, {}, rung_with({"air", "pivoting"}), {});
+  const double share = 1.0 - promise.with / promise.before;
+  const double gained = 1.0 - with.fit.chi2 / known.fit.chi2;
+  ASSERT_GT(gained, 0.05);
+  EXPECT_NEAR(share, gained, 0.2 * gained);
+  EXPECT_EQ(promise.further, 1);
+}
+
+TEST_F(Promised, IsNothingOfALossThatDoesNotAct) {
+  const Rung known = fitted({"air", "pivoting"});
+  const std::map<int, std::set<std::string>> others{{1, {"air_force_N_s_m"}},
+                                                    {2, {"pivoting_friction_m"}}};
+  const Promise promise =
+      promised(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}), others);
+  EXPECT_LE(promise.with, promise.before);
+  EXPECT_GT(promise.with, promise.before - 10.0);
+  // Nor does it do for one that acts.
+  constexpr double kVeryStrong = 10.0;
+  EXPECT_GT(promise.instead.at(1), promise.before + kVeryStrong);
+  EXPECT_GT(promise.instead.at(2), promise.before + kVeryStrong);
 }
 
 }  // namespace
