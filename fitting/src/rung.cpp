@@ -261,7 +261,11 @@ Promise promised(std::span<const data::Track> tracks, const Rung& known, const F
   std::set<std::string> further;
   for (const auto& [name, value] : at.start)
     if (known.fit.find(name) == nullptr) further.insert(name);
-  return promised(tracks, scene, at, further, others);
+  try {
+    return promised(tracks, scene, at, further, others);
+  } catch (const Error&) {  // too many parameters for the track: the fit says so
+    return {};
+  }
 }
 
 void fit_from_first_part(std::span<const data::Track> tracks,

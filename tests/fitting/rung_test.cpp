@@ -249,5 +249,12 @@ TEST_F(Promised, IsNothingOfALossThatDoesNotAct) {
   EXPECT_GT(promise.instead.at(2), promise.before + kVeryStrong);
 }
 
+TEST_F(Promised, IsUntoldWhereTheTrackIsTooShortForIt) {
+  const Rung known = fitted({"air"});
+  std::vector<data::Track> few = tracks_;
+  few.front().samples.resize(2);
+  EXPECT_EQ(promised(few, known, {}, rung_with({"air", "pivoting"}), {}).rows, 0);
+}
+
 }  // namespace
 }  // namespace trochoid::fitting
