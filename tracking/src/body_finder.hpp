@@ -51,6 +51,12 @@ class BodyFinder {
       const data::Pose<>& /*pose*/) const {
     return std::nullopt;
   }
+  /// Attitudes of a body that may have been taken for this one, part of its outline for another:
+  /// its face for the whole of it, its wall's edge for its face's. Not the mirror image.
+  [[nodiscard]] virtual std::vector<data::Pose<>> other_readings(
+      const data::Pose<>& /*pose*/) const {
+    return {};
+  }
   /// For a body on the floor that is known to lie on its face; null where there is no difference.
   [[nodiscard]] virtual const BodyFinder* lying() const { return nullptr; }
   /// Semi-major axis of the rim of the body lying there [px]; 0 if its size is not known.

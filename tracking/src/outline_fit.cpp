@@ -201,9 +201,12 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
   const bool too_small = seen_px < -kTooSmallPx;
   if (!too_small && fitted->evidence > kFewEdges * outline_px) return fitted;
   std::optional<Fitted> best;
-  for (const data::Pose<>& start :
-       faces_outlined_like(scenery.body, scenery.camera, scenery.motion, fitted->refined.pose)) {
-    auto other = fit_exactly(scenery, start, outline_px, fitted->blur_px);
+  for (const Side side : {Side::same, Side::mirrored}) {
+    if (side == Side::mirrored && scenery.motion.pivoted()) break;
+    const auto start = face_outlined_like(scenery.body, scenery.camera, scenery.motion,
+                                          fitted->refined.pose, side);
+    if (!start) continue;
+    auto other = fit_exactly(scenery, *start, outline_px, fitted->blur_px);
     if (!other) continue;
     const bool right_size =
         too_small && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx;

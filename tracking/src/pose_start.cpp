@@ -237,50 +237,78 @@ data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
 
 namespace {
 
-// A body whose axis through the pivot is turned, moved along it until its near face is seen where
-// its middle was; nothing where that is on the other side of the pivot, as on a pin.
+// A body whose axis through the pivot is turned, moved along it until the point so far ahead of its
+// centre is seen where a point of the scene is; nothing where that is on the other side of the
+// pivot, as on a pin.
 std::optional<data::Pose<>> turned_about(const Eigen::Vector3d& pivot_m,
                                          const Eigen::Vector3d& axis,
-                                         const Eigen::Vector3d& towards, double half_thickness_m,
+                                         const Eigen::Vector3d& towards,
+                                         const Eigen::Vector3d& at_m, double ahead_m,
                                          data::Pose<> pose) {
   const auto across = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
     return v - v.dot(towards) * towards;
   };
-  const Eigen::Vector3d middle = across(pose.centre_m - pivot_m), along = across(axis);
-  const double face_m = middle.dot(along) / along.squaredNorm();
-  if (!(face_m > half_thickness_m)) return std::nullopt;
-  pose.centre_m = pivot_m + (face_m - half_thickness_m) * axis;
+  const Eigen::Vector3d point = across(at_m - pivot_m), along = across(axis);
+  const double point_m = point.dot(along) / along.squaredNorm();
+  if (!(point_m > ahead_m)) return std::nullopt;
+  pose.centre_m = pivot_m + (point_m - ahead_m) * axis;
   return pose;
+}
+
+// How a body is seen: the axis out of its near face, and what it leans aside from the line of
+// sight.
+struct View {
+  Eigen::Vector3d towards, near, aside;
+  double facing;  // cosine of the angle between the two
+
+  View(const data::Camera& camera, const data::Pose<>& pose)
+      : towards(direction_to(camera, pose.centre_m)), near(axis_towards(camera, pose)) {
+    facing = near.dot(towards);
+    aside = (near - facing * towards) / leaning();
+  }
+  [[nodiscard]] double leaning() const { return std::sqrt(std::max(0.0, 1.0 - facing * facing)); }
+};
+
+// The body with its near face tilted otherwise, and the point so far ahead of its centre seen where
+// a point of the scene is.
+std::optional<data::Pose<>> tilted(const data::Camera& camera, const PoseMotion& motion,
+                                   const View& view, data::Pose<> pose, double facing, Side side,
+                                   const Eigen::Vector3d& at_m, double ahead_m) {
+  const double way = side == Side::same ? 1.0 : -1.0;
+  const Eigen::Vector3d face =
+      facing * view.towards + way * std::sqrt(std::max(0.0, 1.0 - facing * facing)) * view.aside;
+  if (motion.pivoted()) {
+    const auto turned = turned_about(motion.pivot_m(), face, view.towards, at_m, ahead_m, pose);
+    return turned ? std::optional(motion.settled(*turned)) : std::nullopt;
+  }
+  set_axis(axis_of(pose).dot(view.near) > 0.0 ? face : Eigen::Vector3d(-face), pose);
+  const Eigen::Vector3d centre_m = at_m - ahead_m * face;
+  return on_ray(camera, motion, pose, camera.image_from_table<double>(centre_m));
 }
 
 }  // namespace
 
-std::vector<data::Pose<>> faces_outlined_like(const data::Body& body, const data::Camera& camera,
-                                              const PoseMotion& motion, const data::Pose<>& pose) {
+std::optional<data::Pose<>> face_outlined_like(const data::Body& body, const data::Camera& camera,
+                                               const PoseMotion& motion, const data::Pose<>& pose,
+                                               Side side) {
   const double h = body.half_thickness_m();
-  const Eigen::Vector3d towards = direction_to(camera, pose.centre_m);
-  const Eigen::Vector3d near = axis_towards(camera, pose);
-  const double facing = near.dot(towards), tilted = std::sqrt(std::max(0.0, 1.0 - facing * facing));
+  const View view(camera, pose);
   // The minor axis over the major one of the ellipse that is outlined.
-  const double share = facing + h / body.radius_m * tilted;
-  if (!(share < 1.0)) return {};
-  const Eigen::Vector3d aside = (near - facing * towards) / tilted;
-  std::vector<data::Pose<>> poses;
-  for (const double way : {1.0, -1.0}) {
-    const Eigen::Vector3d face = share * towards + way * std::sqrt(1.0 - share * share) * aside;
-    if (motion.pivoted()) {
-      if (const auto turned = turned_about(motion.pivot_m(), face, towards, h, pose))
-        poses.push_back(motion.settled(*turned));
-      break;
-    }
-    data::Pose<> other = pose;
-    set_axis(axis_of(pose).dot(near) > 0.0 ? face : Eigen::Vector3d(-face), other);
-    const Eigen::Vector3d centre_m = pose.centre_m - h * face;
-    if (const auto placed =
-            on_ray(camera, motion, other, camera.image_from_table<double>(centre_m)))
-      poses.push_back(*placed);
-  }
-  return poses;
+  const double share = view.facing + h / body.radius_m * view.leaning();
+  if (!(share < 1.0)) return std::nullopt;
+  return tilted(camera, motion, view, pose, share, side, pose.centre_m, h);
+}
+
+std::optional<data::Pose<>> outlined_like_face(const data::Body& body, const data::Camera& camera,
+                                               const PoseMotion& motion, const data::Pose<>& pose) {
+  const double h = body.half_thickness_m();
+  const View view(camera, pose);
+  if (!(view.facing > 0.0 && view.leaning() > 0.0)) return std::nullopt;
+  // R cos t + h sin t = R facing
+  const double wall_rad = std::atan2(h, body.radius_m);
+  const double tilt_rad = wall_rad + std::acos(view.facing * std::cos(wall_rad));
+  return tilted(camera, motion, view, pose, std::cos(tilt_rad), Side::same,
+                pose.centre_m + h * view.near, 0.0);
 }
 
 }  // namespace trochoid::tracking

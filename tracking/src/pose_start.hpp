@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "edge_map.hpp"
@@ -21,11 +22,22 @@ namespace trochoid::tracking {
 [[nodiscard]] data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
                                     const data::Pose<>& pose);
 
-/// Attitudes whose near face alone is outlined as the whole body is at this pose: what is taken for
-/// the body's outline is its face's where the wall beside it is about as bright as the floor.
-[[nodiscard]] std::vector<data::Pose<>> faces_outlined_like(const data::Body& body,
-                                                            const data::Camera& camera,
-                                                            const PoseMotion& motion,
-                                                            const data::Pose<>& pose);
+/// On which side of the line of sight a body tilts, of another attitude.
+enum class Side { same, mirrored };
+
+/// The attitude whose near face alone is outlined as the whole body is at this pose: what is taken
+/// for the body's outline is its face's where the wall beside it is about as bright as the floor.
+/// Nothing where there is none; about a pivot on the same side only.
+[[nodiscard]] std::optional<data::Pose<>> face_outlined_like(const data::Body& body,
+                                                             const data::Camera& camera,
+                                                             const PoseMotion& motion,
+                                                             const data::Pose<>& pose, Side side);
+
+/// The reverse, on the same side: the attitude whose whole outline is as that of the near face
+/// alone is at this pose. The lower edge of its wall has been taken for that of its face.
+[[nodiscard]] std::optional<data::Pose<>> outlined_like_face(const data::Body& body,
+                                                             const data::Camera& camera,
+                                                             const PoseMotion& motion,
+                                                             const data::Pose<>& pose);
 
 }  // namespace trochoid::tracking

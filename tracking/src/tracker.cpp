@@ -14,6 +14,7 @@
 #include "path_motion.hpp"
 #include "path_outliers.hpp"
 #include "pose_motion.hpp"
+#include "readings.hpp"
 #include "recording.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
@@ -303,6 +304,8 @@ class Tracking {
     const auto doubts = decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     mend_from_one_side(background_, *finder_, glimpses);
+    if (choose_readings(background_, *finder_, glimpses))
+      mend_from_neighbours(background_, *finder_, glimpses);
     if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
     doubt_attitudes(doubts, glimpses);
     measure_what_lies(background_, *finder_, glimpses);

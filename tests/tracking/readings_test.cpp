@@ -1,0 +1,109 @@
+#include "readings.hpp"
+
+#include "glimpsed_sequence.hpp"
+#include "pose_motion.hpp"
+#include "pose_start.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kOff_rad = 0.3;  // between the two readings of a picture
+
+/// Finds either of two attitudes, whichever it is led to, the true one with more evidence or less.
+class TwoReadings final : public BodyFinder {
+ public:
+  explicit TwoReadings(std::function<double(int)> bonus_of_truth)
+      : bonus_of_truth_(std::move(bonus_of_truth)) {}
+  [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+    Sighting seen = *look.predicted;
+    double& theta = seen.pose->pose.theta_rad;
+    const bool right = theta < kTilt + 0.5 * kOff_rad;
+    theta = right ? kTilt : kTilt + kOff_rad;
+    seen.pose->pose.phi_rad = phi_at(look.frame.t_s);
+    seen.pose->evidence =
+        kEvidence + (right ? bonus_of_truth_(static_cast<int>(look.frame.index)) : 0.0);
+    seen.pose->covariance_m2 = 1e-8 * Eigen::Matrix2d::Identity();
+    return seen;
+  }
+  void place(Sighting& guess) const override {
+    guess.rim = Ellipse::from_axes({32.0, 32.0}, 10.0, 8.0, 0.0);
+    guess.centre_px = guess.rim.centre_px;
+  }
+  [[nodiscard]] std::vector<data::Pose<>> other_readings(const data::Pose<>& pose) const override {
+    data::Pose<> steeper = pose, flatter = pose;
+    steeper.theta_rad += kOff_rad;
+    flatter.theta_rad -= kOff_rad;
+    return {steeper, flatter};
+  }
+
+ private:
+  std::function<double(int)> bonus_of_truth_;
+};
+
+class Readings : public GlimpsedSequence {
+ protected:
+  /// As tracked, on the other edge where `wrong` says so, then chosen anew.
+  std::vector<Glimpse> chosen(const BodyFinder& finder, const std::function<bool(int)>& wrong) {
+    auto glimpses = tracked(finder, [](int) { return false; });
+    for (Glimpse& g : glimpses) {
+      Sighting guess = *g.seen;
+      if (wrong(static_cast<int>(g.frame->index))) guess.pose->pose.theta_rad += kOff_rad;
+      Look look{.frame = *g.frame, .background = background_.plate()};
+      look.predicted = &guess;
+      g.seen = finder.find(look);
+    }
+    (void)choose_readings(background_, finder, glimpses);
+    return glimpses;
+  }
+  static int count_off(const std::vector<Glimpse>& glimpses) {
+    return static_cast<int>(std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) {
+      return g.pose().theta_rad > kTilt + 0.5 * kOff_rad;
+    }));
+  }
+};
+
+TEST_F(Readings, ARecordingOnAnotherEdgeIsFoundOutByWhatAllPicturesSayTogether) {
+  // By a twentieth, which no picture's evidence is to be trusted with.
+  const TwoReadings finder([](int i) { return i % 2 == 0 ? 15.0 : -5.0; });
+  EXPECT_EQ(count_off(chosen(finder, [](int) { return true; })), 0);
+}
+
+TEST_F(Readings, SomePicturesDoNotDecideAgainstAllOthers) {
+  const TwoReadings finder([](int i) { return i % 12 == 6 ? -15.0 : 5.0; });
+  EXPECT_EQ(count_off(chosen(finder, [](int) { return false; })), 0);
+}
+
+TEST_F(Readings, AStretchThatLeavesThePathIsLedBackThoughALittleMoreSpeaksForIt) {
+  const auto astray = [](int i) { return i >= 25 && i < 30; };
+  const TwoReadings finder([&](int i) { return astray(i) ? -4.0 : 4.0; });
+  EXPECT_EQ(count_off(chosen(finder, astray)), 0);
+}
+
+TEST_F(Readings, ALeapStaysThatThePicturesBearOut) {
+  const TwoReadings finder([](int i) { return i < 30 ? 10.0 : -10.0; });
+  EXPECT_EQ(count_off(chosen(finder, [](int i) { return i >= 30; })), 30);
+}
+
+// A wall as high as it is: the face alone is outlined less round than face and wall together.
+TEST(OtherReadings, TheWholeIsFoundAgainFromTheFaceThatWasOutlinedLikeIt) {
+  data::Body body;
+  body.radius_m = 0.03, body.thickness_m = 0.012;
+  const data::Camera camera = data::Camera::overhead(640, 480, 2000.0, 3.0);
+  const PoseMotion motion(body, {data::SupportKind::floor, {}}, camera);
+  constexpr double kParallax_rad = 0.01, kParallax_m = 1e-4;  // about what the body's size subtends
+  for (const double theta : {0.5, 0.9, 1.2}) {
+    data::Pose<> pose;
+    pose.theta_rad = theta, pose.phi_rad = 0.4;
+    pose = motion.settled(pose);
+    const auto face = face_outlined_like(body, camera, motion, pose, Side::same);
+    ASSERT_TRUE(face) << theta;
+    EXPECT_LT(face->theta_rad, theta - 0.1);
+    const auto whole = outlined_like_face(body, camera, motion, *face);
+    ASSERT_TRUE(whole) << theta;
+    EXPECT_NEAR(whole->theta_rad, theta, kParallax_rad);
+    EXPECT_LT((whole->centre_m - pose.centre_m).norm(), kParallax_m);
+  }
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

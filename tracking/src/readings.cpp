@@ -1,0 +1,339 @@
+#include "readings.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "forecast.hpp"
+#include "pose_motion.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Pose = data::Pose<>;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// How far a pose is from where the two before it lead: of its axis and of its centre.
+struct Miss {
+  double axis_rad, centre_m;
+};
+
+/// A frame with the body, and what it may show: first as tracked.
+struct Node {
+  std::size_t at;  ///< among the glimpses
+  double t_s;
+  std::vector<Sighting> readings;
+  std::size_t chosen = 0;
+
+  [[nodiscard]] const Sighting& seen() const { return readings[chosen]; }
+  [[nodiscard]] const Pose& pose() const { return seen().pose->pose; }
+};
+
+/// A body seen in a frame, and where it was when: how it is followed on.
+struct Start {
+  std::size_t at;  ///< of the nodes
+  int side;        ///< 1 ahead, -1 back
+  Sighting seen;
+  Pose before;
+  double before_s;
+};
+
+class Readings {
+ public:
+  Readings(const Background& background, const BodyFinder& finder, std::vector<Glimpse>& glimpses)
+      : background_(background),
+        finder_(finder),
+        glimpses_(glimpses),
+        alike_(finder.faces_look_alike()) {
+    for (std::size_t i = 0; i < glimpses.size(); ++i)
+      if (glimpses[i].posed()) nodes_.push_back({i, glimpses[i].frame->t_s, {*glimpses[i].seen}});
+    std::vector<double> steps_s;
+    for (std::size_t k = 1; k < nodes_.size(); ++k)
+      steps_s.push_back(nodes_[k].t_s - nodes_[k - 1].t_s);
+    if (!steps_s.empty()) frame_s_ = data::median(std::move(steps_s));
+  }
+
+  bool choose() {
+    constexpr std::size_t kFewest = 8;
+    constexpr int kRounds = 2;  // what was found may be followed on itself
+    if (nodes_.size() < kFewest) return false;
+    learn();
+    follow(others());
+    solve();
+    for (int round = 0; round < kRounds; ++round) {
+      learn();
+      follow(breaks());
+      solve();
+    }
+    bool otherwise = false;
+    for (Node& node : nodes_) {
+      if (node.chosen == 0) continue;
+      auto& seen = glimpses_[node.at].seen;
+      node.readings[node.chosen].turned_rad = seen->turned_rad;
+      seen = std::move(node.readings[node.chosen]);
+      otherwise = true;
+    }
+    return otherwise;
+  }
+
+ private:
+  /// Whether frame k follows on the one before it, or nearly so.
+  [[nodiscard]] bool follows(std::size_t k) const {
+    constexpr double kMostFrames = 2.5;
+    return k > 0 && k < nodes_.size() && nodes_[k].t_s - nodes_[k - 1].t_s < kMostFrames * frame_s_;
+  }
+
+  [[nodiscard]] bool same(const Sighting& a, const Sighting& b) const {
+    constexpr double kSame_rad = 0.02;
+    return between_axes(axis_of(a.pose->pose), axis_of(b.pose->pose), alike_) < kSame_rad &&
+           (a.centre_px - b.centre_px).norm() < kSame_rad * a.rim.semi_major_px();
+  }
+
+  void add(std::size_t k, Sighting seen) {
+    std::vector<Sighting>& known = nodes_[k].readings;
+    if (std::none_of(known.begin(), known.end(),
+                     [&](const Sighting& other) { return same(other, seen); }))
+      known.push_back(std::move(seen));
+  }
+
+  /// How much more speaks for one of two fits to a picture.
+  static double gain(const Sighting& over, const Sighting& under) {
+    constexpr double kLeast = 1e-9;
+    return std::log(std::max(kLeast, over.pose->evidence) / std::max(kLeast, under.pose->evidence));
+  }
+
+  [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t k,
+                                                 const Pose& pose, const Pose& near) const {
+    Sighting guess = nodes_[k].seen();
+    guess.pose->pose = pose;
+    auto seen = measure(*glimpses_[nodes_[k].at].frame, std::move(guess), near);
+    return seen && seen->pose ? std::move(seen) : std::nullopt;
+  }
+
+  /// A pose of frame k one frame earlier (side 1) or later, moving as the body was seen to.
+  [[nodiscard]] std::optional<Pose> one_frame_off(std::size_t k, const Pose& pose, int side) const {
+    const bool from_before = follows(k) && (side > 0 || !follows(k + 1));
+    const std::size_t to = from_before ? k : k + 1;
+    if (!follows(to)) return std::nullopt;
+    const Pose &a = nodes_[to - 1].pose(), &b = nodes_[to].pose();
+    const Pose from = alike_ ? nearer_face(a, b, 0.0) : a;
+    const double share = -side * frame_s_ / (nodes_[to].t_s - nodes_[to - 1].t_s);
+    Pose off = pose;
+    off.centre_m += share * (b.centre_m - from.centre_m);
+    off.theta_rad += share * (b.theta_rad - from.theta_rad);
+    off.phi_rad += share * std::remainder(b.phi_rad - from.phi_rad, kTurn);
+    return off;
+  }
+
+  /// Other readings of every so many frames for which about as much speaks.
+  [[nodiscard]] std::vector<Start> others() {
+    constexpr std::size_t kStride = 12;
+    constexpr double kAsGood = -0.05;
+    std::vector<std::vector<Start>> found(nodes_.size() / kStride);
+    on_both_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
+      const std::size_t k = i * kStride + kStride / 2;
+      for (const Pose& other : finder_.other_readings(nodes_[k].pose())) {
+        const auto before = one_frame_off(k, other, 1);
+        if (!before) continue;
+        const auto seen = measured(measure, k, other, *before);
+        if (!seen || same(*seen, nodes_[k].seen()) || gain(*seen, nodes_[k].seen()) < kAsGood)
+          continue;
+        for (const int side : {1, -1})
+          if (const auto off = one_frame_off(k, seen->pose->pose, side))
+            found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
+      }
+    });
+    std::vector<Start> starts;
+    for (const auto& some : found) starts.insert(starts.end(), some.begin(), some.end());
+    for (const Start& start : starts) add(start.at, start.seen);
+    return starts;
+  }
+
+  /// Where the path breaks, it may have gone on from either side.
+  [[nodiscard]] std::vector<Start> breaks() const {
+    constexpr double kBreak = 0.5 * kMost;
+    const std::size_t n = nodes_.size();
+    std::vector<char> ahead(n, 0), back(n, 0);
+    for (std::size_t k = 2; k < n; ++k)
+      if (break_cost(k, nodes_[k - 2].chosen, nodes_[k - 1].chosen, nodes_[k].chosen) > kBreak)
+        ahead[k - 2] = ahead[k - 1] = back[k - 1] = back[k] = 1;
+    std::vector<Start> starts;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (ahead[k] && follows(k))
+        starts.push_back({k, 1, nodes_[k].seen(), nodes_[k - 1].pose(), nodes_[k - 1].t_s});
+      if (back[k] && follows(k + 1))
+        starts.push_back({k, -1, nodes_[k].seen(), nodes_[k + 1].pose(), nodes_[k + 1].t_s});
+    }
+    return starts;
+  }
+
+  /// Adds what is found on the way from each start.
+  void follow(const std::vector<Start>& starts) {
+    std::vector<std::vector<std::pair<std::size_t, Sighting>>> found(starts.size());
+    on_both_cores(background_, finder_, starts.size(), [&](Measuring& measure, std::size_t i) {
+      found[i] = followed(measure, starts[i]);
+    });
+    for (auto& way : found)
+      for (auto& [k, seen] : way) add(k, std::move(seen));
+  }
+
+  /// Until it is one with the path again, nothing is found, or too little speaks for it.
+  [[nodiscard]] std::vector<std::pair<std::size_t, Sighting>> followed(Measuring& measure,
+                                                                       Start from) const {
+    // One frame's evidence scatters by a tenth or two: a way is given up at half of what it had.
+    constexpr double kGiveUp = 0.7;
+    std::vector<std::pair<std::size_t, Sighting>> found;
+    double sum = 0.0, best = 0.0;
+    while (follows(from.side > 0 ? from.at + 1 : from.at)) {
+      const std::size_t k = from.side > 0 ? from.at + 1 : from.at - 1;
+      const Pose last = from.seen.pose->pose;
+      const double last_s = nodes_[from.at].t_s;
+      const double ahead = (nodes_[k].t_s - last_s) / (last_s - from.before_s);
+      auto seen = measured(measure, k, led(from.before, last, ahead), last);
+      if (!seen || same(*seen, nodes_[k].seen())) break;
+      sum += gain(*seen, nodes_[k].seen());
+      best = std::max(best, sum);
+      if (sum < best - kGiveUp) break;
+      found.emplace_back(k, *seen);
+      from = {k, from.side, std::move(*seen), last, last_s};
+    }
+    return found;
+  }
+
+  /// From a to b goes on so many times as far.
+  [[nodiscard]] Pose led(const Pose& a, const Pose& b, double ahead) const {
+    constexpr double kSteep = 0.2;  // near the vertical, precession means nothing
+    const Pose from = alike_ ? nearer_face(a, b, 0.0) : a;
+    const double turn = std::remainder(b.phi_rad - from.phi_rad, kTurn);
+    Pose pose = b;
+    if (std::min(std::sin(from.theta_rad), std::sin(b.theta_rad)) < kSteep) {
+      set_axis((axis_of(b) + ahead * (axis_of(b) - axis_of(from))).normalized(), pose);
+    } else {
+      pose.phi_rad += ahead * turn;
+      pose.theta_rad += ahead * (b.theta_rad - from.theta_rad);
+    }
+    const Eigen::Vector3d step = b.centre_m - from.centre_m;
+    pose.centre_m += ahead * (round_ ? turned(step, turn, ahead) : step);
+    return pose;
+  }
+
+  /// A step of a centre that goes round with the precession, that much later.
+  static Eigen::Vector3d turned(const Eigen::Vector3d& step, double turn_rad, double ahead) {
+    return Eigen::AngleAxisd(0.5 * (1.0 + ahead) * turn_rad, Eigen::Vector3d::UnitZ()) * step;
+  }
+
+  /// Straight on, and round with the precession.
+  [[nodiscard]] std::pair<Miss, Miss> misses(std::size_t k, std::size_t a, std::size_t b,
+                                             std::size_t c) const {
+    const Pose &second = nodes_[k - 1].readings[b].pose->pose,
+               &third = nodes_[k].readings[c].pose->pose;
+    Pose first = nodes_[k - 2].readings[a].pose->pose;
+    if (alike_) first = nearer_face(first, second, 0.0);
+    const double ahead =
+        (nodes_[k].t_s - nodes_[k - 1].t_s) / (nodes_[k - 1].t_s - nodes_[k - 2].t_s);
+    const double turn = std::remainder(second.phi_rad - first.phi_rad, kTurn);
+    Pose on = second;
+    on.phi_rad += ahead * turn;
+    on.theta_rad += ahead * (second.theta_rad - first.theta_rad);
+    const Eigen::Vector3d to = axis_of(second), is = axis_of(third);
+    const Eigen::Vector3d straight = (to + ahead * (to - axis_of(first))).normalized();
+    const Eigen::Vector3d step = second.centre_m - first.centre_m,
+                          went = third.centre_m - second.centre_m;
+    return {{between_axes(straight, is, alike_), (went - ahead * step).head<2>().norm()},
+            {between_axes(axis_of(on), is, alike_),
+             (went - ahead * turned(step, turn, ahead)).head<2>().norm()}};
+  }
+
+  /// How the body moves: what its path misses by as a rule, and whether its centre goes round.
+  void learn() {
+    constexpr double kLeast_rad = 0.02, kOfUsual = 1.5, kSigmas = 2.0;
+    std::vector<double> axis, centre, straight, round, sd;
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      sd.push_back(std::sqrt(0.5 * nodes_[k].seen().pose->covariance_m2.trace()));
+      if (k < 2 || !follows(k) || !follows(k - 1)) continue;
+      const auto [on, about] =
+          misses(k, nodes_[k - 2].chosen, nodes_[k - 1].chosen, nodes_[k].chosen);
+      axis.push_back(std::min(on.axis_rad, about.axis_rad));
+      centre.push_back(std::min(on.centre_m, about.centre_m));
+      straight.push_back(on.centre_m), round.push_back(about.centre_m);
+    }
+    if (axis.empty()) return;
+    round_ = data::median(std::move(round)) < data::median(std::move(straight));
+    usual_ = {std::max(kLeast_rad, kOfUsual * data::median(std::move(axis))),
+              std::max(kSigmas * data::median(std::move(sd)),
+                       kOfUsual * data::median(std::move(centre)))};
+  }
+
+  /// What it costs that frame k does not go on from the two before it, in these readings.
+  [[nodiscard]] double break_cost(std::size_t k, std::size_t a, std::size_t b,
+                                  std::size_t c) const {
+    if (!follows(k) || !follows(k - 1)) return 0.0;
+    const auto [on, about] = misses(k, a, b, c);
+    const double axis = std::min(on.axis_rad, about.axis_rad) / usual_.axis_rad;
+    const double centre = std::min(on.centre_m, about.centre_m) / usual_.centre_m;
+    return std::min(kMost, 0.5 * (axis * axis + centre * centre));
+  }
+
+  /// What it costs that less speaks for a reading than for the frame as tracked.
+  [[nodiscard]] double own_cost(std::size_t k, std::size_t c) const {
+    constexpr double kPerGain = 12.0;  // fits as good as each other scatter by a tenth or so
+    return -kPerGain * gain(nodes_[k].readings[c], nodes_[k].readings[0]);
+  }
+
+  /// The best path; pairs of readings of successive frames are the states.
+  void solve() {
+    const std::size_t n = nodes_.size();
+    const auto count = [&](std::size_t k) { return nodes_[k].readings.size(); };
+    Eigen::MatrixXd until(count(0), count(1));
+    for (std::size_t a = 0; a < count(0); ++a)
+      for (std::size_t b = 0; b < count(1); ++b) until(a, b) = own_cost(0, a) + own_cost(1, b);
+    std::vector<Eigen::MatrixX<std::size_t>> from(n);
+    for (std::size_t k = 2; k < n; ++k) {
+      Eigen::MatrixXd next(count(k - 1), count(k));
+      from[k].resize(next.rows(), next.cols());
+      for (std::size_t b = 0; b < count(k - 1); ++b)
+        for (std::size_t c = 0; c < count(k); ++c) {
+          double least = std::numeric_limits<double>::infinity();
+          for (std::size_t a = 0; a < count(k - 2); ++a) {
+            const double sum = until(a, b) + break_cost(k, a, b, c);
+            if (sum < least) least = sum, from[k](b, c) = a;
+          }
+          next(b, c) = least + own_cost(k, c);
+        }
+      until = std::move(next);
+    }
+    Eigen::Index b = 0, c = 0;
+    until.minCoeff(&b, &c);
+    nodes_[n - 2].chosen = static_cast<std::size_t>(b);
+    nodes_[n - 1].chosen = static_cast<std::size_t>(c);
+    for (std::size_t k = n - 1; k >= 2; --k)
+      nodes_[k - 2].chosen = from[k](nodes_[k - 1].chosen, nodes_[k].chosen);
+  }
+
+  /// A break costs at most what five frames gain in which a tenth more speaks for another reading;
+  /// a leap and the way back are four breaks.
+  static constexpr double kMost = 6.0;
+
+  const Background& background_;
+  const BodyFinder& finder_;
+  std::vector<Glimpse>& glimpses_;
+  bool alike_;
+  double frame_s_ = 1.0;
+  std::vector<Node> nodes_;
+  Miss usual_{1.0, 1.0};
+  bool round_ = false;  ///< the centre goes round with the precession
+};
+
+}  // namespace
+
+bool choose_readings(const Background& background, const BodyFinder& finder,
+                     std::vector<Glimpse>& glimpses) {
+  return Readings(background, finder, glimpses).choose();
+}
+
+}  // namespace trochoid::tracking
