@@ -115,9 +115,12 @@ void print_truth(const Recording& r, const data::TrackFile& file) {
              cell(s.rms_px, 4), cell(s.rms_mm, 4), cell(s.bias_px.x(), 4), cell(s.bias_px.y(), 4),
              cell(s.bias_mm.x(), 4), cell(s.bias_mm.y(), 4), cell(s.largest_px, 3), s.worst_frame);
   fmt::print("  rms of tilt {} deg, precession {} deg, spin {} deg (tilt 15..75 deg{})\n",
-             cell(s.tilt_rms_deg, 3), cell(s.precession_rms_deg, 3), cell(s.spin_rms_deg, 3),
+             cell(s.tilt.rms_deg, 3), cell(s.precession.rms_deg, 3), cell(s.spin.rms_deg, 3),
              scene.body->faces_look_alike() ? ", folded" : "");
-  fmt::print("  mean squared normalised error {} (1 = honest sigmas)\n", cell(s.normalised, 3));
+  fmt::print(
+      "  mean squared normalised error {} (tilt {}, precession {}, spin {}; 1 = honest sigmas)\n",
+      cell(s.normalised, 3), cell(s.tilt.normalised, 2), cell(s.precession.normalised, 2),
+      cell(s.spin.normalised, 2));
 }
 
 void print_label_score(const LabelScore& s) {

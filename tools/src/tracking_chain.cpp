@@ -186,7 +186,7 @@ Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& 
              "frames/s", "peak MB");
   std::string csv =
       "recording,picture,width_px,height_px,effort,frames,found,wrong,rms_px,rms_mm,tilt_rms_deg,"
-      "normalised,frames_per_s,peak_mb\n";
+      "normalised,tilt_normalised,frames_per_s,peak_mb\n";
   for (const fs::path& folder : folders) {
     const std::string name = fs::weakly_canonical(folder).filename().string();
     for (const View& view : kViews) {
@@ -203,13 +203,14 @@ Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& 
         row->view = view;
         const TruthScore& s = row->score;
         fmt::print("{:>5}/{:<5} {:>6} {:>8.4f} {:>8.4f} {:>9.3f} {:>9.0f} {:>8.0f}\n", s.found,
-                   s.frames, s.wrong, s.rms_px, s.rms_mm, s.tilt_rms_deg, row->frames_per_s,
+                   s.frames, s.wrong, s.rms_px, s.rms_mm, s.tilt.rms_deg, row->frames_per_s,
                    row->peak_mb);
         std::fflush(stdout);
-        csv += fmt::format("{},{},{},{},{},{},{},{},{:.5g},{:.5g},{:.5g},{:.4g},{:.5g},{:.4g}\n",
-                           name, view.name, made.camera.width_px, made.camera.height_px, effort,
-                           s.frames, s.found, s.wrong, s.rms_px, s.rms_mm, s.tilt_rms_deg,
-                           s.normalised, row->frames_per_s, row->peak_mb);
+        csv += fmt::format(
+            "{},{},{},{},{},{},{},{},{:.5g},{:.5g},{:.5g},{:.4g},{:.5g},{:.5g},{:.4g}\n", name,
+            view.name, made.camera.width_px, made.camera.height_px, effort, s.frames, s.found,
+            s.wrong, s.rms_px, s.rms_mm, s.tilt.rms_deg, s.normalised, s.tilt.normalised,
+            row->frames_per_s, row->peak_mb);
         rows.push_back(*row);
       }
     }

@@ -19,7 +19,8 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 class Rms {
  public:
   void add(double error) { sum_ += error * error, ++count_; }
-  [[nodiscard]] double value() const { return count_ > 0 ? std::sqrt(sum_ / count_) : kUnknown; }
+  [[nodiscard]] double square() const { return count_ > 0 ? sum_ / count_ : kUnknown; }
+  [[nodiscard]] double value() const { return std::sqrt(square()); }
 
  private:
   double sum_ = 0.0;
@@ -49,17 +50,29 @@ std::map<std::int64_t, Eigen::Index> rows_by_frame(const data::Table& table) {
   return rows;
 }
 
-struct AngleErrors {
-  Rms tilt, precession, spin;
+class AngleErrors {
+ public:
+  void add(double error_rad, double sigma_rad) {
+    degrees_.add(error_rad * kDeg);
+    normalised_.add(error_rad / sigma_rad);
+  }
+  [[nodiscard]] TruthScore::Angle score() const { return {degrees_.value(), normalised_.square()}; }
+
+ private:
+  Rms degrees_, normalised_;
+};
+
+struct AttitudeErrors {
+  AngleErrors tilt, precession, spin;
 
   void add(const data::TrackSample& sample, const Attitude& truth, const data::Body& body) {
     if (!sample.theta || truth.theta < 15.0 / kDeg || truth.theta > 75.0 / kDeg) return;
     const Attitude ours = folded({sample.theta->value_rad, sample.phi ? sample.phi->value_rad : 0.0,
                                   sample.psi ? sample.psi->value_rad : 0.0},
                                  body);
-    tilt.add((ours.theta - truth.theta) * kDeg);
-    if (sample.phi) precession.add(turn_difference(ours.phi, truth.phi) * kDeg);
-    if (sample.psi) spin.add(turn_difference(ours.psi, truth.psi) * kDeg);
+    tilt.add(ours.theta - truth.theta, sample.theta->sigma_rad);
+    if (sample.phi) precession.add(turn_difference(ours.phi, truth.phi), sample.phi->sigma_rad);
+    if (sample.psi) spin.add(turn_difference(ours.psi, truth.psi), sample.psi->sigma_rad);
   }
 };
 
@@ -77,7 +90,7 @@ TruthScore score_against_truth(const data::Track& track, const data::Table& trut
   const Eigen::VectorXd visible =
       truth.has("vis_frac") ? column("vis_frac") : Eigen::VectorXd::Ones(x_px.size()).eval();
   Rms pixels, metres, normalised;
-  AngleErrors angles;
+  AttitudeErrors attitude;
   for (const auto& [frame, row] : rows_by_frame(truth)) {
     const auto found = samples.find(frame);
     const bool counts = visible[row] >= 0.5;
@@ -97,7 +110,7 @@ TruthScore score_against_truth(const data::Track& track, const data::Table& trut
     score.bias_px += error_px;
     if (error_px.norm() > score.largest_px)
       score.largest_px = error_px.norm(), score.worst_frame = frame;
-    angles.add(sample, folded({theta[row], phi[row], psi[row]}, body), body);
+    attitude.add(sample, folded({theta[row], phi[row], psi[row]}, body), body);
     if (!sample.has_metres()) continue;
     const Eigen::Vector2d error_m = sample.centre_m - Eigen::Vector2d(x_m[row], y_m[row]);
     metres.add(1e3 * error_m.norm());
@@ -108,10 +121,10 @@ TruthScore score_against_truth(const data::Track& track, const data::Table& trut
   score.rms_px = pixels.value();
   score.rms_mm = metres.value();
   if (score.found > 0) score.bias_px /= score.found, score.bias_mm /= score.found;
-  score.normalised = normalised.value() * normalised.value();
-  score.tilt_rms_deg = angles.tilt.value();
-  score.precession_rms_deg = angles.precession.value();
-  score.spin_rms_deg = angles.spin.value();
+  score.normalised = normalised.square();
+  score.tilt = attitude.tilt.score();
+  score.precession = attitude.precession.score();
+  score.spin = attitude.spin.score();
   return score;
 }
 

@@ -17,10 +17,12 @@ struct TruthScore {
   int wrong = 0;  ///< samples farther off than the body is large
   double rms_px = 0.0, largest_px = 0.0, rms_mm = 0.0;
   Eigen::Vector2d bias_px = Eigen::Vector2d::Zero(), bias_mm = Eigen::Vector2d::Zero();
-  double tilt_rms_deg = 0.0;  ///< where the tilt is 15..75 deg; folded if the faces look alike
-  double precession_rms_deg = 0.0;  ///< modulo whole turns, same frames
-  double spin_rms_deg = 0.0;        ///< modulo whole turns, same frames
-  double normalised = 0.0;          ///< mean of error^T covariance^-1 error / 2; 1 = honest sigmas
+  double normalised = 0.0;  ///< mean of error^T covariance^-1 error / 2; 1 = honest sigmas
+  /// Where the tilt is 15..75 deg; folded if the faces look alike.
+  struct Angle {
+    double rms_deg = 0.0;     ///< modulo whole turns
+    double normalised = 0.0;  ///< mean of (error / sigma)^2; 1 = honest sigmas
+  } tilt, precession, spin;
   std::int64_t worst_frame = -1;
 };
 /// @param truth columns frame, x_m, y_m, x_px, y_px, theta_rad, phi_rad, psi_rad, vis_frac.
