@@ -189,11 +189,10 @@ void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
   });
 }
 
-// The terms without one of `these`; the last resort stays.
-std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<int>& terms,
-                                         const std::set<int>& these) {
+// The terms with one less; the last resort stays.
+std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<int>& terms) {
   std::vector<std::set<int>> sets;
-  for (const int index : these) {
+  for (const int index : terms) {
     if (ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
     sets.push_back(terms);
     sets.back().erase(index);
@@ -234,7 +233,7 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
   while (rungs[current].fitted && rungs[current].fit.converged) {
     const std::size_t first = rungs.size();
     const std::set<int> terms = rungs[current].terms;
-    std::vector<std::set<int>> smaller = with_one_less(ladder, terms, terms);
+    std::vector<std::set<int>> smaller = with_one_less(ladder, terms);
     std::erase_if(smaller, [&](const std::set<int>& fewer) {
       return !may_do_without(rungs[current], rung_with(ladder, fewer));
     });
@@ -260,18 +259,27 @@ std::set<std::string> parameters_of_term(const Ladder& ladder, const std::set<in
   return own;
 }
 
-// Whether a fit with so many more parameters, which promises this chi-square, may come to something
-// beside a known rung. One that hardly follows the track has to be mended for a good part: all else
-// would only follow the tracker's errors. Where what is left hangs together, a further term may be
-// what is missing, and all that it takes away counts; what takes the place of another, or stands
-// beside a rung that leaves noise, may do as well as that.
-bool worth_a_fit(const Rung& known, const Promise& promise, double chi2, int more, bool larger) {
+// What a change is promised to cost in BIC for its parameters, and to bring in chi-square.
+double price(const Promise& promise, const Promise::Change& change) {
+  return change.parameters * std::log(promise.rows);
+}
+double gain(const Promise& promise, const Promise::Change& change) {
+  return promise.before - change.chi2;
+}
+
+// Whether a promised change of a known rung may come to something. One that hardly follows the
+// track has to be mended for a good part: all else would only follow the tracker's errors. Where
+// what is left hangs together, a further term may be what is missing, and all that it takes away
+// counts; what takes the place of another, or stands beside a rung that leaves noise, may do as
+// well as that.
+bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
+                 const Promise::Change& change, bool larger) {
   constexpr double kGoodPart = 0.25;
-  const double gain = promise.before - chi2, price = more * std::log(promise.rows);
+  const double gained = gain(promise, change), paid = price(promise, change);
   if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
-    return gain > kGoodPart * promise.before;
-  if (larger && known.fit.whiteness_p < kWhite) return gain > price;
-  return price - gain / promise.dilution < kVeryStrong;
+    return gained > kGoodPart * promise.before;
+  if (larger && known.fit.whiteness_p < kWhite) return gained > paid;
+  return paid - gained / dilution < kVeryStrong;
 }
 
 // Sets with one more term than a known rung's, and with one more in the place of another, the most
@@ -284,29 +292,29 @@ std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
     if (!ladder.terms[static_cast<std::size_t>(term)].last_resort)
       others[term] = parameters_of_term(ladder, known.terms, term);
   const std::vector<std::set<int>> larger = with_one_more(ladder, known.terms);
-  std::vector<Promise> promises(larger.size());
+  std::vector<std::optional<Promise>> promises(larger.size());
   in_parallel(static_cast<int>(larger.size()), options.threads, [&](int i) {
     const auto n = static_cast<std::size_t>(i);
     promises[n] = promised(tracks, known, options, rung_with(ladder, larger[n]), others);
   });
+  const double diluted = dilution(tracks, known, options);
   std::vector<std::pair<double, std::set<int>>> worth;  // by what BIC is promised to change by
-  const auto consider = [&](const Promise& promise, double chi2, int more, bool is_larger,
+  const auto consider = [&](const Promise& promise, const Promise::Change& change, bool is_larger,
                             std::set<int> terms) {
-    if (worth_a_fit(known, promise, chi2, more, is_larger))
-      worth.emplace_back(chi2 - promise.before + more * std::log(promise.rows), std::move(terms));
+    if (worth_a_fit(known, diluted, promise, change, is_larger))
+      worth.emplace_back(price(promise, change) - gain(promise, change), std::move(terms));
   };
   for (std::size_t i = 0; i < larger.size(); ++i) {
-    const Promise& promise = promises[i];
-    if (promise.rows == 0) {
+    const auto& promise = promises[i];
+    if (!promise) {
       worth.emplace_back(0.0, larger[i]);
       continue;
     }
-    consider(promise, promise.with, promise.further, true, larger[i]);
-    for (const auto& [term, names] : others) {
+    consider(*promise, promise->with, true, larger[i]);
+    for (const auto& [term, change] : promise->instead) {
       std::set<int> exchanged = larger[i];
       exchanged.erase(term);
-      consider(promise, promise.instead.at(term), promise.further - static_cast<int>(names.size()),
-               false, std::move(exchanged));
+      consider(*promise, change, false, std::move(exchanged));
     }
   }
   std::stable_sort(worth.begin(), worth.end(),

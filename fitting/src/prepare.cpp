@@ -137,6 +137,17 @@ void start_decay_within_sight(Problem& problem) {
   }
 }
 
+// Values by name: for all arcs or, with "@i", for arc i.
+void take_start(const std::map<std::string, double>& start, Problem& problem) {
+  const auto& parameters = problem.predictor->parameters();
+  for (std::size_t arc = 0; arc < problem.base.size(); ++arc)
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      auto given = start.find(fmt::format("{}@{}", parameters[i].name, arc));
+      if (given == start.end()) given = start.find(parameters[i].name);
+      if (given != start.end()) problem.base[arc][static_cast<Eigen::Index>(i)] = given->second;
+    }
+}
+
 }  // namespace
 
 double frame_time_s(std::span<const data::Track> tracks) {
@@ -166,9 +177,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
                     problem.rows(), problem.arcs.front().held ? " after the body is let go" : "",
                     needed, model));
   start_decay_within_sight(problem);
-  for (const auto& [name, value] : options.start)
-    if (const int index = predictor.index_of(name); index >= 0)
-      for (Eigen::VectorXd& base : problem.base) base[index] = value;
+  take_start(options.start, problem);
   problem.tolerance =
       options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
   return problem;

@@ -2,9 +2,13 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
 #include <vector>
 
 #include "first_guess.hpp"
+#include "linearise.hpp"
 #include "observed.hpp"
 #include "prepare.hpp"
 #include "problem.hpp"
@@ -14,107 +18,109 @@
 namespace trochoid::fitting {
 namespace {
 
-// Residuals and derivatives by u at the minimum, where further losses are next to nothing.
+// A minimum, whose values are the problem's start.
+struct Minimum {
+  std::unique_ptr<model::Predictor> plain, wrapped;
+  Problem problem;
+  Eigen::VectorXd u;
+
+  Minimum(std::span<const data::Track> tracks, const data::Scene& given,
+          const FitOptions& options) {
+    data::Scene scene = completed(given, options);
+    plain = model::make_predictor(scene);
+    wrapped = observed(*plain, scene, frame_time_s(tracks));
+    problem = prepare(tracks, wrapped ? *wrapped : *plain, scene, options);
+    u = problem.start();
+    reweight(problem, u, true);
+  }
+};
+
+// Residuals and derivatives by u, priors among them.
 struct Tangent {
-  Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
+  Eigen::VectorXd residuals;
+  Eigen::VectorXd nothing;     // the step at which a parameter is zero: losses act in proportion
+  std::vector<bool> positive;  // strengths of losses
 };
 
-Eigen::MatrixXd side_by_side(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd both(a.rows(), a.cols() + b.cols());
-  both << a, b;
-  return both;
+Tangent tangent(const Problem& problem, const Eigen::VectorXd& u) {
+  const auto count = static_cast<int>(problem.free.size());
+  Linearised all = linearise(problem, u);
+  Tangent at{{}, {}, Eigen::VectorXd(count), std::vector<bool>(problem.free.size())};
+  Eigen::Index row = problem.rows();
+  for (int i = 0; i < count; ++i) {
+    const FreeParameter& parameter = problem.free[i];
+    const double slope = parameter.transform.slope(u[i]), value = problem.value(i, u);
+    all.jacobian.col(i) *= slope;
+    if (parameter.prior)
+      all.residuals[row++] = (value - parameter.prior->value) / parameter.prior->sigma;
+    at.nothing[i] = -value / slope;
+    at.positive[i] =
+        is_loss(problem, parameter) && problem.predictor->parameters()[parameter.index].logarithmic;
+  }
+  at.jacobian = std::move(all.jacobian);
+  at.residuals = std::move(all.residuals);
+  return at;
 }
 
-// Chi-square when these columns have done what they can.
-double least(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residuals) {
-  return (residuals - columns * columns.colPivHouseholderQr().solve(residuals)).squaredNorm();
+// Chi-square when all parameters but these have done what they can, which are zero or held.
+double least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
+  Eigen::VectorXd residuals = at.residuals;
+  for (const int i : zero) residuals += at.nothing[i] * at.jacobian.col(i);
+  std::vector<int> columns;
+  for (int i = 0; i < at.nothing.size(); ++i)
+    if (!zero.contains(i) && !held.contains(i)) columns.push_back(i);
+  const Eigen::MatrixXd active = at.jacobian(Eigen::all, columns);
+  const Eigen::VectorXd step = active.colPivHouseholderQr().solve(-residuals);
+  // Where some would be negative, one of them at least is zero: chi-square falls on a straight way
+  // from any other place to here.
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    const int i = columns[c];
+    if (!at.positive[i] || step[static_cast<Eigen::Index>(c)] >= at.nothing[i]) continue;
+    std::set<int> fewer = zero;
+    fewer.insert(i);
+    best = std::min(best, least(at, fewer, held));
+  }
+  return std::isfinite(best) ? best : (residuals + active * step).squaredNorm();
 }
 
-// What would be added: its columns, and which of them can only grow from nothing.
-struct Further {
-  Eigen::MatrixXd columns;
-  std::vector<bool> only_grows;
-};
-
-// The same with one of the further columns, or all.
-double least_with(const Eigen::MatrixXd& columns, const Further& further,
-                  const Eigen::VectorXd& residuals) {
-  double best = least(columns, residuals);
-  const auto take = [&](Eigen::Index first, Eigen::Index count) {
-    const Eigen::MatrixXd all = side_by_side(columns, further.columns.middleCols(first, count));
-    const Eigen::VectorXd step = all.colPivHouseholderQr().solve(-residuals);
-    for (Eigen::Index i = 0; i < count; ++i)
-      if (further.only_grows[static_cast<std::size_t>(first + i)] && step[columns.cols() + i] < 0.0)
-        return;
-    best = std::min(best, (residuals + all * step).squaredNorm());
-  };
-  const Eigen::Index all = further.columns.cols();
-  for (Eigen::Index i = 0; i < all; ++i) take(i, 1);
-  take(0, all);
-  return best;
-}
-
-std::vector<int> indices_of(const Problem& problem, const std::set<std::string>& names) {
-  std::vector<int> indices;
+std::set<int> named(const Problem& problem, const std::set<std::string>& names) {
+  std::set<int> indices;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
-    if (names.contains(problem.name(i))) indices.push_back(i);
+    if (names.contains(problem.name(i))) indices.insert(i);
   return indices;
-}
-
-std::vector<int> all_but(const Problem& problem, const std::set<std::string>& a,
-                         const std::set<std::string>& b = {}) {
-  std::vector<int> indices;
-  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
-    if (!a.contains(problem.name(i)) && !b.contains(problem.name(i))) indices.push_back(i);
-  return indices;
-}
-
-// How many times less than its change of chi-square tells what leaves residuals hanging together.
-double dilution(Problem problem, const std::set<std::string>& further) {
-  std::erase_if(problem.free, [&](const FreeParameter& parameter) {
-    return further.contains(problem.predictor->parameters()[parameter.index].name);
-  });
-  const double widened = uncertainty(problem, problem.start()).widened;
-  return widened * widened;
 }
 
 }  // namespace
 
-Promise promised(std::span<const data::Track> tracks, const data::Scene& given,
+Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
                  const FitOptions& options, const std::set<std::string>& further,
                  const std::map<int, std::set<std::string>>& others) {
-  data::Scene scene = completed(given, options);
-  const auto plain = model::make_predictor(scene);
-  const auto wrapped = observed(*plain, scene, frame_time_s(tracks));
-  Problem problem = prepare(tracks, wrapped ? *wrapped : *plain, scene, options);
-  if (problem.arcs.size() > 1) return {};
-  const Eigen::VectorXd u = problem.start();
-  reweight(problem, u, true);
-  Tangent at;
-  if (!evaluate(problem, 0, u, at.residuals, &at.jacobian)) return {};
-  Further added;
-  for (const int i : indices_of(problem, further)) {
-    const Transform::Kind kind = problem.free[i].transform.kind;
-    added.only_grows.push_back(kind != Transform::Kind::identity && kind != Transform::Kind::below);
-  }
-  added.columns = at.jacobian(Eigen::all, indices_of(problem, further));
-  const Eigen::MatrixXd known = at.jacobian(Eigen::all, all_but(problem, further));
+  const Minimum minimum(tracks, scene, options);
+  const Problem& problem = minimum.problem;
+  const Tangent at = tangent(problem, minimum.u);
+  std::set<int> held;  // as in a fit
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (problem.free[i].held) held.insert(i);
+  const std::set<int> added = named(problem, further);
+  const auto more = static_cast<int>(added.size());
   Promise promise;
-  promise.dilution = dilution(problem, further);
   promise.rows = problem.rows();
-  promise.further = static_cast<int>(added.columns.cols());
-  promise.before = least(known, at.residuals);
-  promise.with = least_with(known, added, at.residuals);
+  promise.before = least(at, added, held);
+  promise.with = {least(at, {}, held), more};
   for (const auto& [key, names] : others) {
-    // Losses act in proportion to their strengths.
-    Eigen::VectorXd without = at.residuals;
-    for (const int i : indices_of(problem, names))
-      without -= problem.value(i, u) / problem.free[i].transform.slope(u[i]) * at.jacobian.col(i);
-    const Eigen::MatrixXd rest = at.jacobian(Eigen::all, all_but(problem, further, names));
-    promise.instead[key] = least_with(rest, added, without);
+    const std::set<int> removed = named(problem, names);
+    promise.instead[key] = {least(at, removed, held), more - static_cast<int>(removed.size())};
   }
   return promise;
+}
+
+double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
+                const FitOptions& options) {
+  const Minimum at(tracks, scene, options);
+  const double widened = uncertainty(at.problem, at.u).widened;
+  return widened * widened;
 }
 
 }  // namespace trochoid::fitting

@@ -34,16 +34,21 @@ bool explains(const Rung& rung) {
          (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
 }
 
-std::map<std::string, double> values_of(const data::Fit& fit) {
-  const bool single = fit.arcs.size() < 2;
-  const auto predictor_like = [&](const data::FitParameter& parameter) {
-    return parameter.status != data::ParameterStatus::derived &&
-           parameter.name.find('@') == std::string::npos && std::isfinite(parameter.value);
-  };
+namespace {
+
+// Those of one of several arcs alone under their names there ("x_m@1").
+std::map<std::string, double> values_of_all_arcs(const data::Fit& fit) {
   std::map<std::string, double> values;
   for (const data::FitParameter& parameter : fit.parameters)
-    if (single && predictor_like(parameter)) values[parameter.name] = parameter.value;
+    if (parameter.status != data::ParameterStatus::derived && std::isfinite(parameter.value))
+      values[parameter.name] = parameter.value;
   return values;
+}
+
+}  // namespace
+
+std::map<std::string, double> values_of(const data::Fit& fit) {
+  return fit.arcs.size() < 2 ? values_of_all_arcs(fit) : std::map<std::string, double>{};
 }
 
 namespace {
@@ -177,14 +182,21 @@ double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& ru
 // Of the typical size of a parameter: near the solution without it; and what no residual sees.
 constexpr double kLittle = 0.02, kNext = 1e-6;
 
-// Parameters that `known` does not have start at a share of their typical size.
-std::map<std::string, double> extended_start(const Rung& known, const Rung& rung,
-                                             double share = kLittle) {
-  std::map<std::string, double> start = values_of(known.fit);
+// Parameters of a rung that `known` does not have at a share of their typical size.
+std::map<std::string, double> further_parameters(const Rung& known, const Rung& rung,
+                                                 double share) {
+  std::map<std::string, double> further;
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())
     if (info.role == model::ParameterInfo::Role::dynamics && known.fit.find(info.name) == nullptr)
-      start[info.name] = share * info.value;
+      further[info.name] = share * info.value;
+  return further;
+}
+
+// From a known rung's values on.
+std::map<std::string, double> extended_start(const Rung& known, const Rung& rung) {
+  std::map<std::string, double> start = values_of(known.fit);
+  start.merge(further_parameters(known, rung, kLittle));
   return start;
 }
 
@@ -252,19 +264,33 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
   });
 }
 
-Promise promised(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
-                 const Rung& larger, const std::map<int, std::set<std::string>>& others) {
+std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung& known,
+                                const FitOptions& options, const Rung& larger,
+                                const std::map<int, std::set<std::string>>& others) {
   FitOptions at = options;
-  at.start = extended_start(known, larger, kNext);
+  at.start = values_of_all_arcs(known.fit);
+  std::set<std::string> further;
+  for (const auto& [name, value] : further_parameters(known, larger, kNext)) {
+    at.start[name] = value;
+    further.insert(name);
+  }
   data::Scene scene = larger.scene;
   scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
-  std::set<std::string> further;
-  for (const auto& [name, value] : at.start)
-    if (known.fit.find(name) == nullptr) further.insert(name);
   try {
     return promised(tracks, scene, at, further, others);
-  } catch (const Error&) {  // too many parameters for the track: the fit says so
-    return {};
+  } catch (const TrackError&) {
+  } catch (const NumericalError&) {
+  }
+  return std::nullopt;
+}
+
+double dilution(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options) {
+  FitOptions at = options;
+  at.start = values_of_all_arcs(known.fit);
+  try {
+    return dilution(tracks, known.scene, at);
+  } catch (const NumericalError&) {  // integrated as coarsely as a search does
+    return 1.0;
   }
 }
 

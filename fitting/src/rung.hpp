@@ -1,6 +1,7 @@
 #pragma once
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -68,9 +69,17 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 
 /// What a known rung's tangent plane says of a larger one.
 /// @param others  parameters of each of the known rung's terms that may be left out.
-[[nodiscard]] Promise promised(std::span<const data::Track> tracks, const Rung& known,
-                               const FitOptions& options, const Rung& larger,
-                               const std::map<int, std::set<std::string>>& others);
+/// @returns nothing where nothing can be told: the larger one has too many parameters for the
+/// track, or no prediction. Its fit says so.
+[[nodiscard]] std::optional<Promise> promised(std::span<const data::Track> tracks,
+                                              const Rung& known, const FitOptions& options,
+                                              const Rung& larger,
+                                              const std::map<int, std::set<std::string>>& others);
+
+/// How many times less than its change a rung's chi-square tells, for what its residuals have in
+/// common.
+[[nodiscard]] double dilution(std::span<const data::Track> tracks, const Rung& known,
+                              const FitOptions& options);
 
 /// Fits a rung from the values that explain a first part of the track. A sliding one rolls at first
 /// and slides by Coulomb's law from where that ends; softly where that law leaves something to be
