@@ -71,5 +71,27 @@ TEST(RobustStep, FarRimsMoveAgainstNearOnes) {
   EXPECT_LT(solution.common(1, 1), 0.01 * solution.common(0, 0));
 }
 
+// The long sides of an outline against its ends: no shift of the whole, but a tilt, which is seen
+// as the outline getting narrower.
+TEST(RobustStep, LongSidesMoveAgainstEnds) {
+  constexpr double kFlank_px = 0.05, kRadius_px = 40.0;
+  std::mt19937 random(23);
+  auto equations = round_a_circle(0.02, 0.0, random);
+  for (EdgeEquation& e : equations) {
+    const double along = std::cos(2.0 * e.direction_rad);
+    e.motion =
+        Eigen::Vector3d(e.normal.x(), e.normal.y(), -kRadius_px * e.normal.x() * e.normal.x());
+    e.flank_px = kFlank_px * along;
+  }
+  RobustSolution solution;
+  const PoseMotion::Step prior = Eigen::Vector3d(30.0, 30.0, 0.5);
+  ASSERT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
+  find_uncertainty(equations, prior, solution);
+  // cos^2 = (1 + cos 2) / 2, and a circle of free size takes the one.
+  const double tilted_rad = 2.0 * kFlank_px / kRadius_px;
+  EXPECT_NEAR(std::sqrt(solution.common(2, 2)), tilted_rad, 0.15 * tilted_rad);
+  EXPECT_LT(std::sqrt(solution.common(0, 0)), 0.05 * kFlank_px);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -187,8 +187,8 @@ double sliver_px(const ProfileEdge& e) {
 }
 
 // What edges of a whole side of the body may be wrong by alike [px]: light beside them that is not
-// known by some share of it, rounded rims, and colours that luma mixes wrongly.
-double common_sd_px(const Scenery& scenery, const ProfileEdge& e, double blur_px) {
+// known by some share of it, and colours that luma mixes wrongly.
+double common_light_px(const Scenery& scenery, const ProfileEdge& e, double blur_px) {
   constexpr double kUnknownPx = 0.03;    // beside an edge as strong as its mean level
   const double step_px = 2.5 * blur_px;  // of a Gaussian edge: shift per share of its step
   const double tone = tone_of(e);
@@ -197,8 +197,15 @@ double common_sd_px(const Scenery& scenery, const ProfileEdge& e, double blur_px
                             ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
                                            e.mean_level + 0.5 * e.contrast)
                             : 0.0;
-  return std::hypot(unknown_share(e) * kUnknownPx / (tone * std::sqrt(tone)), sliver_px(e),
+  return std::hypot(unknown_share(e) * kUnknownPx / (tone * std::sqrt(tone)),
                     kMixingShare * step_px * std::min(kMostMixing, std::abs(mixing)));
+}
+
+// Direction in the picture in which the outline of a pose is the narrowest.
+double narrow_direction_rad(const data::Camera& camera, const data::Pose<>& pose) {
+  const Eigen::Vector2d along =
+      camera.jacobian_px_per_m(pose.centre_m) * axis_towards(camera, pose);
+  return std::atan2(along.y(), along.x());
 }
 
 EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look, bool colour) {
@@ -505,9 +512,17 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   return out;
 }
 
+// A lamp makes one side of the body wrong against the other; what the light is like beside the long
+// sides of the outline and at its ends, where the wall turns away, differs as much.
 void find_uncertainty(const Scenery& scenery, Refined& refined) {
-  for (size_t i = 0; i < refined.equations.size(); ++i)
-    refined.equations[i].common_px = common_sd_px(scenery, refined.edges[i], refined.blurs_px[i]);
+  const double narrow_rad = narrow_direction_rad(scenery.camera, refined.pose);
+  for (size_t i = 0; i < refined.equations.size(); ++i) {
+    EdgeEquation& e = refined.equations[i];
+    const double light_px = common_light_px(scenery, refined.edges[i], refined.blurs_px[i]);
+    e.common_px = std::hypot(light_px, sliver_px(refined.edges[i]));
+    if (refined.samples[i].silhouette)
+      e.flank_px = light_px * std::cos(2.0 * (e.direction_rad - narrow_rad));
+  }
   find_uncertainty(refined.equations, prior_of(scenery.motion), refined.solution);
 }
 

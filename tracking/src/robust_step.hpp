@@ -31,6 +31,8 @@ struct EdgeEquation {
   double common_px = 0.0;
   /// The same, for all edges of the far face and the wall against those of the near face [px].
   double lower_px = 0.0;
+  /// The same, where the outline is narrow against where it is wide; signed [px].
+  double flank_px = 0.0;
   /// Seen in the colour planes: with a shift of these planes and one along the normal as nuisances.
   bool colour = false;
   double offset_px = 0.0;
