@@ -59,6 +59,22 @@ void print_notes(const data::Fit& fit) {
   for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
 }
 
+void print_comparison(const std::vector<data::ModelScore>& models) {
+  if (models.empty()) return;
+  fmt::print("  {:>10}{:>12}{:>12}{:>12}   model\n", "AICc", "BIC", "held back", "parameters");
+  for (const data::ModelScore& m : models) {
+    const std::string held_back =
+        std::isnan(m.held_back_rms_sigma) ? "-" : fmt::format("{:.2f} sigma", m.held_back_rms_sigma);
+    if (std::isnan(m.bic))
+      fmt::print("  {:>10}{:>12}{:>12}{:>12}   {}: not fitted: {}\n", "-", "-", "-", "-", m.model,
+                 m.reason);
+    else
+      fmt::print("{} {:>10.2f}{:>12.2f}{:>12}{:>12}   {}{}\n", m.recommended ? "*" : " ", m.aicc,
+                 m.bic, held_back, m.parameters, m.model,
+                 m.reason.empty() ? "" : ": not accepted: " + m.reason);
+  }
+}
+
 void print(const data::Fit& fit) {
   fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
   // Where no start led anywhere, there is nothing to count.
@@ -77,18 +93,7 @@ void print(const data::Fit& fit) {
   for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
     fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
                b.lower_95, b.upper_95);
-  for (const data::ModelScore& m : fit.comparison) {
-    if (std::isnan(m.bic)) {
-      fmt::print("    {:<32} not fitted: {}\n", m.model, m.reason);
-      continue;
-    }
-    const std::string held_back = std::isnan(m.held_back_rms_sigma)
-                                      ? "       -"
-                                      : fmt::format("{:8.2f}", m.held_back_rms_sigma);
-    fmt::print("  {} {:<32} AICc {:10.2f}  BIC {:10.2f}  held back {} sigma  {} parameters\n",
-               m.recommended ? "*" : " ", m.model, m.aicc, m.bic, held_back, m.parameters);
-    if (!m.reason.empty()) fmt::print("      not accepted: {}\n", m.reason);
-  }
+  print_comparison(fit.comparison);
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
   print_notes(fit);
 }
