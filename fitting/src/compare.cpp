@@ -80,16 +80,9 @@ void keep_own(data::Scene& scene) {
   std::erase_if(fit.bounds, [&](const auto& item) { return !names_one_of(own, item.first); });
 }
 
-// Every rung frees the terms it has: a list made for one of them would hold the others' fixed. What
-// leaves the model its own choice of the rest stays.
+// Every rung frees the terms it has: a list made for one of them would hold the others' fixed.
 void free_all_terms(data::FitSettings& fit) {
-  const auto listed = [&](const char* name) {
-    return std::find(fit.free.begin(), fit.free.end(), name) != fit.free.end();
-  };
-  fit.free_pivot = fit.free_pivot || listed("pivot_x_m") || listed("pivot_y_m");
-  std::erase_if(fit.free, [](const std::string& name) {
-    return name != kReadout && name != kAngleDelay && name != kSlipScale;
-  });
+  std::erase_if(fit.free, [](const std::string& name) { return !leaves_choice(name); });
 }
 
 Rung rung_with(const Ladder& ladder, const std::set<int>& terms) {
@@ -123,6 +116,21 @@ FitOptions options_for(const Rung& rung, const FitOptions& options) {
   return own;
 }
 
+// Whether a term stands for something beside these.
+bool means_something(const Ladder& ladder, const std::set<int>& terms, int index) {
+  const std::optional<int> of = ladder.terms[static_cast<std::size_t>(index)].of;
+  return !of || terms.contains(*of);
+}
+
+// Whether one of these terms may be left out: the last resort stays, and what another is a property
+// of.
+bool may_go(const Ladder& ladder, const std::set<int>& terms, int index) {
+  return !ladder.terms[static_cast<std::size_t>(index)].last_resort &&
+         std::all_of(terms.begin(), terms.end(), [&](int other) {
+           return ladder.terms[static_cast<std::size_t>(other)].of != index;
+         });
+}
+
 // All extensions of rungs[current] by one term, tried at the same time. @returns the index of the
 // best rung now known.
 std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
@@ -133,7 +141,9 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
     const Term& term = ladder.terms[static_cast<std::size_t>(index)];
     std::set<int> terms = rungs[current].terms;
-    if (term.last_resort != last_resort || term.smooth || !terms.insert(index).second) continue;
+    if (term.last_resort != last_resort || term.smooth || !means_something(ladder, terms, index) ||
+        !terms.insert(index).second)
+      continue;
     rungs.push_back(rung_with(ladder, terms));
     added.push_back(&term);
   }
@@ -189,11 +199,11 @@ void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
   });
 }
 
-// The terms with one less; the last resort stays.
+// The terms with one less.
 std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<int>& terms) {
   std::vector<std::set<int>> sets;
   for (const int index : terms) {
-    if (ladder.terms[static_cast<std::size_t>(index)].last_resort) continue;
+    if (!may_go(ladder, terms, index)) continue;
     sets.push_back(terms);
     sets.back().erase(index);
   }
@@ -204,7 +214,8 @@ std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<in
 std::vector<std::set<int>> with_one_more(const Ladder& ladder, const std::set<int>& terms) {
   std::vector<std::set<int>> sets;
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
-    if (terms.contains(index) || ladder.terms[static_cast<std::size_t>(index)].last_resort)
+    if (terms.contains(index) || !means_something(ladder, terms, index) ||
+        ladder.terms[static_cast<std::size_t>(index)].last_resort)
       continue;
     sets.push_back(terms);
     sets.back().insert(index);
@@ -289,7 +300,7 @@ std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
                                             const FitOptions& options, const Rung& known) {
   std::map<int, std::set<std::string>> others;
   for (const int term : known.terms)
-    if (!ladder.terms[static_cast<std::size_t>(term)].last_resort)
+    if (may_go(ladder, known.terms, term))
       others[term] = parameters_of_term(ladder, known.terms, term);
   const std::vector<std::set<int>> larger = with_one_more(ladder, known.terms);
   std::vector<std::optional<Promise>> promises(larger.size());
@@ -312,6 +323,7 @@ std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
     }
     consider(*promise, promise->with, true, larger[i]);
     for (const auto& [term, change] : promise->instead) {
+      if (!may_go(ladder, larger[i], term)) continue;
       std::set<int> exchanged = larger[i];
       exchanged.erase(term);
       consider(*promise, change, false, std::move(exchanged));
@@ -459,8 +471,11 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
 
 std::set<std::string> parameters_of_any(const Ladder& ladder) {
   std::set<std::string> names = parameters_of(ladder.plain);
-  for (int term = 0; term < static_cast<int>(ladder.terms.size()); ++term)
-    names.merge(parameters_of(rung_with(ladder, {term}).scene));
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
+    std::set<int> terms{index};
+    if (const auto of = ladder.terms[static_cast<std::size_t>(index)].of) terms.insert(*of);
+    names.merge(parameters_of(rung_with(ladder, terms).scene));
+  }
   return names;
 }
 

@@ -112,6 +112,19 @@ void warn_short_rim(const Problem& problem, data::Fit& fit) {
       turns));
 }
 
+// A law for small tilts may miss air's viscosity by a few times, not by orders of magnitude.
+void warn_thick_air(data::Fit& fit) {
+  constexpr double kMost = 10.0;
+  const data::FitParameter* gap = fit.find("gap_viscosity_Pa_s");
+  if (gap == nullptr || gap->status != data::ParameterStatus::free) return;
+  const double times = gap->value / kAirViscosity_Pa_s;
+  if (times < kMost) return;
+  fit.warnings.push_back(fmt::format(
+      "gap_viscosity_Pa_s is {:.0f} times that of air: on a dry floor some other loss, which the "
+      "model lacks, looks like a gap layer",
+      times));
+}
+
 void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit) {
   const Criteria score = criteria(problem, u, error.surprise);
@@ -145,6 +158,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   warn(problem, error, fit);
   tell_whether_one_friction(problem, fit);
   warn_short_rim(problem, fit);
+  warn_thick_air(fit);
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);
   warn_short_top(problem, fit);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "problem.hpp"
 #include "trochoid/model/inertia.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -52,9 +53,8 @@ void add_floor_losses(const Scene& scene, Ladder& ladder) {
                                       scene, kTypical * unit_N_m_s / rate_rad_s));
     ladder.terms.push_back(single("air force", &ModelSettings::air_force_N_s_m, scene,
                                   kTypical * inertia.mass_kg * rate_rad_s));
-    constexpr double kAir_Pa_s = 1.8e-5;
     ladder.terms.push_back(
-        single("gap layer", &ModelSettings::gap_viscosity_Pa_s, scene, kAir_Pa_s));
+        single("gap layer", &ModelSettings::gap_viscosity_Pa_s, scene, kAirViscosity_Pa_s));
   } else {
     ladder.left_out.push_back("air couples, air force and the gap layer (need body.mass_kg)");
   }
@@ -95,14 +95,9 @@ void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
          s.model.spin_down_imbalance_cos_rad_s2 = 0.0;
        },
        {}}};
-  Term weakening =
-      single("weakening with speed", &ModelSettings::spin_down_weakening_s_rad, scene, 0.1);
-  weakening.switch_on = [set = weakening.switch_on,
-                         dry = ladder.terms.front().switch_on](Scene& s) {
-    if (!s.model.spin_down_dry_rad_s2) dry(s);
-    set(s);
-  };
-  ladder.terms.push_back(std::move(weakening));
+  ladder.terms.push_back(
+      single("weakening with speed", &ModelSettings::spin_down_weakening_s_rad, scene, 0.1));
+  ladder.terms.back().of = 0;  // of dry friction
 }
 
 }  // namespace

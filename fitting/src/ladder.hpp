@@ -19,6 +19,7 @@ struct Term {
   bool usual = false;
   /// A floor without any friction instead of the law: no rolling at all. A last resort of its own.
   bool smooth = false;
+  std::optional<int> of = {};  ///< index of the term it is a property of: only beside that one
 };
 
 /// A scene's possible models: the plainest one and the terms it may take on.

@@ -232,24 +232,27 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
 }
 
+bool is_pivot(const std::string& name) {
+  return name == "pivot_x_m" || name == "pivot_y_m";
+}
+
 bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   if (settings.fixed.contains(info.name)) return false;
   for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
     if (info.name == asked_for) return true;
-  if (info.name == "pivot_x_m" || info.name == "pivot_y_m")
-    return settings.free_pivot || listed(settings.free, info.name);
+  if (is_pivot(info.name)) return settings.free_pivot || listed(settings.free, info.name);
   if (info.name == kSlipScale && settings.prior.contains(info.name)) return true;
-  // Freeing the clock, or how friction sets in, leaves the model its own choice of the rest.
-  const bool chosen =
-      std::any_of(settings.free.begin(), settings.free.end(), [](const std::string& name) {
-        return name != kReadout && name != kAngleDelay && name != kSlipScale;
-      });
+  const bool chosen = !std::all_of(settings.free.begin(), settings.free.end(), leaves_choice);
   if (!chosen || info.role == ParameterInfo::Role::initial)
     return info.worth_fitting || listed(settings.free, info.name);
   return listed(settings.free, info.name);
 }
 
 }  // namespace
+
+bool leaves_choice(const std::string& name) {
+  return is_pivot(name) || name == kReadout || name == kAngleDelay || name == kSlipScale;
+}
 
 Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                      const data::Scene& scene) {

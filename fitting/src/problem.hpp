@@ -18,6 +18,8 @@ namespace trochoid::fitting {
 /// How friction sets in: the slip speed of the regularised law, absent in Coulomb's.
 inline constexpr const char* kSlipScale = "slip_regularisation_m_s";
 
+inline constexpr double kAirViscosity_Pa_s = 1.8e-5;
+
 /// How a free parameter is handed to the minimiser, so that it stays in its range.
 ///   identity  value = u
 ///   log       value = exp(u): positive, over decades
@@ -95,6 +97,10 @@ struct Problem {
 /// Whether a free parameter is the strength of a loss: short windows do not see it, and it may be
 /// absent altogether. The friction of a sliding body and a top's a, b and l are not.
 [[nodiscard]] bool is_loss(const Problem& problem, const FreeParameter& parameter);
+
+/// Whether naming a parameter in [fit] free leaves the model its own choice of the others: where
+/// its pivot is, when it was seen, how friction sets in.
+[[nodiscard]] bool leaves_choice(const std::string& name);
 
 /// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it
 /// names none) are free, those of role `initial` once per arc.

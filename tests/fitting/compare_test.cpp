@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <set>
+#include <utility>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -99,6 +101,10 @@ TEST(Compare, FindsTheWeightBesideTheAxisAndFrictionThatWeakens) {
     EXPECT_NEAR(parameter->value, value, 4.0 * parameter->sigma) << name;
     EXPECT_LT(parameter->sigma, 0.02 * std::abs(value)) << name;
   }
+  // Each model stands in the table once.
+  std::set<std::pair<double, int>> scores;
+  for (const data::ModelScore& score : found.fit.comparison)
+    EXPECT_TRUE(scores.emplace(score.bic, score.parameters).second) << score.model;
 }
 
 // Held for a second, brought to speed by hand within half a second, then let go.

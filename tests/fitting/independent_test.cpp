@@ -52,6 +52,18 @@ TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
                            {"pivoting_friction_m", 2.5386966524556133e-05}});
 }
 
+TEST(Independent, AGapLayerThickerThanAirIsTold) {
+  const data::Track track = track_of("air_force");
+  data::Scene scene = scene_of("air_force");
+  scene.model.name = "rolling";
+  scene.model.pivoting_friction_m = 2.5e-5;
+  scene.model.gap_viscosity_Pa_s = 1.8e-5;
+  const auto told = testing::Contains(testing::HasSubstr("times that of air"));
+  EXPECT_THAT(fit(std::span(&track, 1), scene).warnings, told);
+  scene.fit.fixed["gap_viscosity_Pa_s"] = 0.02;  // whoever says so knows
+  EXPECT_THAT(fit(std::span(&track, 1), scene).warnings, testing::Not(told));
+}
+
 // Who knows that the floor is smooth has its losses compared all the same.
 TEST(Independent, LossesAreComparedOnAFloorThatIsNamedSmooth) {
   const data::Track track = track_of("smooth_floor");
