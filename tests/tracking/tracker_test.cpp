@@ -275,6 +275,29 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
 }
 
 // Seen face on, precession and spin are one angle.
+// It keeps to its place and looks there as the background does, which it is part of, but for a
+// glint: the glint alone must not be all of it that is found.
+TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
+  const ScratchFolder folder("precesses");
+  constexpr double kScale_px_m = 1000.0, kRadius_px = 40.0, kTilt_rad = 0.5;
+  const Eigen::Vector2d centre_px(119.5, 79.5);
+  write_clip(folder / "clip.mkv", drawn_floor(240, 160, 120.0), kFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               const bool glints = i % 30 > 25;
+               draw_disc(picture, centre_px.x(), centre_px.y(), kRadius_px,
+                         kRadius_px * std::cos(kTilt_rad), 0.25 * i, glints ? 230.0 : 140.0);
+             });
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = kRadius_px / kScale_px_m;
+  body.thickness_m = 0.0005;
+  scene.support.kind = data::SupportKind::floor;
+  const TrackResult result =
+      track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 160, kScale_px_m));
+  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_LT(largest_error_px(result.file.tracks[0], [&](int) { return centre_px; }), 0.5);
+}
+
 TEST(TrackVideo, ADiscOnAPinShowsItsTurnByItsMark) {
   const ScratchFolder folder("pin");
   TurningInPlace::write(folder / "clip.mkv");

@@ -29,6 +29,17 @@ double travel_in_radii(const BodyPath& path) {
   return travel_px(path) / std::max(1.0, usual_radius_px(path));
 }
 
+Ellipse reach_of(const BodyPath& path) {
+  Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
+  for (const auto& [index, at] : path.frames) middle_px += at.seen.centre_px;
+  middle_px /= static_cast<double>(path.frames.size());
+  double radius_px = 0.0;
+  for (const auto& [index, at] : path.frames)
+    radius_px =
+        std::max(radius_px, (at.seen.centre_px - middle_px).norm() + at.seen.rim.semi_major_px());
+  return Ellipse::from_axes(middle_px, radius_px, radius_px, 0.0);
+}
+
 bool moves(const BodyPath& path) {
   constexpr double kTrembles_px = 0.7, kOfItsSize = 0.12, kTurns_rad = 0.3;
   if (path.frames.begin()->second.seen.pose) return true;

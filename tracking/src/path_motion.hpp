@@ -9,6 +9,9 @@ namespace trochoid::tracking {
 /// hundred positions, so that single slips do not count.
 [[nodiscard]] double travel_in_radii(const BodyPath& path);
 
+/// A circle that holds a body which hardly travels, in all of its frames.
+[[nodiscard]] Ellipse reach_of(const BodyPath& path);
+
 /// Whether what was followed ever moved, or turned: a reflection or a clamp that trembles with its
 /// stand does not.
 [[nodiscard]] bool moves(const BodyPath& path);

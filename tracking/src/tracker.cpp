@@ -164,6 +164,7 @@ class Tracking {
       if (!seed) return paths_.empty() && follow_one_in_plate();
       Followed found = follow_from(*seed);
       if (attempt == 0) prefer_one_that_turns(found);
+      follow_off_the_plate(found);
       explain(found.path);
       if (!moves(found.path) || is_known(found.path)) continue;
       add(std::move(found));
@@ -205,6 +206,31 @@ class Tracking {
     if (explains(other) <= explains(found)) return;
     explain(found.path);
     found = std::move(other);
+  }
+
+  /// A body that keeps to its place is in the plate itself, and is lost in frames in which it looks
+  /// as it does there. With the floor continued below it, it may be seen in more of them.
+  void follow_off_the_plate(Followed& found) {
+    constexpr double kInPlace_radii = 0.5, kMostSeen = 0.9;
+    const auto seen_in = [](const Followed& followed) {
+      return static_cast<double>(followed.path.frames.size());
+    };
+    const auto frames = static_cast<double>(recording_.window().size());
+    if (!found.path.frames.begin()->second.seen.pose || seen_in(found) > kMostSeen * frames ||
+        travel_in_radii(found.path) > kInPlace_radii)
+      return;
+    const Background before = background_;
+    in_plate_.push_back(reach_of(found.path));
+    background_.clear_of(in_plate_.back());
+    if (const auto seed = find_seed(recording_.window(), background_, *finder_, explained_)) {
+      Followed other = follow_from(*seed);
+      if (seen_in(other) > seen_in(found)) {
+        found = std::move(other);
+        return;
+      }
+    }
+    background_ = before;
+    in_plate_.pop_back();
   }
 
   /// A body that turns in place about its own axis, with nothing but a mark that moves.
