@@ -96,29 +96,52 @@ Found look_about(const Problem& problem, Found found) {
   return hop(problem, std::move(found), kMisses);
 }
 
-// A start that rolls for `window` samples, with the coefficients of friction that explain most of
-// somewhat more than that: the best few, best first.
-std::vector<Start> with_frictions(const Problem& problem, const Start& start, int window) {
-  constexpr double kFurther = 1.3;
+// The coefficients of friction, clearly different, that leave least of a problem unexplained, best
+// first: where its body rolls to the end, or slides from another instant on, derivatives do not
+// lead to the right one.
+std::vector<double> likeliest_frictions(const Problem& part) {
+  constexpr double kLeast = 0.02, kMost = 0.9, kStep = 1.25;
   constexpr std::size_t kTried = 2;
-  const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  const Problem longer = windowed(problem, std::min(static_cast<int>(kFurther * window) + 8, all));
-  std::vector<std::pair<double, Start>> scored;
-  for (const double friction : {0.1, 0.14, 0.18, 0.23, 0.3, 0.38, 0.48, 0.6, 0.8}) {
-    Start trial = start;
-    trial.values["friction"] = friction;
-    Problem at = longer;
-    apply(trial, at);
+  constexpr double kApart = 0.04;  // of friction
+  std::vector<std::pair<double, double>> scored;
+  const auto try_friction = [&](double friction) {
+    Problem at = part;
+    apply({"", {{"friction", friction}}}, at);
     Eigen::VectorXd residuals;
     if (evaluate(at, 0, at.start(), residuals, nullptr))
-      scored.emplace_back(residuals.squaredNorm(), std::move(trial));
+      scored.emplace_back(residuals.squaredNorm(), friction);
+    std::sort(scored.begin(), scored.end());
+  };
+  for (double friction = kLeast; friction < kMost; friction *= kStep) try_friction(friction);
+  // A few per cent of friction decide at which turn a body first slides.
+  for (const double finer : {0.12, 0.06, 0.03, 0.015, 0.007}) {
+    if (scored.empty()) break;
+    const double friction = scored.front().second;
+    try_friction(friction * (1.0 - finer));
+    try_friction(friction * (1.0 + finer));
   }
-  std::stable_sort(scored.begin(), scored.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<Start> best;
-  for (std::size_t i = 0; i < std::min(kTried, scored.size()); ++i)
-    best.push_back(std::move(scored[i].second));
-  return best;
+  std::vector<double> frictions;
+  for (const auto& [chi2, friction] : scored)
+    if (frictions.size() < kTried &&
+        std::none_of(frictions.begin(), frictions.end(),
+                     [&](double other) { return std::abs(friction - other) < kApart * other; }))
+      frictions.push_back(friction);
+  return frictions;
+}
+
+// A start that rolls for `window` samples, with the coefficients of friction that explain most of
+// somewhat more than that, best first.
+std::vector<Start> with_frictions(const Problem& problem, const Start& start, int window) {
+  constexpr double kFurther = 1.3;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  Problem longer = windowed(problem, std::min(static_cast<int>(kFurther * window) + 8, all));
+  apply(start, longer);
+  std::vector<Start> starts;
+  for (const double friction : likeliest_frictions(longer)) {
+    starts.push_back(start);
+    starts.back().values["friction"] = friction;
+  }
+  return starts;
 }
 
 // Those starts that say nothing of friction: for a body that rolls.
@@ -200,48 +223,14 @@ int explained_samples(const Problem& problem) {
   }
 }
 
-// Coefficients of friction in the order of what they leave unexplained of a problem: where its body
-// rolls to the end, or slides from another instant on, derivatives do not lead to the right one.
-std::vector<double> frictions_by_misfit(const Problem& part) {
-  constexpr double kLeast = 0.02, kMost = 0.9, kStep = 1.25;
-  std::vector<std::pair<double, double>> scored;
-  const auto try_friction = [&](double friction) {
-    Problem at = part;
-    apply({"", {{"friction", friction}}}, at);
-    Eigen::VectorXd residuals;
-    if (evaluate(at, 0, at.start(), residuals, nullptr))
-      scored.emplace_back(residuals.squaredNorm(), friction);
-    std::sort(scored.begin(), scored.end());
-  };
-  for (double friction = kLeast; friction < kMost; friction *= kStep) try_friction(friction);
-  // A few per cent of friction decide at which turn a body first slides.
-  for (const double finer : {0.12, 0.06, 0.03, 0.015, 0.007}) {
-    if (scored.empty()) break;
-    const double friction = scored.front().second;
-    try_friction(friction * (1.0 - finer));
-    try_friction(friction * (1.0 + finer));
-  }
-  std::vector<double> frictions;
-  for (const auto& [chi2, friction] : scored) frictions.push_back(friction);
-  return frictions;
-}
-
 double reduced_chi2(const Problem& problem, const Solution& solution) {
   return solution.usable ? solution.chi2 / free_rows(problem)
                          : std::numeric_limits<double>::infinity();
 }
 
-// The best of `known` and what is found from a few clearly different coefficients of friction.
+// The best of `known` and what is found from the likeliest coefficients of friction.
 Solution seek_friction(const Problem& part, Solution known, const SolveOptions& options) {
-  constexpr std::size_t kMost = 2;
-  constexpr double kApart = 0.04;  // of friction
-  std::vector<double> tried;
-  for (const double friction : frictions_by_misfit(part)) {
-    if (tried.size() == kMost) break;
-    if (std::any_of(tried.begin(), tried.end(),
-                    [&](double other) { return std::abs(friction - other) < kApart * other; }))
-      continue;
-    tried.push_back(friction);
+  for (const double friction : likeliest_frictions(part)) {
     Problem trial = part;
     apply({"", {{"friction", friction}}}, trial);
     Solution found = seek(trial, trial.start(), options);
