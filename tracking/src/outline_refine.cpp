@@ -22,11 +22,6 @@ double blur_along(const Scenery& scenery, const OutlineSample& sample, double bl
   return std::sqrt(blur_px * blur_px + smear * smear / 12.0);
 }
 
-// Of a picture of luma or colour with nothing moving.
-double own_blur(const Search& search, bool colour) {
-  return colour ? std::hypot(search.blur_px, std::sqrt(kColourBlur2Px2)) : search.blur_px;
-}
-
 // How far a profile may go before the blur of the body's next edge shows.
 double clear_of_next(double next_px, double extent_px, double blur_px) {
   constexpr double kClearOfBlur = 1.5;
@@ -56,12 +51,13 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   if (sweep != nullptr && sweep->count == 0) return false;
   // Between two surfaces of the body there is no room for a ramp.
   if (!sample.silhouette) sweep = nullptr;
-  const double own_blur_px = own_blur(search, colour);
+  const double own_blur =
+      colour ? std::hypot(search.blur_px, std::sqrt(kColourBlur2Px2)) : search.blur_px;
   look.steps = 0;
-  look.blur_px = blur_along(scenery, sample, own_blur_px);
+  look.blur_px = blur_along(scenery, sample, own_blur);
   double half_range = 0.0, middle = 0.0;
   if (sweep != nullptr) {
-    set_sweep(*sweep, own_blur_px, look);
+    set_sweep(*sweep, own_blur, look);
     half_range = sweep->half_range_px();
     middle = sweep->mean_px();
   }
@@ -234,14 +230,6 @@ EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look
   return e;
 }
 
-// Blur draws the half level of a bent edge towards the inside of the bend: level lines of a picture
-// that is blurred more and more move by half of what its variance grows, times their curvature. Of
-// a bend as tight as the blur is wide, half of that is left (a thin disc drawn nearly from aside).
-double drawn_in_px(const Crossings& crossings, double blur_px) {
-  const double bend = blur_px * crossings.at.front().curvature_per_px;
-  return 0.5 * blur_px * bend / (1.0 + std::abs(bend));
-}
-
 // An edge that is expected to be seen so much too far out; by how much really, differs along it.
 void allow_for_shadow(double too_far_px, EdgeEquation& equation) {
   constexpr double kUnsureShare = 0.4;
@@ -316,7 +304,6 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i], colour);
-    equation.offset_px += drawn_in_px(round.crossings[places[i]], own_blur(search, colour));
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
     if (sample.silhouette && !colour)
       allow_for_shadow(shadow_px(around[i], sample.height_px), equation);
