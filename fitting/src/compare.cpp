@@ -380,6 +380,8 @@ void let_go_of_friction(const Ladder& ladder, std::span<const data::Track> track
 std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Track> tracks,
                                 const FitOptions& options, Reach reach, std::size_t current,
                                 std::vector<Rung>& rungs) {
+  if (reach == Reach::from_below && !rungs[current].fitted)
+    return current;  // nothing to go on from
   for (std::size_t size = 1; size <= std::min(kMostTerms, ladder.terms.size()); ++size) {
     const std::size_t best = step_up(ladder, tracks, options, false, reach, current, rungs);
     const bool worth = best != current && rungs[best].bic < rungs[current].bic - kStrong;

@@ -16,27 +16,24 @@ struct Rival {
   bool larger = false;  // has further terms beside all of the chosen rung's
 };
 
-// Of the same law, and not ruled out.
+// Of the same law, and not ruled out. One with further terms is left out for being larger, not for
+// being wrong: what it fits beyond is all that its terms promise where they do nothing.
 bool in_question(const Rung& rung, const Rung& chosen) {
   return &rung != &chosen && rung.fitted && rung.fit.converged &&
          rung.fit.model == chosen.fit.model && rung.fit.arcs.size() == chosen.fit.arcs.size() &&
-         rung.bic <= chosen.bic + kVeryStrong;
+         (has_all_terms_of(rung, chosen) || rung.bic <= chosen.bic + kVeryStrong);
 }
 
-// The chosen rung's own weight is not listed. One with further terms is a rival where BIC's
-// evidence against it is not strong, by the odds that BIC gives it: it was left out for being
-// larger, not for being wrong. Not so where residuals hang together: a further term may then only
-// follow the tracker's errors.
+// The chosen rung's own weight is not listed. Those with further terms do not count where residuals
+// hang together: a further term may then only follow the tracker's errors.
 std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen) {
-  const double most = chosen.fit.whiteness_p < kWhite ? -std::numeric_limits<double>::infinity()
-                                                      : chosen.bic + kStrong;
+  const bool white = chosen.fit.whiteness_p >= kWhite;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
-    if (!in_question(rung, chosen) || (larger && rung.bic > most)) continue;
-    const double lead = larger ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
-    rivals.push_back({&rung, std::exp(0.5 * lead), larger});
+    if (!in_question(rung, chosen) || (larger && !white)) continue;
+    rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc)), larger});
     all += rivals.back().weight;
   }
   for (Rival& rival : rivals) rival.weight /= all;
@@ -52,30 +49,56 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
 
 // Variance of a parameter in a rung with further terms beyond that in the chosen one, which does
 // not allow for those terms.
-double further_variance(const Rival& rival, const std::string& name, const data::Fit& chosen) {
-  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(name) : nullptr;
+double further_variance(const Rival& rival, const data::FitParameter& here) {
+  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(here.name) : nullptr;
   if (there == nullptr || !std::isfinite(there->sigma)) return 0.0;
-  const double here = chosen.find(name)->sigma;
-  return std::max(0.0, there->sigma * there->sigma - here * here);
+  return std::max(0.0, there->sigma * there->sigma - here.sigma * here.sigma);
 }
 
-void widen(const Rival& rival, const data::Fit& chosen, data::Fit& fit) {
-  Eigen::VectorXd shift(fit.covariance.rows());
-  for (Eigen::Index i = 0; i < shift.size(); ++i) {
-    const std::string& name = fit.covariance_names[static_cast<std::size_t>(i)];
-    shift[i] = shift_of(*fit.find(name), rival.rung->fit);
+// What the rivals that are larger, or the others, add to the covariance of all parameters.
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool larger,
+                          const std::vector<data::FitParameter>& parameters) {
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
+  for (const Rival& rival : rivals) {
+    if (rival.larger != larger) continue;
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(count), further = shift;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
+      if (here.status == data::ParameterStatus::fixed) continue;
+      shift[i] = shift_of(here, rival.rung->fit);
+      further[i] = further_variance(rival, here);
+    }
+    spread += rival.weight * shift * shift.transpose();
+    spread.diagonal() += rival.weight * further;
   }
-  fit.covariance += rival.weight * shift * shift.transpose();
-  for (Eigen::Index i = 0; i < shift.size(); ++i)
-    fit.covariance(i, i) +=
-        rival.weight *
-        further_variance(rival, fit.covariance_names[static_cast<std::size_t>(i)], chosen);
-  for (data::FitParameter& parameter : fit.parameters)
-    if (parameter.status != data::ParameterStatus::fixed)
-      parameter.sigma =
-          std::sqrt(std::pow(parameter.sigma, 2) +
-                    rival.weight * (std::pow(shift_of(parameter, rival.rung->fit), 2) +
-                                    further_variance(rival, parameter.name, chosen)));
+  return spread;
+}
+
+// Beside a loss that could be anything, bars would tell of what is assumed about losses rather than
+// of the track: larger rivals widen them so far, and the rest is told in words.
+void keep_within_bounds(const std::vector<data::FitParameter>& parameters,
+                        Eigen::MatrixXd& spread) {
+  constexpr double kWidest = 2.5;
+  Eigen::VectorXd share(spread.rows());
+  for (Eigen::Index i = 0; i < share.size(); ++i) {
+    const double most =
+        parameters[static_cast<std::size_t>(i)].sigma * std::sqrt(kWidest * kWidest - 1.0);
+    share[i] = spread(i, i) > most * most ? most / std::sqrt(spread(i, i)) : 1.0;
+  }
+  spread = share.asDiagonal() * spread * share.asDiagonal();
+}
+
+void widen(const Eigen::MatrixXd& spread, data::Fit& fit) {
+  std::vector<Eigen::Index> places;  // among the parameters, of those in the covariance
+  for (const std::string& name : fit.covariance_names)
+    places.push_back(fit.find(name) - fit.parameters.data());
+  fit.covariance += spread(places, places);
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    double& sigma = fit.parameters[i].sigma;
+    if (spread(at, at) > 0.0) sigma = std::sqrt(sigma * sigma + spread(at, at));
+  }
 }
 
 void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::FitParameter>& before,
@@ -102,33 +125,31 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
                   strongest->rung->name, name, most));
 }
 
-// A loss too small to be needed may still move the others.
+// A loss too small to be needed may still move the others: the one that does so most.
 void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
   constexpr double kFar = 3.0;  // error bars
-  const Rung* likeliest = nullptr;
-  for (const Rung& rung : rungs)
-    if (in_question(rung, chosen) && has_all_terms_of(rung, chosen) && rung.aicc < chosen.aicc &&
-        (likeliest == nullptr || rung.aicc < likeliest->aicc))
-      likeliest = &rung;
-  if (likeliest == nullptr) return;
+  const Rung* moving = nullptr;
   const data::FitParameter* moved = nullptr;
   double most = kFar;
-  for (const data::FitParameter& parameter : fit.parameters) {
-    // Where Coulomb's law does beside one loss more, the speed over which friction sets in is gone.
-    if (parameter.status != data::ParameterStatus::free ||
-        likeliest->fit.find(parameter.name) == nullptr)
-      continue;
-    const double bars = std::abs(shift_of(parameter, likeliest->fit)) / parameter.sigma;
-    if (!(bars > most)) continue;
-    most = bars;
-    moved = &parameter;
+  for (const Rung& rung : rungs) {
+    if (!in_question(rung, chosen) || !has_all_terms_of(rung, chosen)) continue;
+    for (const data::FitParameter& parameter : fit.parameters) {
+      // Where Coulomb's law does beside one loss more, the speed over which friction sets in is
+      // gone.
+      if (parameter.status != data::ParameterStatus::free ||
+          rung.fit.find(parameter.name) == nullptr)
+        continue;
+      const double bars = std::abs(shift_of(parameter, rung.fit)) / parameter.sigma;
+      if (!(bars > most)) continue;
+      most = bars, moving = &rung, moved = &parameter;
+    }
   }
-  if (moved == nullptr) return;
-  const data::FitParameter* there = likeliest->fit.find(moved->name);
+  if (moving == nullptr) return;
+  const data::FitParameter* there = moving->fit.find(moved->name);
   fit.warnings.push_back(fmt::format(
       "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}, {:.2g} of its "
       "error bars from here",
-      likeliest->name, moved->name, there->value, there->sigma, most));
+      moving->name, moved->name, there->value, there->sigma, most));
 }
 
 }  // namespace
@@ -136,8 +157,9 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
   const std::vector<data::FitParameter> before = fit.parameters;
   const std::vector<Rival> rivals = rivals_of(rungs, chosen);
-  const data::Fit chosen_fit = fit;
-  for (const Rival& rival : rivals) widen(rival, chosen_fit, fit);
+  Eigen::MatrixXd spread = spread_of(rivals, true, before);
+  keep_within_bounds(before, spread);
+  widen(spread + spread_of(rivals, false, before), fit);
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);
 }

@@ -59,10 +59,7 @@ std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const L
   for (const Rung& rung : rungs) {
     if (!rung.fitted || &rung == &chosen) continue;
     const bool near = rung.bic - chosen.bic < kVeryStrong;
-    if (!has_all_terms_of(rung, chosen))
-      (near ? alike : worse).push_back(&rung);
-    else if (near)
-      more.push_back(&rung);
+    (has_all_terms_of(rung, chosen) ? more : near ? alike : worse).push_back(&rung);
   }
   const auto by_bic = [](const Rung* a, const Rung* b) { return a->bic < b->bic; };
   std::sort(alike.begin(), alike.end(), by_bic);

@@ -144,12 +144,13 @@ TEST(Rivals, ThatAreRuledOutOrUnexplainedOrOfAnotherLawDoNotCount) {
   EXPECT_TRUE(fit.warnings.empty());
 }
 
-// The simplest model that suffices stands; what it leaves out is told.
-TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
-  const std::vector<Rung> rungs{
+// Further terms may only follow a tracker's common errors.
+TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
+  std::vector<Rung> rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               98.0, 104.0)};
+  rungs[0].fit.whiteness_p = 1e-6;
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_DOUBLE_EQ(fit.parameters[0].sigma, 0.1);
@@ -158,25 +159,41 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedFor) {
       << fit.warnings[0];
 }
 
-// It was left out for being larger, not for being wrong.
-TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals) {
+// They were left out for being larger, not for being wrong.
+TEST(Rivals, WithATermMoreWidenTheErrorBarsOfWhiteResiduals) {
   std::vector<Rung> rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-      rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
-              95.0, 101.0)};
-  const double weight = std::exp(-0.5) / (1.0 + std::exp(-0.5));  // by BIC
-  const double expected = std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.5 * 0.5 + 0.6 * 0.6));
+      rung_of({1, 2}, {loss("rolling_friction_m", 0.9, 0.2), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              102.0, 112.0)};
+  const double weight = std::exp(-1.0) / (1.0 + std::exp(-1.0));  // by AICc
+  const double expected = std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.2 * 0.2 + 0.1 * 0.1));
   rungs[0].fit.whiteness_p = 0.5;
-  data::Fit white = rungs[0].fit;
-  allow_for_rivals(rungs, rungs[0], white);
-  EXPECT_NEAR(white.parameters[0].sigma, expected, 1e-12);
-  EXPECT_NEAR(white.covariance(0, 0), expected * expected, 1e-12);
-  EXPECT_EQ(white.warnings.size(), 1u);
-  // A tracker's common errors ask for further terms as well.
-  rungs[0].fit.whiteness_p = 1e-6;
-  data::Fit correlated = rungs[0].fit;
-  allow_for_rivals(rungs, rungs[0], correlated);
-  EXPECT_DOUBLE_EQ(correlated.parameters[0].sigma, 0.1);
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_NEAR(fit.parameters[0].sigma, expected, 1e-12);
+  EXPECT_NEAR(fit.covariance(0, 0), expected * expected, 1e-12);
+}
+
+TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold) {
+  std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1), loss("pivoting_friction_m", 2.0, 0.1)},
+              100.0, 100.0),
+      rung_of({1, 2},
+              {loss("rolling_friction_m", 0.0, 0.5), loss("pivoting_friction_m", 3.0, 0.5),
+               loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              102.0, 112.0)};
+  rungs[1].name = "with a gap layer";
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_NEAR(fit.parameters[0].sigma, 0.25, 1e-12);
+  EXPECT_NEAR(fit.covariance(0, 0), 0.25 * 0.25, 1e-12);
+  // What one loses the other gains.
+  EXPECT_LT(fit.covariance(0, 1), -0.5 * 0.25 * 0.25);
+  ASSERT_EQ(fit.warnings.size(), 2u);
+  EXPECT_NE(fit.warnings[1].find("with a gap layer is neither needed nor ruled out"),
+            std::string::npos)
+      << fit.warnings[1];
 }
 
 // Which may be another one than the likeliest.
