@@ -95,6 +95,17 @@ TEST_F(AttitudeSequence, AFrameLostOverItsReadingIsStillInDoubt) {
   EXPECT_EQ(doubts.size(), glimpses.size());
 }
 
+// Nor do they know more of a frame in which nothing was seen than of themselves.
+TEST_F(AttitudeSequence, AFrameWithoutTheBodyIsInDoubtWhereItsNeighboursAre) {
+  for (const double tells : {1.0, 10.0}) {
+    const Oracle oracle([tells](int) { return tells; });
+    auto glimpses = tracked(oracle, [](int) { return false; });
+    for (const std::size_t lost : {0u, 29u, 30u}) glimpses[lost].seen.reset();
+    const auto doubts = decide_attitudes(background_, oracle, glimpses);
+    EXPECT_EQ(doubts.size(), tells > 5.0 ? 0 : glimpses.size()) << tells;
+  }
+}
+
 // Nor is its tilt known better than between those of the two readings.
 TEST_F(AttitudeSequence, TheTiltOfADoubtedFrameHoldsBothReadings) {
   const Oracle oracle([](int) { return 10.0; });

@@ -404,9 +404,29 @@ class Chain {
       doubts[i]->off_theta_rad =
           between_tilts(seen->pose->pose.theta_rad, other->pose->pose.theta_rad);
     });
+    return with_frames_between(doubts);
+  }
+
+  /// A frame without the body, which its neighbours may bring back, is known no better than they
+  /// are.
+  [[nodiscard]] std::vector<AttitudeDoubt> with_frames_between(
+      const std::vector<std::optional<AttitudeDoubt>>& of_nodes) const {
     std::vector<AttitudeDoubt> out;
-    for (const auto& doubt : doubts)
-      if (doubt) out.push_back(*doubt);
+    std::size_t next = 0;  // node
+    for (std::size_t at = 0; at < glimpses_.size(); ++at) {
+      const bool is_node = next < nodes_.size() && nodes_[next].at == at;
+      if (is_node) {
+        if (of_nodes[next]) out.push_back(*of_nodes[next]);
+        ++next;
+      } else if (!glimpses_[at].posed()) {
+        for (const std::size_t k : {next - 1, next})
+          if (k < nodes_.size() && of_nodes[k]) {
+            out.push_back(*of_nodes[k]);
+            out.back().at = at;
+            break;
+          }
+      }
+    }
     return out;
   }
 
