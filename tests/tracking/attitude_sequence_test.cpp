@@ -1,6 +1,9 @@
 #include "attitude_sequence.hpp"
 
+#include <Eigen/Geometry>
+
 #include "glimpsed_sequence.hpp"
+#include "pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -145,6 +148,53 @@ TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatKeepsTheSizeOfTheBodyIsRight) {
 TEST_F(AttitudeSequence, SizesThatHardlyTellLeaveItDoubtful) {
   const Oracle oracle([](int) { return 0.0; }, [](int i) { return 0.08 * std::sin(0.2 * i); });
   auto glimpses = tracked(oracle, [](int) { return false; });
+  decide(oracle, glimpses);
+  for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
+}
+
+/// Through a camera that leans.
+class Leaning final : public Oracle {
+ public:
+  /// @param nods_rad  how much a body that goes round the vertical nods once a round, or seems to.
+  Leaning(double lean_rad, double nods_rad)
+      : Oracle([](int) { return 0.0; }),
+        sight_(std::sin(lean_rad), 0.0, std::cos(lean_rad)),
+        nods_rad_(nods_rad) {}
+  [[nodiscard]] std::optional<data::Pose<>> mirror_image(const data::Pose<>& pose) const override {
+    data::Pose<> other = pose;
+    const Eigen::Vector3d axis = axis_of(pose);
+    set_axis(2.0 * axis.dot(sight_) * sight_ - axis, other);
+    return other;
+  }
+  void nod(Sighting& seen) const {
+    seen.pose->pose.theta_rad += nods_rad_ * std::sin(seen.pose->pose.phi_rad);
+  }
+
+ private:
+  Eigen::Vector3d sight_;
+  double nods_rad_;
+};
+
+// Weight acts along the vertical: the mirror image of a body that goes round that nods with every
+// round, by twice as much as the camera leans.
+TEST_F(AttitudeSequence, OfTwoReadingsTheOneThatGoesRoundTheVerticalIsRight) {
+  const Leaning oracle(0.2, 0.03);
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses) {
+    oracle.nod(*g.seen);
+    g.seen->pose->pose = *oracle.mirror_image(g.seen->pose->pose);
+  }
+  ASSERT_EQ(count_wrong(glimpses), kFrames);
+  decide(oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+  for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful);
+}
+
+// A lamp on one side makes a body seem to nod as a leaning camera makes its mirror image.
+TEST_F(AttitudeSequence, ACameraThatHardlyLeansDoesNotTell) {
+  const Leaning oracle(0.02, 0.03);
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses) oracle.nod(*g.seen);
   decide(oracle, glimpses);
   for (const Glimpse& g : glimpses) EXPECT_TRUE(g.seen->attitude_doubtful);
 }

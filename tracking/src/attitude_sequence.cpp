@@ -61,6 +61,7 @@ class Chain {
       steps.push_back(nodes_[i].t_s - nodes_[i - 1].t_s);
     if (steps.empty()) return;
     frame_s_ = data::median(std::move(steps));
+    lean_tells_ = lean_tells();
   }
 
   [[nodiscard]] std::vector<AttitudeDoubt> decide() {
@@ -79,7 +80,8 @@ class Chain {
   }
 
  private:
-  static constexpr double kLeastTilt = 0.06;  // below, both readings are one
+  static constexpr double kLeastTilt = 0.06;   // below, both readings are one
+  static constexpr double kAnother_rad = 0.3;  // turned by this, a body is seen anew
 
   /// Two frames do not show how the body goes on, and no single picture is sure.
   [[nodiscard]] std::vector<AttitudeDoubt> undecided() {
@@ -311,13 +313,35 @@ class Chain {
                                  between_axes(to, is, alike_) / std::max(ahead, 1e-9));
     const double allowed = kLeast + kOfStep * step;
     return std::min(kMost, 0.5 * off * off / (allowed * allowed)) +
-           kPerRadian * between_axes(to, is, alike_);
+           kPerRadian * between_axes(to, is, alike_) + tilt_cost(pb, pc);
+  }
+
+  /// Weight acts along the vertical: a body goes round that, and its tilt changes slowly. Going
+  /// round the line of sight, as its mirror image does, it would bob up and down once a round.
+  [[nodiscard]] double tilt_cost(const Pose& from, const Pose& to) const {
+    constexpr double kLeast_rad = 0.02, kOfTurn = 0.15, kMost = 1.5;  // the rest nods
+    const double turn_rad = between_axes(axis_of(from), axis_of(to), alike_);
+    const double change_rad = 2.0 * between_tilts(from.theta_rad, to.theta_rad);
+    return lean_tells_ * std::min(1.0, turn_rad / kAnother_rad) *
+           std::min(kMost, change_rad / (kLeast_rad + kOfTurn * turn_rad));
+  }
+
+  /// The tilts of the two readings differ by up to twice as much as the line of sight leans. Tilts
+  /// have errors, too, that go round with the axis (a lamp on one side of the body): what differs
+  /// by no more than these tells nothing.
+  [[nodiscard]] double lean_tells() const {
+    constexpr double kErrors_rad = 0.05;
+    double apart2 = 0.0;
+    for (const Node& node : nodes_)
+      apart2 += std::pow(2.0 * between_tilts(node.poses[0].theta_rad, node.poses[1].theta_rad), 2);
+    const double errors2 = kErrors_rad * kErrors_rad * static_cast<double>(nodes_.size());
+    return apart2 > errors2 ? 1.0 - errors2 / apart2 : 0.0;
   }
 
   /// Pictures of nearly the same attitude share their errors: a node that was weighed tells as much
   /// of its own as the axis turns from one such node to the next, in the reading that takes less.
   [[nodiscard]] std::vector<double> turned_anew() const {
-    constexpr double kAnother_rad = 0.3, kLeast = 0.05;
+    constexpr double kLeast = 0.05;
     std::vector<std::size_t> weighed;
     for (std::size_t i = 0; i < nodes_.size(); ++i)
       if (nodes_[i].weighed) weighed.push_back(i);
@@ -435,6 +459,7 @@ class Chain {
   std::vector<Glimpse>& glimpses_;
   bool alike_;
   double frame_s_ = 1.0;
+  double lean_tells_ = 0.0;  ///< how much of what the two tilts differ by is more than errors
   std::vector<Node> nodes_;
   std::vector<double> margin_;  ///< cost of the second reading beyond that of the first
 };
