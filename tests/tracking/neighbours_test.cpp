@@ -35,6 +35,30 @@ TEST_F(Neighbours, ALostFrameIsSoughtWhereItsNeighboursPutIt) {
   EXPECT_NEAR(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn), 0.0, 0.01);
 }
 
+TEST_F(Neighbours, ALongGapIsClosedFromItsEnds) {
+  // Found only where it is looked for.
+  class Narrow final : public Oracle {
+   public:
+    using Oracle::Oracle;
+    [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+      const double off_rad = look.predicted->pose->pose.phi_rad - phi_at(look.frame.t_s);
+      constexpr double kNear_rad = 0.3;
+      if (std::abs(std::remainder(off_rad, kTurn)) > kNear_rad) return std::nullopt;
+      auto seen = Oracle::find(look);
+      seen->pose->pose.phi_rad -= off_rad;
+      return seen;
+    }
+  };
+  const Narrow oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (std::size_t i = 8; i < 55; ++i) glimpses[i].seen.reset();
+  mend_from_neighbours(background_, oracle, glimpses);
+  for (const Glimpse& g : glimpses) {
+    ASSERT_TRUE(g.seen) << g.frame->index;
+    EXPECT_NEAR(std::remainder(g.pose().phi_rad - phi_at(g.frame->t_s), kTurn), 0.0, 0.01);
+  }
+}
+
 TEST_F(Neighbours, WrongFramesSideBySideAreOutvotedByThoseAround) {
   const Oracle oracle([](int) { return 10.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });

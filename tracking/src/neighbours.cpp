@@ -437,19 +437,20 @@ void doubt(const Expected& expected, Sighting& seen) {
 
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
                           std::vector<Glimpse>& glimpses) {
-  constexpr int kMostRounds = 3;
+  constexpr int kRounds = 3;
   constexpr std::size_t kReach = 6;
   if (std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) { return g.posed(); }) <
       4)
     return;
-  // What was mended may tell its own neighbours more.
+  // What was mended may tell its own neighbours more. Where the body was lost that goes on: it is
+  // followed into a gap from both ends, by the attitudes that all of its frames decided on.
   std::vector<char> open(glimpses.size(), 1);
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; std::count(open.begin(), open.end(), 1) > 0; ++round) {
     const std::vector<Glimpse> was = glimpses;
     const Mending mend(finder, was);
     std::vector<char> mended(was.size(), 0);
     on_both_cores(background, finder, was.size(), [&](Measuring& measure, std::size_t i) {
-      if (!open[i]) return;
+      if (!open[i] || (round >= kRounds && was[i].seen)) return;
       if (auto seen = mend(measure, i)) glimpses[i].seen = std::move(seen), mended[i] = 1;
     });
     open.assign(was.size(), 0);
