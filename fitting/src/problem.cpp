@@ -225,8 +225,6 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
-  // A law sharper than that makes stiff equations, and no camera tells it from Coulomb's.
-  constexpr double kSharpest_m_s = 5e-5;
   if (info.name == kSlipScale)
     return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};

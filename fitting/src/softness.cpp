@@ -52,19 +52,24 @@ std::optional<data::Fit> fit_gently(std::span<const data::Track> tracks, const F
   return fit;
 }
 
-// From the gentle law's solution.
+// From the gentle law's solution. Coulomb's law makes a rough cost over the whole track, on which a
+// descent stops anywhere; grown from a first part on, it is followed down.
 std::optional<data::Fit> fit_sharply(std::span<const data::Track> tracks, const FitOptions& options,
                                      const data::Scene& scene, const data::Fit& gentle) {
   FitOptions own = going_on_from(gentle, options);
   own.start.erase(kSlipScale);
+  if (own.strategy == "single") own.strategy = "growing";
   return fit_named(tracks, scene, std::move(own), "Coulomb's law, ");
 }
 
 // Whether so many standard deviations of eps are beyond what a parabola may hide of Coulomb's law.
+// As sharp as a fit lets it be it shows nothing but that limit.
 bool shows_without_asking(const data::Fit& gentle) {
   constexpr double kSurely = 10.0;  // squared
+  constexpr double kAtLimit = 1.05;
   const data::FitParameter* eps = gentle.find(kSlipScale);
-  return eps != nullptr && eps->value * eps->value > kSurely * eps->sigma * eps->sigma;
+  return eps != nullptr && eps->value > kAtLimit * kSharpest_m_s &&
+         eps->value * eps->value > kSurely * eps->sigma * eps->sigma;
 }
 
 }  // namespace

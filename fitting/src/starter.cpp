@@ -58,7 +58,7 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
 // The exact Coulomb law, and a sharply regularised one, make a rough cost and stiff equations; the
 // gentle law's minimum lies far from theirs. Each bridge takes a third of the regularisation.
 std::vector<OwnedRelative> relatives_of(data::Scene scene) {
-  constexpr double kGentle_m_s = 1e-3, kSharpest_m_s = 1e-4, kStep = 0.33;
+  constexpr double kGentle_m_s = 1e-3, kSharpEnough_m_s = 1e-4, kStep = 0.33;
   std::vector<OwnedRelative> relatives;
   if (scene.model.name != "sliding") return relatives;
   const double given_m_s = scene.model.slip_regularisation_m_s.value_or(0.0);
@@ -76,7 +76,7 @@ std::vector<OwnedRelative> relatives_of(data::Scene scene) {
   // The exact law runs as fast as the gentle one, a sharply regularised one does not.
   if (given_m_s == 0.0) relatives.push_back({nullptr, {}});
   relatives.push_back({softened(kGentle_m_s), {}});
-  const double last_m_s = std::max(given_m_s / (0.7 * kStep), kSharpest_m_s);
+  const double last_m_s = std::max(given_m_s / (0.7 * kStep), kSharpEnough_m_s);
   for (double by_m_s = kStep * kGentle_m_s; by_m_s >= last_m_s; by_m_s *= kStep)
     relatives.back().bridges.push_back(softened(by_m_s));
   return relatives;

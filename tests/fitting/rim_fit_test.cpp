@@ -9,6 +9,7 @@
 #include <random>
 #include <sstream>
 
+#include "softness.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -306,6 +307,28 @@ TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
   EXPECT_LT(pull(fit, "theta_rad", 0.9599310885968813), kFar);
   EXPECT_LT(pull(fit, "w2_rad_s", 19.659649062935802), kFar);
   EXPECT_LT(fit.find("friction")->sigma, 0.01);
+}
+
+// A softer law follows it as far as it may be sharpened, and its speed then looks well determined.
+TEST_F(RimFit, FrictionAsSharpAsAFitLetsItBeIsCoulombs) {
+  Case c = noisy("s10_stick_slip_event", 2.0, 1e-4);
+  c.scene.fit.fixed = losses_of_the_sliding_disc();
+  Rung rung;
+  rung.scene = c.scene;
+  FitOptions near;
+  near.strategy = "single";
+  near.start = {{"slip_regularisation_m_s", 2e-4},
+                {"friction", 0.3},
+                {"theta_rad", 0.96},
+                {"phi_rad", 0.0},
+                {"w1_rad_s", 0.0},
+                {"w2_rad_s", 19.66},
+                {"w3_rad_s", -0.34},
+                {"vx_m_s", 0.2},
+                {"vy_m_s", 0.05}};
+  fit_softly(std::span(&c.track, 1), near, rung);
+  EXPECT_FALSE(rung.scene.model.slip_regularisation_m_s);
+  EXPECT_LT(pull(rung.fit, "friction", 0.3), kFar);
 }
 
 // Eight pictures a turn, and a tilt that swings to and fro once a turn: no smooth curve through the
