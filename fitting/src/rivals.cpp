@@ -12,7 +12,7 @@ namespace {
 
 struct Rival {
   const Rung* rung = nullptr;
-  double weight = 0.0;  // by AICc, of all that are not ruled out together 1
+  double weight = 0.0;  // of all that are not ruled out and of the chosen rung together 1
   bool larger = false;  // has further terms beside all of the chosen rung's
 };
 
@@ -24,16 +24,20 @@ bool in_question(const Rung& rung, const Rung& chosen) {
          (has_all_terms_of(rung, chosen) || rung.bic <= chosen.bic + kVeryStrong);
 }
 
-// The chosen rung's own weight is not listed. Those with further terms do not count where residuals
-// hang together: a further term may then only follow the tracker's errors.
-std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen) {
+// Those that may be right as well, or those against which there is strong evidence, but only for
+// being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
+// where residuals hang together: a further term may then only follow the tracker's errors.
+std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen, bool too_large) {
   const bool white = chosen.fit.whiteness_p >= kWhite;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
-    if (!in_question(rung, chosen) || (larger && !white)) continue;
-    rivals.push_back({&rung, std::exp(0.5 * (chosen.aicc - rung.aicc)), larger});
+    if (!in_question(rung, chosen) || (larger && !white) ||
+        (larger && rung.bic > chosen.bic + kStrong) != too_large)
+      continue;
+    const double lead = larger && !too_large ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
+    rivals.push_back({&rung, std::exp(0.5 * lead), larger});
     all += rivals.back().weight;
   }
   for (Rival& rival : rivals) rival.weight /= all;
@@ -55,13 +59,12 @@ double further_variance(const Rival& rival, const data::FitParameter& here) {
   return std::max(0.0, there->sigma * there->sigma - here.sigma * here.sigma);
 }
 
-// What the rivals that are larger, or the others, add to the covariance of all parameters.
-Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool larger,
+// What rivals add to the covariance of all parameters.
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals,
                           const std::vector<data::FitParameter>& parameters) {
   const auto count = static_cast<Eigen::Index>(parameters.size());
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
   for (const Rival& rival : rivals) {
-    if (rival.larger != larger) continue;
     Eigen::VectorXd shift = Eigen::VectorXd::Zero(count), further = shift;
     for (Eigen::Index i = 0; i < count; ++i) {
       const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
@@ -76,7 +79,7 @@ Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool larger,
 }
 
 // Beside a loss that could be anything, bars would tell of what is assumed about losses rather than
-// of the track: larger rivals widen them so far, and the rest is told in words.
+// of the track: rivals that are too large widen them so far, and the rest is told in words.
 void keep_within_bounds(const std::vector<data::FitParameter>& parameters,
                         Eigen::MatrixXd& spread) {
   constexpr double kWidest = 2.5;
@@ -156,10 +159,12 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
 
 void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
   const std::vector<data::FitParameter> before = fit.parameters;
-  const std::vector<Rival> rivals = rivals_of(rungs, chosen);
-  Eigen::MatrixXd spread = spread_of(rivals, true, before);
-  keep_within_bounds(before, spread);
-  widen(spread + spread_of(rivals, false, before), fit);
+  std::vector<Rival> rivals = rivals_of(rungs, chosen, false);
+  const std::vector<Rival> too_large = rivals_of(rungs, chosen, true);
+  Eigen::MatrixXd further = spread_of(too_large, before);
+  keep_within_bounds(before, further);
+  widen(spread_of(rivals, before) + further, fit);
+  rivals.insert(rivals.end(), too_large.begin(), too_large.end());
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);
 }

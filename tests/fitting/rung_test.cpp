@@ -159,8 +159,24 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
       << fit.warnings[0];
 }
 
-// They were left out for being larger, not for being wrong.
-TEST(Rivals, WithATermMoreWidenTheErrorBarsOfWhiteResiduals) {
+// It was left out for being larger, not for being wrong.
+TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals) {
+  std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              95.0, 101.0)};
+  const double weight = std::exp(-0.5) / (1.0 + std::exp(-0.5));  // by BIC
+  const double expected = std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.5 * 0.5 + 0.6 * 0.6));
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_NEAR(fit.parameters[0].sigma, expected, 1e-12);
+  EXPECT_NEAR(fit.covariance(0, 0), expected * expected, 1e-12);
+  EXPECT_EQ(fit.warnings.size(), 1u);
+}
+
+// BIC's evidence against two parameters more is very strong where they fit exactly as well.
+TEST(Rivals, ThatAreTooLargeWidenTheErrorBarsOfWhiteResidualsToo) {
   std::vector<Rung> rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.9, 0.2), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
