@@ -17,7 +17,7 @@ namespace trochoid::fitting {
 
 /// How friction sets in: the slip speed of the regularised law, absent in Coulomb's.
 inline constexpr const char* kSlipScale = "slip_regularisation_m_s";
-// A law sharper than that makes stiff equations, and no camera tells it from Coulomb's.
+/// A law sharper than that makes stiff equations, and no camera tells it from Coulomb's.
 inline constexpr double kSharpest_m_s = 5e-5;
 
 inline constexpr double kAirViscosity_Pa_s = 1.8e-5;

@@ -274,7 +274,6 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
             0.3);
 }
 
-// Seen face on, precession and spin are one angle.
 // It keeps to its place and looks there as the background does, which it is part of, but for a
 // glint: the glint alone must not be all of it that is found.
 TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
@@ -298,6 +297,7 @@ TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
   EXPECT_LT(largest_error_px(result.file.tracks[0], [&](int) { return centre_px; }), 0.5);
 }
 
+// Seen face on, precession and spin are one angle.
 TEST(TrackVideo, ADiscOnAPinShowsItsTurnByItsMark) {
   const ScratchFolder folder("pin");
   TurningInPlace::write(folder / "clip.mkv");
