@@ -393,8 +393,9 @@ std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Trac
 
 // Where the plainest model explains nothing its solution leads nowhere, and neither does that of
 // one with a single loss if several act: all usual losses together, then fewer of them. Where that
-// explains a first part of the track alone, another loss acts as well, or the body slides from
-// there on. @returns whether one of these explains the track.
+// explains a first part of the track alone, further losses act as well, of which one is added at a
+// time while each helps, or the body slides from there on. @returns whether one of these explains
+// the track.
 bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
                 const FitOptions& options, std::vector<Rung>& rungs) {
   const std::set<int> usual = usual_losses(ladder);
@@ -410,22 +411,29 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
   if (first_part.empty()) return false;
   std::vector<std::set<int>> sets = with_one_more(ladder, usual);
   sets.push_back(all_that_usually_acts(ladder, {}));
-  std::vector<Rung> tried;
-  for (const std::set<int>& terms : sets) tried.push_back(rung_with(ladder, terms));
-  FitOptions one = options;
-  one.threads = 1;
-  in_parallel(static_cast<int>(tried.size()), options.threads, [&](int i) {
-    Rung& rung = tried[static_cast<std::size_t>(i)];
-    fit_from_first_part(tracks, first_part, options_for(rung, one), rung);
-  });
-  const Rung* best = least_bic(tried);
-  if (best == nullptr) return false;
-  rungs.push_back(*best);  // of the others a search of their own may make more
-  if (explains(rungs.back())) {
-    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
-    return true;
+  double known_bic = rungs[all].bic;
+  for (std::size_t more = 1; more <= kMostTerms; ++more) {
+    std::vector<Rung> tried;
+    for (const std::set<int>& terms : sets) tried.push_back(rung_with(ladder, terms));
+    FitOptions one = options;
+    one.threads = 1;
+    in_parallel(static_cast<int>(tried.size()), options.threads, [&](int i) {
+      Rung& rung = tried[static_cast<std::size_t>(i)];
+      fit_from_first_part(tracks, first_part, options_for(rung, one), rung);
+    });
+    const Rung* best = least_bic(tried);
+    if (best == nullptr) return false;
+    if (explains(*best)) {
+      rungs.push_back(*best);  // of the others a search of their own may make more
+      step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+      return true;
+    }
+    // Two may act that each alone follow the track not much farther. A body that slides has been
+    // given all that usually acts.
+    if (best->fit.model == "sliding" || !(best->bic < known_bic - kVeryStrong)) return false;
+    known_bic = best->bic;
+    sets = with_one_more(ladder, best->terms);
   }
-  rungs.pop_back();
   return false;
 }
 
