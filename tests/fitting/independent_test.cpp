@@ -52,6 +52,15 @@ TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
                            {"pivoting_friction_m", 2.5386966524556133e-05}});
 }
 
+// Neither alone explains the track, and the search went on to bodies that slide, for minutes.
+TEST(Independent, TwoLossesThatOnlyTogetherExplainTheTrackAreFound) {
+  const Comparison found = comparison_of("two_further_losses");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.model, "rolling");
+  expect_found(found.fit, {{"air_force_N_s_m", 0.0035190430141933318},
+                           {"contour_friction_m", 7.747631453212088e-05}});
+}
+
 TEST(Independent, AGapLayerThickerThanAirIsTold) {
   const data::Track track = track_of("air_force");
   data::Scene scene = scene_of("air_force");
