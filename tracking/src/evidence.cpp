@@ -57,6 +57,23 @@ struct PlanePair {
   }
 };
 
+FaceColours colours_at(const Frame& frame, const std::vector<Eigen::Vector2d>& face_px) {
+  constexpr std::uint8_t kGrey = 128;
+  FaceColours face;
+  for (const Eigen::Vector2d& p : face_px) {
+    const Eigen::Vector2d half = 0.5 * p - Eigen::Vector2d::Constant(0.25);
+    const bool coloured = !frame.chroma.empty();
+    if (face.count == FaceColours::kMost || !holds(frame.luma, p) ||
+        (coloured && !holds(frame.chroma, half)))
+      continue;
+    const auto level = [](double mean) { return static_cast<std::uint8_t>(std::lround(mean)); };
+    face.at[static_cast<std::size_t>(face.count++)] = {
+        level(mean_at(frame.luma, p, 0)), coloured ? level(mean_at(frame.chroma, half, 0)) : kGrey,
+        coloured ? level(mean_at(frame.chroma, half, 1)) : kGrey};
+  }
+  return face;
+}
+
 }  // namespace
 
 Evidence weigh(const Frame& frame, const Plate& background,
@@ -79,6 +96,7 @@ Evidence weigh(const Frame& frame, const Plate& background,
                            [&](const PlanePair& plane) { return plane.steps(border); });
   if (!face_px.empty()) evidence.cover = covered / static_cast<double>(face_px.size());
   if (!outline.empty()) evidence.edges = stepped / static_cast<double>(outline.size());
+  evidence.face = colours_at(frame, face_px);
   return evidence;
 }
 

@@ -11,6 +11,8 @@
 namespace trochoid::tracking {
 namespace {
 
+constexpr double kLittle = 0.5;  // of what usually speaks for the body
+
 cv::Rect box_around(const Eigen::Vector2d& centre_px, double half_px, const cv::Size& picture) {
   const cv::Rect box(static_cast<int>(centre_px.x() - half_px),
                      static_cast<int>(centre_px.y() - half_px), static_cast<int>(2 * half_px) + 1,
@@ -55,7 +57,9 @@ void Follower::start(const Frame& frame, const Sighting& seen) {
   usual_evidence_ = seen.pose ? seen.pose->evidence : 0.0;
   mean_shape_px_ = seen.rim.shape_px;
   shape_scatter_px_ = 1.0;
-  lost_ = 0;
+  palette_ = {};
+  palette_.learn(seen.evidence.face, background_.gain(frame.luma));
+  lost_ = strange_ = faint_ = 0;
 }
 
 void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
@@ -75,15 +79,33 @@ double Follower::wholeness(const Sighting& seen) const {
   return std::min(cover, edges);
 }
 
+/// How much speaks for a sighting compared with what is usual for this body here: far less for what
+/// hides it.
+double Follower::clearness(const Sighting& seen) const {
+  constexpr double kLeastUsual = 1e-6;
+  const double of_outline = seen.accepted / std::max(usual_accepted_, kLeastUsual);
+  return seen.pose ? of_outline * seen.pose->evidence / std::max(usual_evidence_, kLeastUsual)
+                   : of_outline;
+}
+
 /// A partly hidden body and a fit gone astray look alike by their evidence; what tells them apart
-/// is that the hidden body is where it was expected.
+/// is that the hidden body is where it was expected. One in other colours is the body only where
+/// its whole outline is seen, or for a few frames where it was expected: not what hides it. Nor is
+/// a body that was lost found again in what little speaks for.
 bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double reach_px) const {
   constexpr double kWhole = 0.75, kLeast = 0.35;
   if (seen.accepted < std::max(0.25, 0.4 * usual_accepted_)) return false;
   const double ratio = seen.rim.semi_major_px() / usual_major_px_;
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
-  const double whole = wholeness(seen), surprise = forecast_.surprise_px();
+  constexpr int kMostStrange = 3;
+  constexpr double kAllOfIt = 0.8;
+  const bool strange = !palette_.fits(seen.evidence.face, gain_);
+  if (strange && (lost_ > 0 || strange_ >= kMostStrange)) return false;
+  const bool may_be_what_hides_it = (strange && seen.accepted < kAllOfIt * usual_accepted_) ||
+                                    (lost_ > 0 && clearness(seen) < kLittle);
+  const double whole = may_be_what_hides_it ? kLeast : wholeness(seen);
+  const double surprise = forecast_.surprise_px();
   const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
   if (whole >= kWhole) return lost_ > 3 || apart_px(seen, predicted) < far;
   const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * lost_;
@@ -173,9 +195,11 @@ Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const 
 std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
                                              const Others& others) {
   const double size = usual_major_px_;
-  // The longer it has been lost, the farther it may have gone; after a while, anywhere.
+  // The longer it has been lost, the farther it may have gone; after a while, anywhere. What is
+  // seen little of for as long may be what hides it, left behind in its place.
+  const int astray = std::max(lost_, faint_);
   const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
-  const double gate = lost_ > 30 ? 1e9 : 0.5 * size + 0.5 * speed + 0.25 * size * lost_;
+  const double gate = astray > 30 ? 1e9 : 0.5 * size + 0.5 * speed + 0.25 * size * astray;
   cv::Rect box = gate > 1e8 ? cv::Rect({}, frame.luma.size())
                             : box_around(predicted.centre_px, gate + 2.2 * size, frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
@@ -186,14 +210,17 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
     Detection detection;
   };
   std::vector<Candidate> candidates;
-  for (const Silhouette& body : find_bodies(frame, plate_, box)) {
+  const auto consider = [&](const Silhouette& body, double favour) {
     const Detection& d = body.detection;
-    if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) continue;
-    if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others))
-      continue;
+    if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) return;
+    if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others)) return;
     const double off = std::log(d.semi_major_px / size) / 0.2;
-    candidates.push_back({likeness(body, finder_) * std::exp(-0.5 * off * off), d});
-  }
+    candidates.push_back({favour * likeness(body, finder_) * std::exp(-0.5 * off * off), d});
+  };
+  constexpr double kInItsColours = 2.0;
+  for (const Silhouette& body : find_bodies(frame, plate_, box)) consider(body, 1.0);
+  for (const Silhouette& body : find_coloured_like(palette_, gain_, frame, plate_, box))
+    consider(body, kInItsColours);
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   constexpr std::size_t kMostTries = 3;
@@ -230,7 +257,10 @@ void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predic
   constexpr double kLearn = 0.1;
   const bool whole = wholeness(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
   const double shape_off = (seen.rim.shape_px - predicted.rim.shape_px).norm();
+  strange_ = palette_.fits(seen.evidence.face, gain_) ? 0 : strange_ + 1;
+  faint_ = std::max(0, clearness(seen) < kLittle ? faint_ + 1 : faint_ - 2);
   if (whole) {
+    palette_.learn(seen.evidence.face, gain_);
     if (lost_ == 0)
       shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
     usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);

@@ -5,6 +5,7 @@
 #include "background.hpp"
 #include "body_finder.hpp"
 #include "forecast.hpp"
+#include "palette.hpp"
 #include "spin_profile.hpp"
 
 namespace trochoid::tracking {
@@ -27,7 +28,6 @@ class Follower {
   void start(const Frame& frame, const Sighting& seen);
   /// The body in the next frame (earlier or later than the last), if it is seen there.
   [[nodiscard]] std::optional<Sighting> follow(const Frame& frame, const Others& others = {});
-  [[nodiscard]] int frames_lost() const { return lost_; }
 
  private:
   [[nodiscard]] std::optional<Sighting> look_near(const Frame& frame, const Sighting& predicted,
@@ -38,6 +38,7 @@ class Follower {
                                                    const Others& others);
   [[nodiscard]] Sighting as_it_moves(const Frame& frame, const Sighting& found) const;
   [[nodiscard]] double wholeness(const Sighting& seen) const;
+  [[nodiscard]] double clearness(const Sighting& seen) const;
   [[nodiscard]] bool misgiving(const Sighting& seen) const;
   [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
                                double reach_px) const;
@@ -59,7 +60,10 @@ class Follower {
   Evidence usual_{};             ///< running mean over whole sightings
   double usual_clarity_ = 0.0;   ///< of the seed
   double usual_evidence_ = 0.0;  ///< of the pose, running mean
+  Palette palette_;              ///< of whole sightings
   int lost_ = 0;
+  int strange_ = 0;  ///< frames in a row in which what is followed has other colours
+  int faint_ = 0;    ///< frames in which little spoke for it, less those in which much did
   int futile_ = 0, patience_ = 0;  ///< frames to wait before searching in spite of a sighting
 };
 

@@ -208,6 +208,14 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
   }
 }
 
+void forget_what_tells_nothing(std::vector<Glimpse>& glimpses) {
+  for (Glimpse& g : glimpses) {
+    if (!g.posed()) continue;
+    const double size_px = g.seen->rim.semi_major_px();
+    if (!(0.5 * g.seen->covariance_px2.trace() < size_px * size_px)) g.seen.reset();
+  }
+}
+
 void forget_what_the_path_jumps_to(std::vector<Glimpse>& glimpses) {
   constexpr std::size_t kLongest = 12;
   constexpr double kLittle = 0.6;

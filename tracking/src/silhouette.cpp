@@ -58,13 +58,16 @@ Silhouette describe(const std::vector<cv::Point>& contour, int factor, const cv:
   return body;
 }
 
-/// What both searches work on: the reduced difference to the background.
+const cv::Vec2b kGrey(128, 128);
+
+/// What the searches work on: the reduced difference to the background.
 struct Difference {
   cv::Rect box;
   int factor = 1;
   double threshold = 0.0;
   cv::Mat size, brighter;  ///< absolute, and where the picture is brighter
   cv::Mat colour;          ///< how far from the background's colour in any light; may be empty
+  cv::Mat now, chroma;     ///< the reduced picture; chroma may be empty
 };
 
 /// Distance of the colour from that of the plate in whatever light falls on it, times `weight`: in
@@ -97,10 +100,10 @@ bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Di
   d.box = cv::Rect(cv::Point(d.box.x & ~1, d.box.y & ~1), d.box.br());
   if (d.box.width < 4 || d.box.height < 4) return false;
   d.factor = reduction(frame.luma.size());
-  const cv::Mat now = reduced(frame.luma(d.box), d.factor),
-                plate = reduced(background.luma(d.box), d.factor);
-  cv::absdiff(now, plate, d.size);
-  cv::subtract(now, plate, d.brighter);
+  d.now = reduced(frame.luma(d.box), d.factor);
+  const cv::Mat plate = reduced(background.luma(d.box), d.factor);
+  cv::absdiff(d.now, plate, d.size);
+  cv::subtract(d.now, plate, d.brighter);
   // Averaging factor^2 pixels beats the noise down; compression and grain leave a floor.
   d.threshold = std::max(7.0, 4.5 * background.noise_levels / d.factor);
   if (frame.chroma.empty() || background.chroma.empty()) return true;
@@ -109,12 +112,13 @@ bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Di
       cv::Rect({}, frame.chroma.size());
   const auto to_size = [&](const cv::Mat& chroma) {
     cv::Mat out;
-    cv::resize(chroma(half), out, now.size(), 0, 0,
+    cv::resize(chroma(half), out, d.now.size(), 0, 0,
                d.factor > 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
     return out;
   };
   const double colour_threshold = std::max(6.0, 5.0 * background.chroma_noise_levels);
-  d.colour = colour_off(now, plate, to_size(frame.chroma), to_size(background.chroma),
+  d.chroma = to_size(frame.chroma);
+  d.colour = colour_off(d.now, plate, d.chroma, to_size(background.chroma),
                         d.threshold / colour_threshold);
   d.size = cv::max(d.size, d.colour);
   return true;
@@ -184,6 +188,36 @@ std::vector<Silhouette> find_silhouettes(const Frame& frame, const Plate& backgr
     Silhouette body = describe(contour, d.factor, d.box.tl(), frame.luma.size());
     if (body.detection.area_px2 > 0.0) bodies.push_back(std::move(body));
   }
+  largest_first(bodies);
+  return bodies;
+}
+
+std::vector<Silhouette> find_coloured_like(const Palette& body, double gain, const Frame& frame,
+                                           const Plate& background, cv::Rect box) {
+  Difference d;
+  std::vector<Silhouette> bodies;
+  if (!difference_in(frame, background, box, d)) return bodies;
+  for (int y = 0; y < d.size.rows; ++y)
+    for (int x = 0; x < d.size.cols; ++x) {
+      const auto colour = d.chroma.empty() ? kGrey : d.chroma.at<cv::Vec2b>(y, x);
+      if (!body.shows({d.now.at<std::uint8_t>(y, x), colour[0], colour[1]}, gain))
+        d.size.at<std::uint8_t>(y, x) = 0;
+    }
+  const std::vector<Contour> contours = contours_above(d.size, d.threshold);
+  Contour together;
+  double area = 0.0;
+  for (const Contour& contour : contours) {
+    bodies.push_back(describe(contour, d.factor, d.box.tl(), frame.luma.size()));
+    together.insert(together.end(), contour.begin(), contour.end());
+    area += bodies.back().detection.area_px2;
+  }
+  if (contours.size() > 1) {
+    Silhouette all = describe(together, d.factor, d.box.tl(), frame.luma.size());
+    all.solidity *= area / std::max(1.0, all.detection.area_px2);
+    all.detection.area_px2 = area;
+    bodies.push_back(std::move(all));
+  }
+  std::erase_if(bodies, [](const Silhouette& b) { return b.detection.area_px2 <= 0.0; });
   largest_first(bodies);
   return bodies;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "background.hpp"
+#include "palette.hpp"
 #include "trochoid/tracking/detector.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
@@ -27,5 +28,11 @@ struct Silhouette {
 /// and what has another colour than the background in any light (no shadow is either).
 [[nodiscard]] std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
                                                   cv::Rect box = {});
+
+/// What differs from the background and has a body's own colours: each region, and all of them
+/// together, as where a bar lies across the body. Tells it from a hand that touches it.
+[[nodiscard]] std::vector<Silhouette> find_coloured_like(const Palette& body, double gain,
+                                                         const Frame& frame,
+                                                         const Plate& background, cv::Rect box);
 
 }  // namespace trochoid::tracking

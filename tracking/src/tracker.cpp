@@ -338,6 +338,7 @@ class Tracking {
     doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
     doubt_what_stands_alone(glimpses);
+    forget_what_tells_nothing(glimpses);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
