@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <glog/logging.h>
 
+#include "pole_steps.hpp"
 #include "problem.hpp"
 #include "trochoid/fitting/fit.hpp"
 
@@ -88,7 +89,8 @@ struct Blocks {
   }
 };
 
-// Parameters held for now are left out of their block's steps.
+// Parameters held for now are left out of their block's steps; near a pole steps are not those of
+// the angles.
 void hold(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
           ceres::Problem& ceres_problem) {
   for (int block = 0; block < static_cast<int>(blocks.size.size()); ++block) {
@@ -96,6 +98,10 @@ void hold(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
     for (int i = 0; i < blocks.size[block]; ++i)
       if (problem.free[blocks.first[block] + i].held) held.push_back(i);
     double* const values = u.data() + blocks.first[block];
+    if (auto steps = pole_steps(problem, blocks.first[block], blocks.size[block], u, held)) {
+      ceres_problem.SetManifold(values, steps.release());
+      continue;
+    }
     if (held.empty()) continue;
     if (static_cast<int>(held.size()) == blocks.size[block])
       ceres_problem.SetParameterBlockConstant(values);

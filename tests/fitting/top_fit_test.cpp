@@ -29,6 +29,7 @@ struct Planted {
   Eigen::Vector2d pivot_m{0.0, 0.0};
   std::uint64_t seed = 1;
   bool with_covariance = true;
+  data::ModelSettings drag = {};
 };
 
 data::Scene top_scene(const Eigen::Vector2d& pivot_m = {0.0, 0.0}) {
@@ -40,7 +41,10 @@ data::Scene top_scene(const Eigen::Vector2d& pivot_m = {0.0, 0.0}) {
 }
 
 data::Track track_of(const Planted& planted) {
-  const auto predictor = model::make_predictor(top_scene(planted.pivot_m));
+  data::Scene scene = top_scene(planted.pivot_m);
+  scene.model.drag_transverse_N_m_s = planted.drag.drag_transverse_N_m_s;
+  scene.model.drag_spin_N_m_s = planted.drag.drag_spin_N_m_s;
+  const auto predictor = model::make_predictor(scene);
   Eigen::VectorXd values(predictor->parameters().size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     const auto& info = predictor->parameters()[i];
@@ -349,6 +353,41 @@ TEST(TopFit, FindsItsDragsWhereverTheyStart) {
     for (const char* name : {"gamma1_1_s", "gamma3_1_s"})
       EXPECT_LT(pull(result, name, plain.find(name)->value), kSameMinimum) << drag_N_m_s;
   }
+}
+
+// Tilt and azimuth are polar coordinates of an axis that starts nearly upright: steps in these end
+// beside the pole, on a curved floor of the cost where no straight one leads further down.
+TEST(TopFit, StepsAcrossThePole) {
+  data::Scene scene = top_scene();
+  scene.model.drag_transverse_N_m_s = scene.model.drag_spin_N_m_s = 1e-6;
+  const Planted planted{.values = {{"a_1_s2", 232.9735},
+                                   {"b_1_s", -32.7713},
+                                   {"l_m", 0.067227},
+                                   {"gamma1_1_s", 0.043303},
+                                   {"gamma3_1_s", 0.062631},
+                                   {"theta_rad", 0.0235},
+                                   {"phi_rad", 1.2},
+                                   {"dtheta_rad_s", -2.6},
+                                   {"dphi_rad_s", 3.9}},
+                        .duration_s = 5.27,
+                        .samples = 600,
+                        .sigma_m = 6.7e-4,
+                        .seed = 3,
+                        .drag = scene.model};
+  FitOptions beside;
+  beside.strategy = "single";
+  beside.start = planted.values;
+  beside.start["theta_rad"] = 0.004;
+  beside.start["phi_rad"] = 1.94;
+  beside.start["dtheta_rad_s"] = -1.6;
+  beside.start["dphi_rad_s"] = 508.0;
+  const data::Track track = track_of(planted);
+  const data::Fit found = fit_one(track, scene), crossed = fit_one(track, scene, beside);
+  ASSERT_TRUE(found.converged) << found.reason;
+  ASSERT_TRUE(crossed.converged) << crossed.reason;
+  EXPECT_NEAR(crossed.chi2, found.chi2, 0.1);
+  for (const char* name : {"a_1_s2", "b_1_s", "l_m", "gamma1_1_s", "gamma3_1_s", "theta_rad"})
+    EXPECT_LT(pull(crossed, name, planted.values.at(name)), kFar) << name;
 }
 
 TEST(TopFit, FitsNoDragThatTheSceneDoesNotName) {
