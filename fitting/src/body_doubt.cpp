@@ -128,25 +128,23 @@ std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
   return doubts;
 }
 
-Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene) {
+namespace {
+
+// Of one arc, whose spin is its own.
+Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u, int arc, Linearised& all) {
   const model::Predictor& predictor = *problem.predictor;
   const int spin = predictor.index_of("w3_rad_s"), radius = predictor.index_of("contact_radius_m");
-  if (predictor.model_name() != "puck" || scene.fit.fixed.contains("w3_rad_s")) return {};
+  const Eigen::VectorXd values = problem.values(arc, u);
+  const auto fitted = [&](const FreeParameter& p) { return p.index == spin && p.arc == arc; };
+  if (std::any_of(problem.free.begin(), problem.free.end(), fitted) || values[spin] != 0.0)
+    return {};
   Problem turning = problem;
-  bool any = false;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    const Eigen::VectorXd values = problem.values(arc, u);
-    const auto fitted = [&](const FreeParameter& p) { return p.index == spin && p.arc == arc; };
-    if (std::any_of(problem.free.begin(), problem.free.end(), fitted) || values[spin] != 0.0)
-      continue;
-    const double speed_m_s =
-        std::hypot(values[predictor.index_of("vx_m_s")], values[predictor.index_of("vy_m_s")]);
-    turning.base[arc][spin] = speed_m_s / values[radius];
-    any = true;
-  }
+  turning.base[arc][spin] =
+      std::hypot(values[predictor.index_of("vx_m_s")], values[predictor.index_of("vy_m_s")]) /
+      values[radius];
   Eigen::VectorXd there;
-  if (!any || !all_residuals(turning, u, there)) return {};
-  const Linearised all = linearise(problem, u);
+  if (!all_residuals(turning, u, there)) return {};
+  if (all.residuals.size() == 0) all = linearise(problem, u);
   const Eigen::VectorXd change = there - all.residuals.head(there.size());
   const Eigen::VectorXd shift = follow(all, change);
   // What the path has of it that no other value could have made: how much of such a spin there is,
@@ -155,6 +153,20 @@ Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u, const data::
   const double seen = own.squaredNorm();
   const double share = std::max(0.0, -own.dot(all.residuals.head(there.size()))) / (1.0 + seen);
   return {"w3_rad_s", std::sqrt(1.0 / (1.0 + seen) + share * share) * shift};
+}
+
+}  // namespace
+
+std::vector<Doubt> unseen_spins(const Problem& problem, const Eigen::VectorXd& u,
+                                const data::Scene& scene) {
+  std::vector<Doubt> doubts;
+  if (problem.predictor->model_name() != "puck" || scene.fit.fixed.contains("w3_rad_s"))
+    return doubts;
+  Linearised all;  // once, and only where it is needed
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    if (Doubt doubt = unseen_spin(problem, u, arc, all); doubt.shift.size() > 0)
+      doubts.push_back(std::move(doubt));
+  return doubts;
 }
 
 std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {

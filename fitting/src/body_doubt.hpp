@@ -23,11 +23,12 @@ struct Doubt {
 [[nodiscard]] std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
                                              const data::Scene& scene, double frame_time_s);
 
-/// The spin of a puck that nothing shows: friction acts with less of its strength along the path of
-/// one that turns. The shift is that of a rim as fast as the puck slides, as far as the path does
-/// not rule it out; empty for other models and where the spin is fitted, fixed or given.
-[[nodiscard]] Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u,
-                                const data::Scene& scene);
+/// The spins of a puck that nothing shows, one for each arc: friction acts with less of its
+/// strength along the path of one that turns. A shift is that of a rim as fast as the puck slides,
+/// as far as the path does not rule it out; none for other models and where the spin is fitted,
+/// fixed or given.
+[[nodiscard]] std::vector<Doubt> unseen_spins(const Problem& problem, const Eigen::VectorXd& u,
+                                              const data::Scene& scene);
 
 /// Names under [fit] prior that mean nothing to this model or its body.
 [[nodiscard]] std::vector<std::string> idle_priors(const Problem& problem,

@@ -207,13 +207,13 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
     fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
                                        prior.value, prior.sigma));
   }
-  if (const Doubt spin = unseen_spin(problem, solution.u, scene); spin.shift.size() > 0) {
-    error.covariance += spin.shift * spin.shift.transpose();
+  const std::vector<Doubt> spins = unseen_spins(problem, solution.u, scene);
+  for (const Doubt& spin : spins) error.covariance += spin.shift * spin.shift.transpose();
+  if (!spins.empty())
     fit.warnings.push_back(
         "nothing shows the puck's spin: the friction is that of one that does not turn, and its "
         "error bar allows for a rim as fast as the puck slides, as far as the path does not rule "
         "that out; a mark on the face would tell");
-  }
   for (const std::string& name : idle_priors(problem, scene))
     fit.warnings.push_back(fmt::format(
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));

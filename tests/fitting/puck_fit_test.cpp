@@ -176,38 +176,61 @@ TEST(PuckFit, DoesNotMeasureAContactRadiusThatNothingShows) {
     EXPECT_NEAR(result.find(name)->value, truth, 4.0 * result.find(name)->sigma) << name;
 }
 
+// Goes on from the track's end as the model does from these values, its spin angle seen or not.
+struct Turning {
+  data::Scene scene = puck_scene();
+  data::Track track = {};
+  std::mt19937_64 generator;
+
+  Turning& slide(std::map<std::string, double> values, int samples) {
+    values.insert({"friction", kFriction});
+    for (const auto& [name, at] : {std::pair{"x_m", at_m.x()}, {"y_m", at_m.y()}})
+      values.insert({name, at});
+    const auto predictor = model::make_predictor(scene);
+    std::vector<double> t_s;
+    for (int i = 0; i <= samples; ++i) t_s.push_back(i * kStep_s);
+    model::PredictRequest request;
+    request.t_s = t_s;
+    request.observables.push_back(model::Observable::psi_rad);
+    const Eigen::VectorXd run =
+        predictor->predict(fitting::values_with(*predictor, values), request).values;
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::Vector3d at = run.segment<3>(3 * i);
+      data::TrackSample sample;
+      sample.t_s = kStep_s * static_cast<double>(track.samples.size());
+      sample.centre_m =
+          at.head<2>() + kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+      sample.psi = data::MeasuredAngle{at[2] + 0.02 * normal(generator), 0.02};
+      track.samples.push_back(sample);
+    }
+    at_m = run.segment<2>(3 * samples);
+    return *this;
+  }
+  Turning& blind() {
+    for (data::TrackSample& sample : track.samples) sample.psi.reset();
+    return *this;
+  }
+  // That of a rim so many times as fast as the puck slides.
+  [[nodiscard]] double spin_rad_s(double times, double speed_m_s) const {
+    return times * speed_m_s / scene.body->radius_m;
+  }
+  Eigen::Vector2d at_m = Eigen::Vector2d::Zero();
+};
+
 // A rim one and a half times as fast as the puck slides takes a good part of the friction off its
 // path, which bends the slowing down by little: the error bar has to allow for it, the more the
 // less of that bend is seen.
 TEST(PuckFit, AllowsForASpinThatNothingShows) {
-  data::Scene scene = puck_scene();
-  const auto predictor = model::make_predictor(scene);
-  const std::map<std::string, double> truth{
-      {"friction", kFriction}, {"vx_m_s", 0.8}, {"w3_rad_s", 1.5 * 0.8 / scene.body->radius_m}};
-  const Eigen::VectorXd values = fitting::values_with(*predictor, truth);
-  std::vector<double> t_s;
-  for (int i = 0; i < 24; ++i) t_s.push_back(i * kStep_s);
-  model::PredictRequest request;
-  request.t_s = t_s;
-  request.observables.push_back(model::Observable::psi_rad);
-  const Eigen::VectorXd run = predictor->predict(values, request).values;
-  std::mt19937_64 generator(8);
-  std::normal_distribution<double> normal;
-  data::Track track;
-  for (std::size_t i = 0; i < t_s.size(); ++i) {
-    const Eigen::Vector3d at = run.segment<3>(3 * static_cast<Eigen::Index>(i));
-    data::TrackSample sample;
-    sample.t_s = t_s[i];
-    sample.centre_m =
-        at.head<2>() + kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
-    sample.psi = data::MeasuredAngle{at[2] + 0.02 * normal(generator), 0.02};
-    track.samples.push_back(sample);
-  }
+  Turning turning{.generator = std::mt19937_64(8)};
+  data::Scene scene = turning.scene;
+  const double spin_rad_s = turning.spin_rad_s(1.5, 0.8);
+  data::Track track = turning.slide({{"vx_m_s", 0.8}, {"w3_rad_s", spin_rad_s}}, 24).track;
   const data::FitParameter marked = *fit(std::span(&track, 1), scene).find("friction");
   for (data::TrackSample& sample : track.samples) sample.psi.reset();
   const data::Fit blind = fit(std::span(&track, 1), scene);
-  scene.fit.prior["w3_rad_s"] = {truth.at("w3_rad_s"), 1.0};
+  scene.fit.prior["w3_rad_s"] = {spin_rad_s, 1.0};
   const data::Fit told = fit(std::span(&track, 1), scene);
   scene.fit.prior.clear();
   scene.fit.fixed["w3_rad_s"] = 0.0;
@@ -222,6 +245,26 @@ TEST(PuckFit, AllowsForASpinThatNothingShows) {
   EXPECT_EQ(told.find("w3_rad_s")->status, data::ParameterStatus::prior);
   EXPECT_LT(std::abs(told.find("friction")->value - kFriction), 4.0 * told.find("friction")->sigma);
   EXPECT_LT(told.find("friction")->sigma, 0.5 * friction->sigma);
+}
+
+// After every impact it turns as it likes: what one common amount of spin would do to the path is
+// ruled out, what each arc's own does is not.
+TEST(PuckFit, AllowsForASpinOfEachArcsOwn) {
+  Turning turning{.generator = std::mt19937_64(9)};
+  const auto slide = [&](double vx, double vy, double times, int samples) {
+    const double w3 = turning.spin_rad_s(times, std::hypot(vx, vy));
+    turning.slide({{"vx_m_s", vx}, {"vy_m_s", vy}, {"w3_rad_s", w3}}, samples);
+  };
+  slide(0.7, -0.8, 0.9, 30);
+  slide(-0.1, -0.8, -0.2, 30);
+  slide(-0.8, 0.1, 0.7, 30);
+  slide(-1.2, 0.4, 0.0, 100);
+  const data::Fit result = fit(std::span(&turning.blind().track, 1), turning.scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  ASSERT_EQ(result.arcs.size(), 4u);
+  for (const auto& [name, truth] :
+       {std::pair{"friction", kFriction}, {"vx_m_s", 0.7}, {"vy_m_s", -0.8}})
+    EXPECT_NEAR(result.find(name)->value, truth, 4.0 * result.find(name)->sigma) << name;
 }
 
 TEST(PuckFit, RefusesABodyAtRest) {
