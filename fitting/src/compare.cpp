@@ -479,6 +479,13 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   return rungs;
 }
 
+bool show_spin(std::span<const data::Track> tracks) {
+  return std::any_of(tracks.begin(), tracks.end(), [](const data::Track& track) {
+    return std::any_of(track.samples.begin(), track.samples.end(),
+                       [](const data::TrackSample& sample) { return sample.psi.has_value(); });
+  });
+}
+
 std::set<std::string> parameters_of_any(const Ladder& ladder) {
   std::set<std::string> names = parameters_of(ladder.plain);
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
@@ -527,7 +534,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
   if (open && leaves_pivot(tracks, named)) named.model.name = "top";
   free_all_terms(named.fit);
-  const Ladder ladder = ladder_of(named);
+  const Ladder ladder = ladder_of(named, show_spin(tracks));
   const std::set<std::string> known = parameters_of_any(ladder);
   check_names(scene.fit, known);
   check_first_guess(options.start, "the models compared have", known);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -198,6 +199,29 @@ void heed_far_side(const Problem& problem, const Solution& solution, const FitOp
         problem.name(far->index), times));
 }
 
+// A puck's path is the same for either sense of its spin: unless a prior tells, the spin that fits
+// is as likely the other way round.
+void heed_either_sense(const Problem& problem, Uncertainty& error, data::Fit& fit) {
+  if (fit.model != "puck") return;
+  const int spin = problem.predictor->index_of("w3_rad_s");
+  constexpr double kTells = 2.0;  // standard deviations
+  bool either = false;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& free = problem.free[i];
+    const int arc = std::max(0, free.arc);
+    if (free.index != spin || problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0 ||
+        (free.prior && std::abs(free.prior->value) > kTells * free.prior->sigma))
+      continue;
+    const double value = problem.base[arc][spin];
+    error.covariance(i, i) += 2.0 * value * value;  // the mean square of 0 and 2 w3
+    either = true;
+  }
+  if (either)
+    fit.warnings.push_back(
+        "the path shows how fast the puck turns, not which way round: the error bar of w3_rad_s "
+        "holds either");
+}
+
 // What the model takes for given is known as well as its priors say, and no better.
 void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
                  double frame_s, Uncertainty& error, data::Fit& fit) {
@@ -207,6 +231,7 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
     fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
                                        prior.value, prior.sigma));
   }
+  heed_either_sense(problem, error, fit);
   const std::vector<Doubt> spins = unseen_spins(problem, solution.u, scene);
   for (const Doubt& spin : spins) error.covariance += spin.shift * spin.shift.transpose();
   if (!spins.empty())

@@ -100,9 +100,30 @@ void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
   ladder.terms.back().of = 0;  // of dry friction
 }
 
+// Friction that spin weakens looks like air that slows: the path has to choose between them.
+Term unseen_spin(const Scene& scene) {
+  constexpr double kFastest = 4.0;  // of the natural rate: a rim of a metre and a half per second
+  const double rate_rad_s = std::sqrt(scene.model.gravity_m_s2 / scene.body->radius_m);
+  return {"unseen spin",
+          [rate_rad_s](Scene& s) {
+            s.fit.prior["w3_rad_s"] = {0.0, kFastest * rate_rad_s};
+          },
+          {}};
+}
+
+void add_puck_terms(const Scene& scene, bool spin_seen, Ladder& ladder) {
+  if (scene.body->mass_kg)
+    ladder.terms.push_back(
+        single("air force", &ModelSettings::air_force_N_s_m, scene, 0.05 * *scene.body->mass_kg));
+  else
+    ladder.left_out.push_back("air force (needs body.mass_kg)");
+  if (!spin_seen && !scene.fit.fixed.contains("w3_rad_s") && !scene.fit.prior.contains("w3_rad_s"))
+    ladder.terms.push_back(unseen_spin(scene));
+}
+
 }  // namespace
 
-Ladder ladder_of(const Scene& scene) {
+Ladder ladder_of(const Scene& scene, bool spin_seen) {
   Ladder ladder;
   Scene named = scene;
   // Any friction will do to ask which law the scene's support stands for.
@@ -118,11 +139,7 @@ Ladder ladder_of(const Scene& scene) {
     add_floors(scene, ladder);
   } else if (ladder.law == "puck") {
     ladder.plain.model.friction = scene.model.friction.value_or(0.2);
-    if (scene.body->mass_kg)
-      ladder.terms.push_back(
-          single("air force", &ModelSettings::air_force_N_s_m, scene, 0.05 * *scene.body->mass_kg));
-    else
-      ladder.left_out.push_back("air force (needs body.mass_kg)");
+    add_puck_terms(scene, spin_seen, ladder);
   } else if (ladder.law == "pivot") {
     add_spin_down_terms(scene, ladder);
   } else if (ladder.law == "top") {

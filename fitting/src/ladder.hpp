@@ -30,7 +30,8 @@ struct Ladder {
   std::vector<std::string> left_out;  ///< why a term that belongs here is not tried
 };
 
+/// @param spin_seen  whether the tracks have a spin angle; a puck may turn without showing it.
 /// @throws InputError if the scene lacks what its law needs.
-[[nodiscard]] Ladder ladder_of(const data::Scene& scene);
+[[nodiscard]] Ladder ladder_of(const data::Scene& scene, bool spin_seen);
 
 }  // namespace trochoid::fitting

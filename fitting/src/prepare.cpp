@@ -76,6 +76,13 @@ double tolerance_for(const std::vector<ArcData>& arcs, double share) {
   return std::clamp(least, 1e-11, 1e-5);
 }
 
+// The path is the same for either sense of a spin: at none it does not tell which way to go.
+void start_turning(const data::Prior& prior, double& spin_rad_s) {
+  constexpr double kShare = 0.25;  // of the prior's standard deviation
+  if (spin_rad_s != 0.0) return;
+  spin_rad_s = prior.value != 0.0 ? prior.value : kShare * prior.sigma;
+}
+
 // Turns parameters on that only some measurements show, and off those nothing shows: the spin angle
 // without a mark, and a puck's spin, which the path alone hardly carries, unless a prior does.
 void suit_to_data(Problem& problem, const data::Scene& scene) {
@@ -92,6 +99,8 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       const bool told = puck && prior != scene.fit.prior.end();
       if (told && !is_free)
         problem.free.push_back({index, arc, {}, prior->second, {}, prior->second.value});
+      if (told && !seen)
+        start_turning(prior->second, problem.base[arc][index]);
       else if (seen && !is_free)
         problem.free.push_back({index, arc, {}, {}, {}});
       if (!seen && !told && is_free) std::erase_if(problem.free, same);

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
@@ -265,6 +266,26 @@ TEST(PuckFit, AllowsForASpinOfEachArcsOwn) {
   for (const auto& [name, truth] :
        {std::pair{"friction", kFriction}, {"vx_m_s", 0.7}, {"vy_m_s", -0.8}})
     EXPECT_NEAR(result.find(name)->value, truth, 4.0 * result.find(name)->sigma) << name;
+}
+
+// Spin takes friction off the path, less and less as the puck slows down at first: alike to what
+// air does, and far likelier.
+TEST(PuckFit, DoesNotTakeASpinForTheAir) {
+  Turning turning{.generator = std::mt19937_64(10)};
+  turning.scene.body->mass_kg = 0.02;
+  const double spin_rad_s = turning.spin_rad_s(-0.8, 0.9);
+  turning.slide({{"vx_m_s", 0.9}, {"w3_rad_s", spin_rad_s}}, 100).blind();
+  const Comparison chosen = compare(std::span(&turning.track, 1), turning.scene, {});
+  ASSERT_TRUE(chosen.fit.converged) << chosen.fit.reason;
+  const data::FitParameter* friction = chosen.fit.find("friction");
+  EXPECT_LT(std::abs(friction->value - kFriction), 4.0 * friction->sigma);
+  EXPECT_LT(friction->sigma, 0.1 * kFriction);
+  // Which way round the path does not show.
+  const data::FitParameter* spin = chosen.fit.find("w3_rad_s");
+  ASSERT_NE(spin, nullptr);
+  EXPECT_NEAR(std::abs(spin->value), std::abs(spin_rad_s), 0.2 * std::abs(spin_rad_s));
+  EXPECT_LT(std::abs(spin->value - spin_rad_s), 3.0 * spin->sigma);
+  EXPECT_THAT(chosen.fit.warnings, testing::Contains(testing::HasSubstr("which way round")));
 }
 
 TEST(PuckFit, RefusesABodyAtRest) {
