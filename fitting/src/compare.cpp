@@ -451,7 +451,11 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   // Where a search with all usual losses led nowhere, one with fewer does not either.
   const Reach reach = searched ? Reach::from_below : Reach::search;
   const std::size_t current = step_up_while_worth(ladder, tracks, options, reach, 0, rungs);
-  if (explains(rungs[current])) return rungs;
+  if (explains(rungs[current])) {
+    // What stood in for another loss while that was missing may not be needed beside it.
+    step_down(ladder, tracks, options, current, rungs);
+    return rungs;
+  }
   if (const std::optional<int> none = smooth_term(ladder)) {
     std::size_t smooth = rungs.size();
     rungs.push_back(rung_with(ladder, {*none}));

@@ -148,8 +148,9 @@ struct SolveOptions {
                              const SolveOptions& options = {});
 
 /// The minimiser for any model. A body on its rim has long bent valleys with steep walls, and its
-/// derivatives cost many plain predictions: there Levenberg-Marquardt with geodesic acceleration,
-/// which needs a quarter of the derivatives and stops at no wall; elsewhere solve().
+/// derivatives cost many plain predictions; the losses of a spin-down trade with each other along
+/// one. There Levenberg-Marquardt with geodesic acceleration, which needs a quarter of the
+/// derivatives and stops at no wall; elsewhere solve().
 [[nodiscard]] Solution seek(const Problem& problem, const Eigen::VectorXd& u,
                             const SolveOptions& options = {});
 

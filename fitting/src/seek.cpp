@@ -207,7 +207,8 @@ class Seeker {
 
 Solution seek(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options) {
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
-  if (!rim || problem.arcs.size() > 1) return solve(problem, u, options);
+  const bool valleys = rim || problem.predictor->model_name() == "pivot";
+  if (!valleys || problem.arcs.size() > 1) return solve(problem, u, options);
   return Seeker(problem, u, options).run();
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "trochoid/data/error.hpp"
@@ -105,6 +106,45 @@ TEST(Compare, FindsTheWeightBesideTheAxisAndFrictionThatWeakens) {
   std::set<std::pair<double, int>> scores;
   for (const data::ModelScore& score : found.fit.comparison)
     EXPECT_TRUE(scores.emplace(score.bic, score.parameters).second) << score.model;
+}
+
+// Dry and viscous friction together look quadratic at first, and all three trade with each other
+// along a bent valley: its end, and that the first is not needed then, have to be found.
+TEST(Compare, FindsTwoLossesThatAThirdStoodInFor) {
+  for (const auto& [w3_rad_s, dry, viscous] :
+       {std::tuple{-25.6, 0.876, 0.0317}, {31.0, 0.42, 0.045}, {-50.0, 0.9, 0.03}}) {
+    data::Scene truth = spin_down();
+    truth.model.spin_down_dry_rad_s2 = dry;
+    truth.model.spin_down_viscous_1_s = viscous;
+    const data::Track track = track_of(truth, {{"w3_rad_s", w3_rad_s}}, 10.0, 300, 0.01, 7);
+    const Comparison found = compare_one(track, spin_down());
+    ASSERT_TRUE(found.fit.converged) << found.fit.reason;
+    EXPECT_FALSE(found.scene.model.spin_down_quadratic_1_rad) << w3_rad_s;
+    for (const auto& [name, value] :
+         Values{{"spin_down_dry_rad_s2", dry}, {"spin_down_viscous_1_s", viscous}}) {
+      const data::FitParameter* parameter = found.fit.find(name);
+      ASSERT_NE(parameter, nullptr) << name;
+      EXPECT_NEAR(parameter->value, value, 4.0 * parameter->sigma) << name << ", " << w3_rad_s;
+    }
+  }
+}
+
+// Five standard deviations of a swing of two thousandths of a radian: what it does to the path of a
+// disc without a weight turns faster than that path's own steps.
+TEST(Compare, FindsALightWeightOnAFastDisc) {
+  data::Scene truth = spin_down();
+  truth.model.spin_down_viscous_1_s = 0.042;
+  truth.model.spin_down_imbalance_sin_rad_s2 = 2.4;
+  truth.model.spin_down_imbalance_cos_rad_s2 = 1.1;
+  const data::Track track = track_of(truth, {{"w3_rad_s", -39.7}}, 10.0, 1200, 0.01, 8);
+  const Comparison found = compare_one(track, spin_down());
+  for (const auto& [name, value] : Values{{"spin_down_imbalance_sin_rad_s2", 2.4},
+                                          {"spin_down_imbalance_cos_rad_s2", 1.1},
+                                          {"w3_rad_s", -39.7}}) {
+    const data::FitParameter* parameter = found.fit.find(name);
+    ASSERT_NE(parameter, nullptr) << name;
+    EXPECT_NEAR(parameter->value, value, 4.0 * parameter->sigma) << name;
+  }
 }
 
 // Held for a second, brought to speed by hand within half a second, then let go.
