@@ -207,9 +207,12 @@ class Seeker {
 
 Solution seek(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options) {
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
-  const bool valleys = rim || problem.predictor->model_name() == "pivot";
-  if (!valleys || problem.arcs.size() > 1) return solve(problem, u, options);
-  return Seeker(problem, u, options).run();
+  const bool spin_down = problem.predictor->model_name() == "pivot";
+  if (problem.arcs.size() > 1 || !(rim || spin_down)) return solve(problem, u, options);
+  if (rim) return Seeker(problem, u, options).run();
+  // From afar its bent steps go astray where an angle is off by turns.
+  const Solution near = solve(problem, u, options);
+  return Seeker(problem, near.usable ? near.u : u, options).run();
 }
 
 }  // namespace trochoid::fitting
