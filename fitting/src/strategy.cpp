@@ -47,6 +47,24 @@ Problem without_samples(const Problem& problem, const std::vector<double>& t_s) 
   return part;
 }
 
+namespace {
+
+// A top that nods more than half a turn between two samples has slower twins, which look the same
+// at evenly spaced times.
+bool nods_between_samples(const Problem& problem, const Eigen::VectorXd& u) {
+  const model::Predictor& predictor = *problem.predictor;
+  if (!predictor.model_name().starts_with("top")) return false;
+  const Eigen::VectorXd values = problem.values(0, u);
+  const auto value = [&](const char* name) { return values[predictor.index_of(name)]; };
+  const double rate_rad_s =
+      std::abs(value("b_1_s") - 2.0 * value("dphi_rad_s") * std::cos(value("theta_rad")));
+  const ArcData& arc = problem.arcs[0];
+  const double gaps = std::max(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
+  return rate_rad_s * arc.duration_s() > std::numbers::pi * gaps;
+}
+
+}  // namespace
+
 Found judged(const Problem& problem, Solution solution, const std::string& path) {
   Found found;
   found.solution = std::move(solution);
@@ -56,6 +74,12 @@ Found judged(const Problem& problem, Solution solution, const std::string& path)
   found.reduced_chi2 = found.solution.chi2 / free_rows(problem);
   found.unexplained = found.solution.chi2 / std::max(null_chi2(problem.arcs[0]), 1e-300);
   found.passed = found.reduced_chi2 < chi2_gate(problem.rows());
+  // It is believed only where no slower one is as good.
+  constexpr double kUnlikely = 2.0;
+  if (nods_between_samples(problem, found.solution.u)) {
+    found.reduced_chi2 *= kUnlikely;
+    found.passed = false;
+  }
   return found;
 }
 
