@@ -5,6 +5,8 @@
 #include <map>
 #include <random>
 
+#include "prepare.hpp"
+#include "strategy.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -388,6 +390,25 @@ TEST(TopFit, StepsAcrossThePole) {
   EXPECT_NEAR(crossed.chi2, found.chi2, 0.1);
   for (const char* name : {"a_1_s2", "b_1_s", "l_m", "gamma1_1_s", "gamma3_1_s", "theta_rad"})
     EXPECT_LT(pull(crossed, name, planted.values.at(name)), kFar) << name;
+}
+
+// Whole turns of nutation a sample are not seen at evenly spaced times.
+TEST(TopFit, BelievesAFastTwinOnlyWhereNoSlowerOneIsAsGood) {
+  const data::Track track = track_of({});
+  const data::Scene scene = top_scene();
+  const auto predictor = model::make_predictor(scene);
+  Problem problem = prepare(std::span(&track, 1), *predictor, scene, {});
+  const auto with = [&](double b_1_s) {
+    for (const auto& [name, value] : kThesis) problem.base[0][predictor->index_of(name)] = value;
+    problem.base[0][predictor->index_of("b_1_s")] = b_1_s;
+    const double chi2 = problem.rows();
+    return judged(problem, {.u = problem.start(), .chi2 = chi2, .usable = true}, "");
+  };
+  const double turn_a_sample_rad_s = 2.0 * M_PI / (track.samples[1].t_s - track.samples[0].t_s);
+  const Found slow = with(0.75), fast = with(0.75 + 2.0 * turn_a_sample_rad_s);
+  EXPECT_TRUE(slow.passed);
+  EXPECT_FALSE(fast.passed);
+  EXPECT_TRUE(better(slow, fast));
 }
 
 TEST(TopFit, FitsNoDragThatTheSceneDoesNotName) {
