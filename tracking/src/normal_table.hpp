@@ -11,6 +11,8 @@ class NormalTable {
     float share, density;
   };
   static const NormalTable& instance();
+  /// Shares and densities in turns, from -4 in steps of 1/64.
+  [[nodiscard]] const float* values() const { return &entries_[0].share; }
   [[nodiscard]] Step at(float x) const {
     const float place = (std::clamp(x, -kRange, kRange) + kRange) * kPerUnit;
     const int i = static_cast<int>(place);

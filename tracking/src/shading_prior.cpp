@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "stretch_kernel.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -13,79 +16,71 @@ namespace {
 // for curves all of whose looks together show so little.
 constexpr double kPlainVariance = 3e-4, kLeastVariance = 0.03, kMostVariance = 1.0;
 
-// Minimises x^T A x / 2 - b^T x over 0 <= x <= kMostVariance, A positive semidefinite, one
-// coordinate at a time, from x.
-Shading least_within_bounds(const ShadingMatrix& A, const Shading& b, Shading x) {
-  constexpr int kSweeps = 3;
-  const Shading inverse = A.diagonal().cwiseInverse();
-  for (int sweep = 0; sweep < kSweeps; ++sweep)
-    for (int k = 0; k < kShading; ++k) {
-      if (!(A(k, k) > 0.0)) continue;
-      const double off = b[k] - A.col(k).dot(x);
-      x[k] = std::clamp(x[k] + off * inverse[k], 0.0, kMostVariance);
-    }
-  return x;
-}
-
-// Inverse of a positive definite matrix, one pivot after the other (Gauss-Jordan).
-ShadingMatrix inverse_of(ShadingMatrix m) {
-  for (int k = 0; k < kShading; ++k) {
-    const double inverse = 1.0 / m(k, k);
-    const Shading column = m.col(k), scaled = inverse * column;
-    m -= scaled * column.transpose();
-    m.col(k) = scaled;
-    m.row(k) = scaled.transpose();
-    m(k, k) = -inverse;
-  }
-  return -m;
-}
-
-// With shading s of diagonal covariance V, right sides r = N s + noise have E[r_k^2] =
-// sum_l N_kl^2 V_l + N_kk: sums of both sides over some looks.
-struct Moments {
-  ShadingMatrix squares = ShadingMatrix::Zero();
-  Shading excess = Shading::Zero();
-
-  void add(const ShadingEvidence& look, const Shading& rest, double sign) {
-    squares += sign * look.normal.cwiseAbs2();
-    excess += sign * (rest.cwiseAbs2() - look.normal.diagonal());
-  }
-  // From those of a look nearby.
-  [[nodiscard]] Shading variances(const Shading& nearby) const {
-    return least_within_bounds(squares, excess, nearby);
-  }
-  // From nothing.
-  [[nodiscard]] Shading variances() const {
-    constexpr int kRounds = 4;
-    Shading found = Shading::Zero();
-    for (int round = 0; round < kRounds; ++round) found = variances(found);
-    return found;
-  }
-};
-
 // What a look's slopes and bends may vary by at least, from the sums over its whole curve: as much
 // as these show of any of them, and a standard deviation more (r_k^2 of noise alone has the
 // variance 2 N_kk^2).
-double least_variance(const Moments& curve) {
-  const Eigen::Array<double, kShading, 1> sd =
-      (2.0 / curve.squares.diagonal().array().max(1e-9)).sqrt();
-  const Shading most = curve.variances() + sd.matrix();
+double least_variance(const Shading& variances, const Shading& squares) {
+  const Eigen::Array<double, kShading, 1> sd = (2.0 / squares.array().max(1e-9)).sqrt();
+  const Shading most = variances + sd.matrix();
   return std::clamp(most.head<kShading - 1>().maxCoeff(), kPlainVariance, kLeastVariance);
 }
 
-// A strip along the edge, the wall of the body mostly, is lit like nothing else.
-ShadingEstimate estimate(const ShadingEvidence& look, const Shading& expected,
-                         const Shading& seen_variance, double least) {
-  Shading variance = seen_variance.cwiseMax(least);
-  variance[kShading - 1] = kMostVariance;
-  ShadingMatrix information = look.normal;
-  information.diagonal() += variance.cwiseInverse();
-  ShadingEstimate out;
-  out.covariance = inverse_of(information);
-  out.shading = expected + out.covariance * (look.right - look.normal * expected);
-  out.unevenness = seen_variance.head<kShading - 1>().mean();
-  return out;
+// Doubles from one element of an array to the next.
+template <class Element>
+constexpr int stride_of() {
+  static_assert(sizeof(Element) % sizeof(double) == 0);
+  return static_cast<int>(sizeof(Element) / sizeof(double));
 }
+
+// Looks as the kernels read them, with what of each right side is not expected.
+class Looks {
+ public:
+  Looks(const std::vector<ShadingEvidence>& looks, const std::vector<Shading>& expected)
+      : looks_(looks), expected_(expected) {
+    for (const ShadingEvidence& look : looks) usable_.push_back(look.usable ? 1 : 0);
+    if (expected.empty()) return;
+    rest_.resize(looks.size());
+    for (std::size_t i = 0; i < looks.size(); ++i)
+      rest_[i] = looks[i].right - looks[i].normal * expected[i];
+  }
+  [[nodiscard]] stretch::CurveLooks within(std::size_t first, std::size_t end) const {
+    constexpr int kStride = stride_of<ShadingEvidence>();
+    const bool plain = expected_.empty();
+    return {static_cast<int>(end - first),
+            looks_[first].normal.data(),
+            plain ? looks_[first].right.data() : rest_[first].data(),
+            kStride,
+            plain ? kStride : stride_of<Shading>(),
+            &usable_[first]};
+  }
+  // With variances that were seen and what they are at least.
+  [[nodiscard]] std::vector<ShadingEstimate> estimates(std::vector<Shading> variances,
+                                                       const std::vector<double>& least) const {
+    const std::size_t n = looks_.size();
+    std::vector<ShadingEstimate> out(n);
+    if (n == 0) return out;
+    for (std::size_t i = 0; i < n; ++i) {
+      out[i].unevenness = variances[i].head<kShading - 1>().mean();
+      variances[i] = variances[i].cwiseMax(least[i]);
+      // A strip along the edge, the wall of the body mostly, is lit like nothing else.
+      variances[i][kShading - 1] = kMostVariance;
+    }
+    constexpr int kStride = stride_of<ShadingEstimate>();
+    stretch::kernel().estimate(within(0, n), variances[0].data(), out[0].covariance.data(), kStride,
+                               out[0].shading.data(), kStride);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!usable_[i]) out[i] = {};
+      if (usable_[i] && !expected_.empty()) out[i].shading += expected_[i];
+    }
+    return out;
+  }
+
+ private:
+  const std::vector<ShadingEvidence>& looks_;
+  const std::vector<Shading>& expected_;
+  std::vector<unsigned char> usable_;
+  std::vector<Shading> rest_;
+};
 
 // Where the normal points, in sectors.
 double sectors_round(double direction_rad, int sectors) {
@@ -96,43 +91,30 @@ double sectors_round(double direction_rad, int sectors) {
 
 std::vector<ShadingEstimate> shadings_given(const std::vector<ShadingEvidence>& looks,
                                             double variance) {
-  std::vector<ShadingEstimate> out(looks.size());
-  const Shading given = Shading::Constant(variance);
-  for (std::size_t i = 0; i < looks.size(); ++i)
-    if (looks[i].usable) out[i] = estimate(looks[i], Shading::Zero(), given, kLeastVariance);
-  return out;
+  const std::vector<Shading> nothing;
+  return Looks(looks, nothing)
+      .estimates(std::vector<Shading>(looks.size(), Shading::Constant(variance)),
+                 std::vector<double>(looks.size(), kLeastVariance));
 }
 
 std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence>& looks,
-                                               const ShadingMemory& known) {
+                                               const std::vector<Shading>& expected) {
   constexpr std::size_t kLeastReach = 8;
   constexpr double kShare = 0.12;  // of the curve to either side
-  std::vector<ShadingEstimate> out(looks.size());
-  std::vector<Shading> expected(looks.size()), rest(looks.size());
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    expected[i] = known.expected(looks[i].curve, looks[i].direction_rad);
-    rest[i] = looks[i].right - looks[i].normal * expected[i];
-  }
+  const Looks all(looks, expected);
+  std::vector<Shading> variances(looks.size());
+  std::vector<double> least(looks.size());
   for (std::size_t first = 0, end = 0; first < looks.size(); first = end) {
     while (end < looks.size() && looks[end].curve == looks[first].curve) ++end;
     const auto share = static_cast<std::size_t>(kShare * static_cast<double>(end - first));
-    const std::size_t reach = std::max(kLeastReach, share);
-    const auto add = [&](std::size_t i, double sign, Moments& sums) {
-      if (looks[i].usable) sums.add(looks[i], rest[i], sign);
-    };
-    Moments whole, around;
-    for (std::size_t i = first; i < end; ++i) add(i, 1.0, whole);
-    const double least = least_variance(whole);
-    for (std::size_t i = first; i < std::min(end, first + reach); ++i) add(i, 1.0, around);
-    Shading variances = around.variances();
-    for (std::size_t i = first; i < end; ++i) {
-      if (i + reach < end) add(i + reach, 1.0, around);
-      if (i > first + reach) add(i - reach - 1, -1.0, around);
-      variances = around.variances(variances);
-      if (looks[i].usable) out[i] = estimate(looks[i], expected[i], variances, least);
-    }
+    Shading curve, squares;
+    stretch::kernel().find_variances(all.within(first, end),
+                                     static_cast<int>(std::max(kLeastReach, share)),
+                                     variances[first].data(), curve.data(), squares.data());
+    std::fill(least.begin() + static_cast<std::ptrdiff_t>(first),
+              least.begin() + static_cast<std::ptrdiff_t>(end), least_variance(curve, squares));
   }
-  return out;
+  return all.estimates(std::move(variances), least);
 }
 
 Eigen::Vector2d ShadingMemory::Sector::slopes() const {

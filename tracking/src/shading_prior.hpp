@@ -32,6 +32,7 @@ class ShadingMemory {
   void add(const ShadingMemory& other);
   /// What a look at a curve is expected to show; zero where nothing is known.
   [[nodiscard]] Shading expected(int curve, double direction_rad) const;
+  [[nodiscard]] bool empty() const { return curves_.empty(); }
 
  private:
   static constexpr int kSectors = 24;
@@ -58,7 +59,8 @@ struct ShadingEstimate {
 /// it with the variance that its neighbours along the curve show (method of moments, at most one).
 /// On plain surfaces that is next to nothing, and with it what free shading costs; beside shadows,
 /// relief and texture shading is as free as it is large.
+/// @param expected of each look, ShadingMemory::expected; empty: nothing is known.
 [[nodiscard]] std::vector<ShadingEstimate> estimate_shadings(
-    const std::vector<ShadingEvidence>& looks, const ShadingMemory& known);
+    const std::vector<ShadingEvidence>& looks, const std::vector<Shading>& expected);
 
 }  // namespace trochoid::tracking
