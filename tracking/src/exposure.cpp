@@ -43,10 +43,37 @@ struct Moved {
   }
 };
 
-// Where an outline crosses the normal of a sample: from its point nearest to that line, along the
-// tangent there. Nothing if it does not cross it on this side or does so at a grazing angle.
-std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sample) {
-  constexpr double kLeastCosine = 0.5, kFarthestPx = 3.0;
+constexpr double kLeastCosine = 0.5;  // between the normals of an outline and of what it crosses
+
+// The point of an outline nearest to the normal of a sample, from one nearby along its arc; nothing
+// if that leads to an end of the arc or not so near as between two points.
+const data::OutlinePoint* nearest_from(size_t near, const Moved& outline,
+                                       const OutlineSample& sample) {
+  const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
+  const int family = family_of(sample.edge, sample.silhouette);
+  if (near >= outline.points.size() || outline.families[near] != family) return nullptr;
+  const auto aside = [&](size_t i) {
+    return std::abs(along.dot(outline.points[i].image_px - sample.image_px));
+  };
+  size_t i = near;
+  double least = aside(i);
+  for (const bool ahead : {true, false})
+    while (true) {
+      if (!ahead && i == 0) return nullptr;
+      const size_t next = ahead ? i + 1 : i - 1;
+      if (outline.ends[std::min(i, next)] <= std::max(i, next)) return nullptr;
+      const double there = aside(next);
+      if (there >= least) break;
+      i = next, least = there;
+    }
+  const data::OutlinePoint& point = outline.points[i];
+  const bool crosses = point.normal_px.dot(sample.normal_px) >= kLeastCosine;
+  return crosses && least < Moved::kStepPx ? &point : nullptr;
+}
+
+// The same from anywhere.
+const data::OutlinePoint* nearest_of_all(const Moved& outline, const OutlineSample& sample) {
+  constexpr double kFarthestPx = 3.0;
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   const int family = family_of(sample.edge, sample.silhouette);
   const data::OutlinePoint* nearest = nullptr;
@@ -69,7 +96,17 @@ std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sam
     least = aside;
     nearest = &point;
   }
+  return nearest;
+}
+
+// Where an outline crosses the normal of a sample: from its point nearest to that line, along the
+// tangent there. Nothing if it does not cross it on this side or does so at a grazing angle.
+// @param near where the sample before crossed it; then where this one does.
+std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sample, size_t& near) {
+  const data::OutlinePoint* nearest = nearest_from(near, outline, sample);
+  if (nearest == nullptr) nearest = nearest_of_all(outline, sample);
   if (nearest == nullptr) return std::nullopt;
+  near = static_cast<size_t>(nearest - outline.points.data());
   return nearest->normal_px.dot(nearest->image_px - sample.image_px) /
          nearest->normal_px.dot(sample.normal_px);
 }
@@ -138,9 +175,10 @@ std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
   for (int k = 0; k < parts; ++k) {
     const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));
     const Moved moved(body, camera, pose);
+    size_t near = moved.points.size();
     for (size_t i = 0; i < outline.size(); ++i) {
       if (lost[i]) continue;
-      const auto crossing = crossing_px(moved, outline[i]);
+      const auto crossing = crossing_px(moved, outline[i], near);
       lost[i] = !crossing;
       if (crossing) sweeps[i].shift_px[static_cast<size_t>(k)] = *crossing;
     }
