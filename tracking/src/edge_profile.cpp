@@ -51,17 +51,6 @@ LightWindow LightWindow::blurred(double sigma_px) const {
   return out;
 }
 
-float LightWindow::at(float x_px, float y_px) const {
-  const float x = x_px - static_cast<float>(window_.x), y = y_px - static_cast<float>(window_.y);
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
-  const float* upper = light_.ptr<float>(iy) + ix;
-  const float* lower = upper + light_.step1();
-  const float top = upper[0] + fx * (upper[1] - upper[0]);
-  const float bottom = lower[0] + fx * (lower[1] - lower[0]);
-  return top + fy * (bottom - top);
-}
-
 bool sample_profile(const LightWindow& picture, const LightWindow& plate,
                     const Eigen::Vector2d& at_px, const Eigen::Vector2d& normal_px,
                     const Extent& extent, Profile& profile) {

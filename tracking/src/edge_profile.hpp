@@ -28,7 +28,16 @@ class LightWindow {
     return light_.ptr<float>(p.y - window_.y)[p.x - window_.x];
   }
   /// Bilinear sample; `holds` must be true for the point.
-  [[nodiscard]] float at(float x_px, float y_px) const;
+  [[nodiscard]] float at(float x_px, float y_px) const {
+    const float x = x_px - static_cast<float>(window_.x), y = y_px - static_cast<float>(window_.y);
+    const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+    const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
+    const float* upper = light_.ptr<float>(iy) + ix;
+    const float* lower = upper + light_.step1();
+    const float top = upper[0] + fx * (upper[1] - upper[0]);
+    const float bottom = lower[0] + fx * (lower[1] - lower[0]);
+    return top + fy * (bottom - top);
+  }
   [[nodiscard]] bool holds(const Eigen::Vector2d& p) const {
     return p.x() >= window_.x && p.y() >= window_.y && p.x() < window_.x + window_.width - 1 &&
            p.y() < window_.y + window_.height - 1;

@@ -19,7 +19,8 @@ namespace {
 // directions and blended between them; then the pose and the nuisances common to the outline.
 constexpr int kCommon = 7, kKnots = 8;
 static_assert(PoseMotion::kMost + kCommon + kGroups * kKnots <= ArrowSystem::kMost);
-constexpr int kRow = PoseMotion::kMost + kCommon + 2;
+constexpr int kRow = 12;  // two knots, the pose, four of those common to the outline; even
+static_assert(2 + PoseMotion::kMost + 4 <= kRow);
 using Vector = ArrowSystem::Vector;
 
 // Where the pose begins among the unknowns.
@@ -42,8 +43,8 @@ constexpr double kShadowSd = 0.5;
 
 // The few unknowns an equation depends on, in the order of their indices but for the knots.
 struct Row {
-  std::array<int, kRow> index;
-  std::array<double, kRow> value;
+  std::array<int, kRow> index{};
+  std::array<double, kRow> value{};  // 0 beyond `count`
   int count = 0;
 
   Row(const EdgeEquation& e, bool directions) {
@@ -87,16 +88,44 @@ struct Row {
       x[static_cast<size_t>(index[static_cast<size_t>(k)])] +=
           weight * value[static_cast<size_t>(k)];
   }
-  // Adds weight * row^T row and weight * row * offset.
-  void accumulate(double weight, double offset, ArrowSystem& system) const {
-    for (int a = 0; a < count; ++a) {
-      const int i = index[static_cast<size_t>(a)];
-      const double w = weight * value[static_cast<size_t>(a)];
-      system.right(i) += w * offset;
-      for (int b = 0; b <= a; ++b)
-        system(i, index[static_cast<size_t>(b)]) += w * value[static_cast<size_t>(b)];
+};
+
+// Adds weight * row^T row and weight * row * offset of many rows to a system. Neighbours depend on
+// the same unknowns: their sums are kept beside each other until that changes.
+class Accumulating {
+ public:
+  explicit Accumulating(ArrowSystem& system) : system_(system) {}
+  ~Accumulating() { flush(); }
+  Accumulating(const Accumulating&) = delete;
+  Accumulating& operator=(const Accumulating&) = delete;
+
+  void add(const Row& row, double weight, double offset) {
+    if (like_ == nullptr || row.index != like_->index) {
+      flush();
+      like_ = &row;
+      for (auto& sums : square_) sums.fill(0.0);
+      right_.fill(0.0);
+    }
+    for (size_t a = 0; a < kRow; ++a) {
+      const double w = weight * row.value[a];
+      right_[a] += w * offset;
+      for (size_t b = 0; b < kRow; ++b) square_[a][b] += w * row.value[b];
     }
   }
+
+ private:
+  void flush() {
+    for (int a = 0; like_ != nullptr && a < like_->count; ++a) {
+      const auto k = static_cast<size_t>(a);
+      system_.right(like_->index[k]) += right_[k];
+      for (size_t l = 0; l <= k; ++l) system_(like_->index[k], like_->index[l]) += square_[k][l];
+    }
+  }
+
+  ArrowSystem& system_;
+  const Row* like_ = nullptr;
+  std::array<std::array<double, kRow>, kRow> square_;
+  std::array<double, kRow> right_;
 };
 
 ArrowSystem prior_information(const PoseMotion::Step& prior_sd, bool directions) {
@@ -153,11 +182,14 @@ Sectors sectors_of(const std::vector<EdgeEquation>& equations, const std::vector
   none.add(prior, -1.0);
   Sectors sectors;
   sectors.fill(none);
-  for (size_t i = 0; i < equations.size(); ++i) {
-    const EdgeEquation& e = equations[i];
-    const double turn = e.direction_rad / (2.0 * std::numbers::pi) + 1.0;
-    const size_t sector = static_cast<size_t>(turn * kSectors) % kSectors;
-    rows[i].accumulate(e.weight / (e.variance_px2 * scale * scale), e.offset_px, sectors[sector]);
+  for (size_t k = 0; k < kSectors; ++k) {
+    Accumulating sums(sectors[k]);
+    for (size_t i = 0; i < equations.size(); ++i) {
+      const EdgeEquation& e = equations[i];
+      const double turn = e.direction_rad / (2.0 * std::numbers::pi) + 1.0;
+      if (static_cast<size_t>(turn * kSectors) % kSectors == k)
+        sums.add(rows[i], e.weight / (e.variance_px2 * scale * scale), e.offset_px);
+    }
   }
   return sectors;
 }
@@ -213,18 +245,18 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
 
 // Tukey's weights about the solution so far, for errors that are `scale` times as large as claimed.
 double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows, const Vector& x,
-             double least_scale_px, std::vector<double>& sizes) {
+             double least_scale_px, const std::vector<double>& per_sd, std::vector<double>& sizes) {
   constexpr double kTukey = 4.685;  // 95 % efficiency for normal errors
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     e.residual_px = e.offset_px - rows[i].dot(x);
-    sizes[i] = std::abs(e.residual_px) / std::sqrt(e.variance_px2);
+    sizes[i] = std::abs(e.residual_px) * per_sd[i];
   }
   // Never below what the edges claim.
   const double scale = std::max(1.4826 * data::upper_median(sizes), 1.0);
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
-    const double bound = kTukey * std::max(scale, least_scale_px / std::sqrt(e.variance_px2));
+    const double bound = kTukey * std::max(scale, least_scale_px * per_sd[i]);
     const double t = sizes[i] / bound;
     e.weight = t < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
   }
@@ -241,19 +273,17 @@ struct Solving {
   Vector x{};
   ArrowSystem system{};  // factorised
   double scale = 1.0;
-  std::vector<double> sizes{};
+  std::vector<double> sizes{}, per_sd{};
 
   bool run() {
     constexpr int kIterations = 8;
     constexpr double kSettled = 0.03;  // in standard deviations
     sizes.resize(equations.size());
+    for (const EdgeEquation& e : equations) per_sd.push_back(1.0 / std::sqrt(e.variance_px2));
     for (int iteration = 0; iteration < kIterations; ++iteration) {
-      scale = weigh(equations, rows, x, least_scale_px, sizes);
+      scale = weigh(equations, rows, x, least_scale_px, per_sd, sizes);
       system = prior;
-      for (size_t i = 0; i < equations.size(); ++i)
-        if (equations[i].weight > 0.0)
-          rows[i].accumulate(equations[i].weight / (equations[i].variance_px2 * scale * scale),
-                             equations[i].offset_px, system);
+      accumulate();
       Vector information{};
       for (int i = first; i < first + count; ++i) information[at(i)] = system(i, i);
       if (!system.factorise()) return false;
@@ -267,6 +297,13 @@ struct Solving {
       if (change2 < kSettled * kSettled) break;
     }
     return true;
+  }
+  void accumulate() {
+    Accumulating sums(system);
+    for (size_t i = 0; i < equations.size(); ++i)
+      if (equations[i].weight > 0.0)
+        sums.add(rows[i], equations[i].weight / (equations[i].variance_px2 * scale * scale),
+                 equations[i].offset_px);
   }
   static constexpr size_t at(int i) { return static_cast<size_t>(i); }
 };
