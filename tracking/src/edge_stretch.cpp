@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "normal_table.hpp"
@@ -70,7 +71,9 @@ class Fitting {
   void take_sums(size_t i);
   [[nodiscard]] std::vector<double> noise_of_looks() const;
   void set_evidence(const std::vector<double>& noise2);
-  [[nodiscard]] double find_shadings(const std::vector<double>& noise2);
+  [[nodiscard]] double find_shadings(const std::vector<double>& noise2, int rounds,
+                                     std::optional<double> wider_px = {});
+  void widen(double step);
   void find_noise(const std::vector<Noise>& assumed);
   [[nodiscard]] std::vector<Noise> noise_of_neighbours() const;
   void find_offsets(const std::vector<Noise>& noise);
@@ -275,27 +278,35 @@ double blur_step(const std::vector<Look>& looks) {
   return data::upper_median(std::move(steps));
 }
 
+// Makes the edges of all looks wider.
+void Fitting::widen(double step) {
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    evidence_[i].right -= step * looks_[i].blur_cross;
+    looks_[i].blur_right -= step * looks_[i].blur_normal;
+  }
+}
+
 // Shading beside the edges and their common blur, which explains what it can first: a picture less
-// sharp than expected looks as if it were brighter and darker beside every edge. Returns by how
-// much the edges are wider.
-double Fitting::find_shadings(const std::vector<double>& noise2) {
+// sharp than expected looks as if it were brighter and darker beside every edge. From the start the
+// edges are `wider_px` wider, or as much as they are with little shading. Returns by how much they
+// are in the end.
+double Fitting::find_shadings(const std::vector<double>& noise2, int rounds,
+                              std::optional<double> wider_px) {
   constexpr double kLittle = 0.02;  // of the largest variance
-  constexpr int kRounds = 3;
-  set_evidence(noise2);
-  double wider_px = 0.0;
-  for (int round = 0; round < kRounds; ++round) {
-    const std::vector<ShadingEstimate> estimates =
-        round == 0 ? shadings_given(evidence_, kLittle) : estimate_shadings(evidence_, expected_);
+  const auto take = [&](const std::vector<ShadingEstimate>& estimates) {
     for (size_t i = 0; i < looks_.size(); ++i)
       if (looks_[i].usable) set_shading(estimates[i], looks_[i]);
-    const double step = blur_step(looks_);
-    wider_px += step;
-    for (size_t i = 0; round + 1 < kRounds && i < looks_.size(); ++i) {
-      evidence_[i].right -= step * looks_[i].blur_cross;
-      looks_[i].blur_right -= step * looks_[i].blur_normal;
-    }
+    return blur_step(looks_);
+  };
+  set_evidence(noise2);
+  double wider = 0.0;
+  double step = wider_px ? *wider_px : take(shadings_given(evidence_, kLittle));
+  for (int round = 0; round < rounds; ++round) {
+    wider += step;
+    widen(step);
+    step = take(estimate_shadings(evidence_, expected_));
   }
-  return wider_px;
+  return wider + step;
 }
 
 // Squared residuals beside and on the edge about the best step with this shading.
@@ -414,12 +425,12 @@ StretchFit Fitting::run(bool weighed) {
   const std::vector<Noise> equal(looks_.size(), kEqual);
   sum(equal);
   StretchFit out;
-  out.wider_px = find_shadings(noise_of_looks());
+  out.wider_px = find_shadings(noise_of_looks(), weighed ? 1 : 2);
   find_noise(equal);
   std::vector<Noise> noise = noise_of_neighbours();
   if (weighed) {
     sum(noise);
-    out.wider_px = find_shadings(std::vector<double>(looks_.size(), 1.0));
+    out.wider_px = find_shadings(std::vector<double>(looks_.size(), 1.0), 2, out.wider_px);
     find_noise(noise);
     noise = noise_of_neighbours();
   }
