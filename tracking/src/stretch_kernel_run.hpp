@@ -295,16 +295,19 @@ TROCHOID_INLINE double clamped(double x, double most) {
 }
 
 // Minimises x^T A x / 2 - b^T x over 0 <= x <= 1, A positive semidefinite, one coordinate at a
-// time, from x; ends early where a sweep hardly changes anything.
-TROCHOID_INLINE void least_within_bounds(const Moments& sums, int sweeps, double* x) {
-  constexpr double kMost = 1.0, kSettled = 1e-6;
+// time, from x; ends early where a sweep hardly changes anything. Where the sums hold no more than
+// what rounding leaves of looks that are gone (`whole`: with all of them), x stays.
+TROCHOID_INLINE void least_within_bounds(const Moments& sums, const Moments& whole, int sweeps,
+                                         double* x) {
+  constexpr double kMost = 1.0, kSettled = 1e-6, kRounding = 1e-12;
   const double* A = sums.value;
   double g[kShading], inverse[kShading];
   for (int k = 0; k < kShading; ++k) {
     g[k] = A[kShading * kShading + k];
     for (int l = 0; l < kShading; ++l) g[k] -= A[l * kShading + k] * x[l];
     const double diagonal = A[k * kShading + k];
-    inverse[k] = diagonal > 0.0 ? 1.0 / diagonal : 0.0;
+    const bool known = diagonal > kRounding * whole.value[k * kShading + k];
+    inverse[k] = known ? 1.0 / diagonal : 0.0;
   }
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     double most = 0.0;
@@ -329,15 +332,15 @@ void find_variances(const CurveLooks& looks, int reach, double* variances, doubl
   Moments whole, around;
   for (int i = 0; i < n; ++i) whole.add(looks, i, 1.0);
   for (int k = 0; k < kShading; ++k) curve_variances[k] = 0.0;
-  least_within_bounds(whole, kSweepsFromNothing, curve_variances);
+  least_within_bounds(whole, whole, kSweepsFromNothing, curve_variances);
   for (int k = 0; k < kShading; ++k) curve_squares[k] = whole.value[k * kShading + k];
   for (int i = 0; i < (reach < n ? reach : n); ++i) around.add(looks, i, 1.0);
   double found[kShading] = {};
-  least_within_bounds(around, kSweepsFromNothing, found);
+  least_within_bounds(around, whole, kSweepsFromNothing, found);
   for (int i = 0; i < n; ++i) {
     if (i + reach < n) around.add(looks, i + reach, 1.0);
     if (i > reach) around.add(looks, i - reach - 1, -1.0);
-    least_within_bounds(around, kSweeps, found);
+    least_within_bounds(around, whole, kSweeps, found);
     for (int k = 0; k < kShading; ++k) variances[i * kShading + k] = found[k];
   }
 }
