@@ -85,7 +85,8 @@ PivotPath<S> run_pivot_with(const S (&p)[kParameters], std::span<const double> t
   P pivot{p[kPsi], p[kDry], p[kWeakening], p[kViscous], p[kQuadratic], p[kSine], p[kCosine]};
   const double dry = value_of(p[kDry]);
   auto control = uniform_control<2>(tolerance);
-  // A weight that is nothing leaves a run of long steps, over which its derivative turns many times.
+  // A weight that is nothing leaves a run of long steps, over which its derivative turns many
+  // times.
   control.control_derivatives = Unbalanced;
   if (max_steps > 0) control.max_steps = max_steps;
   // Without dry friction a balanced disc's speed only tends to zero; rounding must not stop it.

@@ -401,8 +401,11 @@ TEST(TopFit, BelievesAFastTwinOnlyWhereNoSlowerOneIsAsGood) {
   const auto with = [&](double b_1_s) {
     for (const auto& [name, value] : kThesis) problem.base[0][predictor->index_of(name)] = value;
     problem.base[0][predictor->index_of("b_1_s")] = b_1_s;
-    const double chi2 = problem.rows();
-    return judged(problem, {.u = problem.start(), .chi2 = chi2, .usable = true}, "");
+    Solution solution;
+    solution.u = problem.start();
+    solution.chi2 = problem.rows();
+    solution.usable = true;
+    return judged(problem, solution, "");
   };
   const double turn_a_sample_rad_s = 2.0 * M_PI / (track.samples[1].t_s - track.samples[0].t_s);
   const Found slow = with(0.75), fast = with(0.75 + 2.0 * turn_a_sample_rad_s);

@@ -61,8 +61,8 @@ void write_with_arm(const fs::path& clip, const Eigen::Vector2d& disc_px, double
 class AnArmInTheWay : public testing::TestWithParam<double> {};
 
 // The tip of the arm has about the outline of a disc seen from aside, and little of the disc is to
-// be seen for a while: the arm must not be followed in its place. It is much brighter than the disc, or
-// a little.
+// be seen for a while: the arm must not be followed in its place. It is much brighter than the
+// disc, or a little.
 TEST_P(AnArmInTheWay, IsNotTakenForTheDisc) {
   const ScratchFolder folder("arm");
   const std::map<int, Eigen::Vector2d> truth = true_centres();
