@@ -36,7 +36,6 @@ struct Look {
   double shape_sigma_px = 1.0;     ///< how well the predicted rim's shape is known
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< per frame
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
-  std::optional<KnownFit> known{};         ///< OutlineEvidence::known
 };
 
 /// Measures one body where it is expected. Stateless: used from several threads.

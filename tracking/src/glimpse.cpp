@@ -4,7 +4,6 @@
 #include <cmath>
 #include <future>
 
-#include "forecast.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -38,8 +37,7 @@ double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool ali
 
 std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,
                                               const std::optional<data::Pose<>>& near,
-                                              const ShadingMemory* shading,
-                                              const std::optional<KnownFit>& known) {
+                                              const ShadingMemory* shading) {
   finder_.place(guess);
   const double half_px = 1.6 * guess.rim.semi_major_px() + 24.0;
   const cv::Rect box = cv::Rect(static_cast<int>(guess.centre_px.x() - half_px),
@@ -51,9 +49,6 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.shading = shading;
-  look.known = known;
-  if (known && finder_.faces_look_alike())
-    look.known->pose = nearer_face(known->pose, guess.pose->pose, 0.0);
   Sighting last = guess;
   if (near) {
     last.pose->pose = *near;

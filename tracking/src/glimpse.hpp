@@ -28,11 +28,9 @@ class Measuring {
 
   /// @param near its pose one frame earlier or later, if known: how far it smears.
   /// @param shading light beside its outline in other frames, if known.
-  /// @param known a sighting in the frame, of which another reading is wanted.
   [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
                                                    const std::optional<data::Pose<>>& near,
-                                                   const ShadingMemory* shading = nullptr,
-                                                   const std::optional<KnownFit>& known = {});
+                                                   const ShadingMemory* shading = nullptr);
 
  private:
   const Background& background_;

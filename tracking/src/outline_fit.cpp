@@ -28,7 +28,7 @@ constexpr Search kDraw{1.3, 4.5, 3.5, 5.0, 5.0, 2, 0.5, false};
 // Longer outlines are sampled more sparsely: neighbours share their errors anyhow. Rounds that only
 // lead to where the last one looks, and frames that will be looked at again, do with every second
 // point.
-Search exact(const Scenery& scenery, double blur_px, double outline_px, double least_evidence) {
+Search exact(const Scenery& scenery, double blur_px, double outline_px) {
   constexpr double kLeastStep_px = 1.0;  // neighbours nearer than this show the same pixels
   const double step_px = std::max(kLeastStep_px, outline_px / scenery.most_looks);
   return {.blur_px = blur_px,
@@ -38,8 +38,7 @@ Search exact(const Scenery& scenery, double blur_px, double outline_px, double l
           .step_px = scenery.visit == Visit::first ? 2.0 * step_px : step_px,
           .iterations = 5,
           .settled_px = 0.06,
-          .exact = true,
-          .least_evidence = least_evidence};
+          .exact = true};
 }
 
 cv::Rect window_of(const data::Body& body, const data::Camera& camera, const data::Pose<>& pose,
@@ -63,22 +62,16 @@ struct Fitted {
   Eigen::MatrixXd attitudes{};
 };
 
-// A fit that after two rounds has less than this share of the evidence for what it is compared with
-// does not get there.
-constexpr double kHopeless = 0.5;
-
 // The last stage, from a pose that is right to about the blur of the picture. Too sharp or too wide
 // an edge model is looked at again with the right one.
-// @param rival evidence for the fit that this one would have to match, 0: none yet.
 std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& start,
-                                  double outline_px, std::optional<double> known_blur_px,
-                                  double rival = 0.0) {
+                                  double outline_px, std::optional<double> known_blur_px) {
   constexpr double kSharpestPx = 0.45, kWidestPx = 2.2, kClosePx = 0.06;
   Fitted out;
   double blur_px = known_blur_px.value_or(kUsualBlurPx);
   data::Pose<> pose = start;
   for (int round = 0; round < 6; ++round) {
-    auto refined = refine(scenery, pose, exact(scenery, blur_px, outline_px, kHopeless * rival));
+    auto refined = refine(scenery, pose, exact(scenery, blur_px, outline_px));
     if (!refined) return std::nullopt;
     out.refined = std::move(*refined);
     out.blur_px = std::clamp(blur_px + out.refined.wider_px, kSharpestPx, kWidestPx);
@@ -152,16 +145,14 @@ std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted
   const double outline_px = fitted->refined.outline_px;
   std::vector<Fitted> others;
   const auto mirror = mirrored(scenery.camera, scenery.motion, pose);
-  const double rival = fitted->evidence;
-  if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px, rival)) {
+  if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px)) {
     if (cosine > std::cos(kNearly_rad) && other->evidence > kNoticeably * fitted->evidence)
       std::swap(*fitted, *other);
     others.push_back(std::move(*other));
   }
   data::Pose<> level = pose;
   level.theta_rad = pose.theta_rad > 0.5 * std::numbers::pi ? std::numbers::pi : 0.0;
-  if (auto other =
-          fit_exactly(scenery, scenery.motion.settled(level), outline_px, fitted->blur_px, rival))
+  if (auto other = fit_exactly(scenery, scenery.motion.settled(level), outline_px, fitted->blur_px))
     others.push_back(std::move(*other));
   spread_over(scenery.motion, others, *fitted);
   return fitted;
@@ -215,7 +206,7 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
     const auto start = face_outlined_like(scenery.body, scenery.camera, scenery.motion,
                                           fitted->refined.pose, side);
     if (!start) continue;
-    auto other = fit_exactly(scenery, *start, outline_px, fitted->blur_px, fitted->evidence);
+    auto other = fit_exactly(scenery, *start, outline_px, fitted->blur_px);
     if (!other) continue;
     const bool right_size =
         too_small && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx;
@@ -226,54 +217,21 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
   return best ? std::move(best) : std::move(fitted);
 }
 
-// Whether a wider look leads where an exact one has settled, or where one need not go: from that
-// near it would end there, too.
-bool leads_back(const Scenery& scenery, const Refined& drawn, const std::optional<Fitted>& fitted,
-                const std::optional<KnownFit>& known) {
-  // Anywhere: all of an outline but the side on which a shadow lies may agree.
-  const auto near = [&](const Refined& seen, const data::Pose<>& pose) {
-    constexpr double kNearPx = 0.5;
-    const PoseMotion::Step step = scenery.motion.step_between(pose, drawn.pose);
-    return std::all_of(seen.samples.begin(), seen.samples.end(), [&](const OutlineSample& sample) {
-      return std::abs(sample.motion.dot(step)) < kNearPx;
-    });
-  };
-  return (fitted && fitted->refined.settled && near(drawn, fitted->refined.pose) &&
-          near(fitted->refined, fitted->refined.pose)) ||
-         (known && near(drawn, known->pose));
-}
-
-// Whether another reading of a picture is so much worse than what is known that wider looks would
-// not help it, or so good that it needs none.
-bool compares_clearly(const Fitted& fitted, const KnownFit& known) {
-  constexpr double kAsGood = 0.95;
-  const double share = fitted.evidence / std::max(known.evidence, 1e-9);
-  return share < kHopeless || share > kAsGood;
-}
-
 // A prediction is mostly right to the blur: looking from farther would only let shadows and the
 // body's other edges mislead it. Where it was not, or little then speaks for it, the wider looks
-// have their say, unless they had it before.
+// have their say.
 std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
-                                          std::optional<double> blur_px,
-                                          const std::optional<KnownFit>& known) {
+                                          std::optional<double> blur_px) {
   constexpr double kClear = 0.8, kSure = 0.6, kFarPx = 0.8;
   std::optional<Fitted> fitted =
-      fit_exactly(scenery, predicted, outline_length_px(scenery, predicted), blur_px,
-                  known ? known->evidence : 0.0);
-  const bool stays = fitted && moved_px(scenery, fitted->refined, predicted) <= kFarPx;
-  if (stays && scenery.visit == Visit::again) return of_near_tilts(scenery, std::move(fitted));
-  if (fitted && known && compares_clearly(*fitted, *known))
-    return of_near_tilts(scenery, with_its_wall(scenery, std::move(fitted)));
-  const auto add = [&](const std::optional<Refined>& drawn, std::optional<double> blur) {
-    if (!drawn || leads_back(scenery, *drawn, fitted, known)) return;
-    auto other =
-        fit_exactly(scenery, drawn->pose, drawn->outline_px, blur, fitted ? fitted->evidence : 0.0);
-    fitted = better(std::move(fitted), std::move(other));
-  };
-  if (!stays || fitted->score < kClear) add(refine(scenery, predicted, kDraw), blur_px);
+      fit_exactly(scenery, predicted, outline_length_px(scenery, predicted), blur_px);
+  if (!fitted || fitted->score < kClear || moved_px(scenery, fitted->refined, predicted) > kFarPx) {
+    if (const auto drawn = refine(scenery, predicted, kDraw))
+      fitted =
+          better(std::move(fitted), fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px));
+  }
   if (!fitted || fitted->score < kSure)
-    add(refine(scenery.blurred(kNearBlurPx), predicted, kNear), std::nullopt);
+    fitted = better(std::move(fitted), fit_from(scenery, scenery.blurred(kNearBlurPx), predicted));
   return of_near_tilts(scenery, with_its_wall(scenery, std::move(fitted)));
 }
 
@@ -469,9 +427,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
-  auto best = evidence.predicted
-                  ? fit_from_prediction(scenery, starts.front(), evidence.blur_px, evidence.known)
-                  : fit_best(scenery, starts, mirrors);
+  auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front(), evidence.blur_px)
+                                 : fit_best(scenery, starts, mirrors);
   if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
       best->score < kDoubtful) {
     const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);

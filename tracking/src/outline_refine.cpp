@@ -484,10 +484,9 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
     const bool settled = moved2 < settled2;
     // Linear sums about a predicted edge bear a small step at most, a last look hardly any.
     constexpr double kLinear = 2.5;
-    out.settled = settled || (search.exact && scenery.visit != Visit::again &&
-                              moved2 < kLinear * kLinear * settled2);
-    if (last && out.settled) break;
-    if (search.exact && last && i > 0 && evidence_of(out) < search.least_evidence) break;
+    if (last && (settled || (search.exact && scenery.visit != Visit::again &&
+                             moved2 < kLinear * kLinear * settled2)))
+      break;
     last = last || settled || i + 2 >= search.iterations;
   }
   out.seen_px = seen_px(search, round, out);

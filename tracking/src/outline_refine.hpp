@@ -57,7 +57,6 @@ struct Search {
   /// With everything that bears on accuracy: slopes beside the edges, edges between two surfaces of
   /// the body, what edge models may be wrong by.
   bool exact;
-  double least_evidence = 0.0;  ///< exact: with less after two rounds no further ones are tried
 };
 
 struct Refined {
@@ -69,7 +68,6 @@ struct Refined {
   std::vector<ShadingEvidence> shading;  ///< exact: beside each edge
   std::vector<double> blurs_px;          ///< exact: of each edge
   std::vector<size_t> places;            ///< along the outline of all samples
-  bool settled = false;                  ///< the last step was a small one
   double outline_px = 0.0;               ///< length of the predicted silhouette
   double seen_px = 0.0;                  ///< of it, with an edge exactly there
   double covered = 0.0;                  ///< share of the predicted outline with an accepted edge

@@ -111,8 +111,7 @@ class Readings {
                                                  const Pose& pose, const Pose& near) const {
     Sighting guess = nodes_[k].seen();
     guess.pose->pose = pose;
-    const KnownFit known{nodes_[k].pose(), nodes_[k].seen().pose->evidence};
-    auto seen = measure(*glimpses_[nodes_[k].at].frame, std::move(guess), near, nullptr, known);
+    auto seen = measure(*glimpses_[nodes_[k].at].frame, std::move(guess), near);
     return seen && seen->pose ? std::move(seen) : std::nullopt;
   }
 

@@ -67,12 +67,6 @@ struct PoseMeasurement {
   std::vector<EdgePoint> edges;
 };
 
-/// A fit to a picture with which other ones are compared.
-struct KnownFit {
-  data::Pose<> pose;      ///< what leads there need not be fitted again
-  double evidence = 0.0;  ///< with far less, or about as much, it is not looked for any better one
-};
-
 /// Picture evidence for one measurement. `background` may be empty.
 struct OutlineEvidence {
   const cv::Mat& luma;                 ///< CV_8UC1
@@ -89,7 +83,6 @@ struct OutlineEvidence {
   std::optional<double> blur_px{};
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
   Visit visit = Visit::only;
-  std::optional<KnownFit> known{};  ///< when other readings of the picture are wanted
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
