@@ -89,9 +89,9 @@ double Follower::clearness(const Sighting& seen) const {
 }
 
 /// A partly hidden body and a fit gone astray look alike by their evidence; what tells them apart
-/// is that the hidden body is where it was expected. One in other colours is the body only where
-/// its whole outline is seen, or for a few frames where it was expected: not what hides it. Nor is
-/// a body that was lost found again in what little speaks for.
+/// is that the hidden body is where it was expected. What has other colours is the body only where
+/// its outline is plainly seen, or for a few frames where it was expected: not what hides it. Nor
+/// is a body that was lost found again in what little speaks for.
 bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double reach_px) const {
   constexpr double kWhole = 0.75, kLeast = 0.35;
   if (seen.accepted < std::max(0.25, 0.4 * usual_accepted_)) return false;
@@ -99,11 +99,11 @@ bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
   constexpr int kMostStrange = 3;
-  constexpr double kAllOfIt = 0.8;
-  const bool strange = !palette_.fits(seen.evidence.face, gain_);
+  constexpr double kPlainly = 0.7;
+  const double clear = clearness(seen);
+  const bool strange = clear < kPlainly && !palette_.fits(seen.evidence.face, gain_);
   if (strange && (lost_ > 0 || strange_ >= kMostStrange)) return false;
-  const bool may_be_what_hides_it = (strange && seen.accepted < kAllOfIt * usual_accepted_) ||
-                                    (lost_ > 0 && clearness(seen) < kLittle);
+  const bool may_be_what_hides_it = strange || (lost_ > 0 && clear < kLittle);
   const double whole = may_be_what_hides_it ? kLeast : wholeness(seen);
   const double surprise = forecast_.surprise_px();
   const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;

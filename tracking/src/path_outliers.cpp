@@ -209,10 +209,11 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
 }
 
 void forget_what_tells_nothing(std::vector<Glimpse>& glimpses) {
+  constexpr double kOfRadius = 0.3;  // as far as a jump that no impact makes
   for (Glimpse& g : glimpses) {
     if (!g.posed()) continue;
-    const double size_px = g.seen->rim.semi_major_px();
-    if (!(0.5 * g.seen->covariance_px2.trace() < size_px * size_px)) g.seen.reset();
+    const double most_px = kOfRadius * g.seen->rim.semi_major_px();
+    if (!(0.5 * g.seen->covariance_px2.trace() < most_px * most_px)) g.seen.reset();
   }
 }
 

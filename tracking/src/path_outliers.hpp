@@ -16,7 +16,7 @@ void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses);
 /// is hidden, what hides it can pass for it. Their covariance then holds the place on that line.
 void doubt_what_stands_alone(std::vector<Glimpse>& glimpses);
 
-/// Forgets sightings that do not tell where the body is to within its own size.
+/// Forgets sightings that hardly tell where the body is, for its size.
 void forget_what_tells_nothing(std::vector<Glimpse>& glimpses);
 
 /// Forgets short runs of frames in which little of the body is seen compared with the rest of the
