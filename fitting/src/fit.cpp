@@ -212,6 +212,9 @@ void heed_either_sense(const Problem& problem, Uncertainty& error, data::Fit& fi
     if (free.index != spin || problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0 ||
         (free.prior && std::abs(free.prior->value) > kTells * free.prior->sigma))
       continue;
+    // What only its prior says of it is no observation of either.
+    constexpr double kOfPrior = 0.5;
+    if (free.prior && std::sqrt(error.covariance(i, i)) > kOfPrior * free.prior->sigma) continue;
     const double value = problem.base[arc][spin];
     error.covariance(i, i) += 2.0 * value * value;  // the mean square of 0 and 2 w3
     either = true;

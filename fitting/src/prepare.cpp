@@ -99,10 +99,9 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       const bool told = puck && prior != scene.fit.prior.end();
       if (told && !is_free)
         problem.free.push_back({index, arc, {}, prior->second, {}, prior->second.value});
-      if (told && !seen)
+      if (told && !seen && name == std::string("w3_rad_s"))
         start_turning(prior->second, problem.base[arc][index]);
-      else if (seen && !is_free)
-        problem.free.push_back({index, arc, {}, {}, {}});
+      if (seen && !told && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
       if (!seen && !told && is_free) std::erase_if(problem.free, same);
     }
   }

@@ -74,7 +74,8 @@ Found judged(const Problem& problem, Solution solution, const std::string& path)
   found.reduced_chi2 = found.solution.chi2 / free_rows(problem);
   found.unexplained = found.solution.chi2 / std::max(null_chi2(problem.arcs[0]), 1e-300);
   found.passed = found.reduced_chi2 < chi2_gate(problem.rows());
-  // It is believed only where no slower one is as good.
+  // A top that nods between two samples is believed only where no slower one is as good, after all
+  // of the search.
   constexpr double kUnlikely = 2.0;
   if (nods_between_samples(problem, found.solution.u)) {
     found.reduced_chi2 *= kUnlikely;

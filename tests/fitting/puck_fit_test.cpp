@@ -288,6 +288,18 @@ TEST(PuckFit, DoesNotTakeASpinForTheAir) {
   EXPECT_THAT(chosen.fit.warnings, testing::Contains(testing::HasSubstr("which way round")));
 }
 
+// What the data show and a prior tells as well is one parameter, not two.
+TEST(PuckFit, APriorOnTheAngleOfAMarkCountsBesideTheMark) {
+  Turning turning{.generator = std::mt19937_64(12)};
+  turning.slide({{"vx_m_s", 0.9}, {"w3_rad_s", 40.0}, {"psi_rad", 0.2}}, 60);
+  turning.scene.fit.prior["psi_rad"] = {0.0, 1.0};
+  const data::Fit result = fit(std::span(&turning.track, 1), turning.scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  for (const auto& [name, truth] :
+       {std::pair{"friction", kFriction}, {"psi_rad", 0.2}, {"w3_rad_s", 40.0}})
+    EXPECT_NEAR(result.find(name)->value, truth, 4.0 * result.find(name)->sigma) << name;
+}
+
 TEST(PuckFit, RefusesABodyAtRest) {
   Throw thrown(3);
   thrown.slide({0.0, 0.0}, 1.0);

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <opencv2/videoio.hpp>
+#include <random>
 
 #include "drawn_clip.hpp"
 #include "trochoid/data/io.hpp"

@@ -101,6 +101,48 @@ TEST(PathOutliers, ABodyWellSeenIsKeptWhereverItIs) {
   EXPECT_EQ(forgotten(0.9, {25.0, -20.0}), std::vector<int>{});
 }
 
+// Frames 8 to 11 hidden; how much speaks for frames 5 to 7 and 12 to 14, as a share of what usually
+// does.
+std::vector<int> forgotten_beside_a_gap(double before, double after) {
+  Recorded recorded;
+  for (Glimpse& g : recorded.glimpses) g.seen->pose->evidence = 200.0;
+  for (std::size_t i = 5; i < 8; ++i) recorded.glimpses[i].seen->pose->evidence *= before;
+  for (std::size_t i = 12; i < 15; ++i) recorded.glimpses[i].seen->pose->evidence *= after;
+  for (std::size_t i = 8; i < 12; ++i) recorded.glimpses[i].seen.reset();
+  forget_what_is_faint_beside_gaps(recorded.glimpses);
+  std::vector<int> out;
+  for (const Glimpse& g : recorded.glimpses)
+    if (!g.seen) out.push_back(static_cast<int>(g.frame->index));
+  return out;
+}
+
+TEST(PathOutliers, WhatIsSeenLittleBesideAGapIsForgottenOnEitherSide) {
+  EXPECT_EQ(forgotten_beside_a_gap(0.3, 0.9), (std::vector<int>{5, 6, 7, 8, 9, 10, 11}));
+  EXPECT_EQ(forgotten_beside_a_gap(0.9, 0.3), (std::vector<int>{8, 9, 10, 11, 12, 13, 14}));
+}
+
+TEST(PathOutliers, ABodySeenWellUpToAGapIsKept) {
+  EXPECT_EQ(forgotten_beside_a_gap(0.8, 0.7), (std::vector<int>{8, 9, 10, 11}));
+}
+
+// No gap is near, or only the beginning of the recording.
+TEST(PathOutliers, ABodySeenLittleWithoutAGapIsKept) {
+  Recorded recorded;
+  for (Glimpse& g : recorded.glimpses) g.seen->pose->evidence = 200.0;
+  for (const std::size_t i : {0, 1, 2, 20, 21, 22})
+    recorded.glimpses[i].seen->pose->evidence = 50.0;
+  forget_what_is_faint_beside_gaps(recorded.glimpses);
+  for (const Glimpse& g : recorded.glimpses) EXPECT_TRUE(g.seen) << "frame " << g.frame->index;
+}
+
+// A covariance that spans much of the body says that it is somewhere here.
+TEST(PathOutliers, AWrongPlaceThatIsToldIsNoSighting) {
+  Recorded recorded;
+  recorded.glimpses[7].seen->covariance_px2 = 200.0 * Eigen::Matrix2d::Identity();
+  forget_what_tells_nothing(recorded.glimpses);
+  for (const Glimpse& g : recorded.glimpses) EXPECT_EQ(g.seen.has_value(), g.frame->index != 7);
+}
+
 // Frames 5 to 15 hidden but for frame 10.
 TEST(PathOutliers, WhatIsSeenAloneInAGapIsDoubtedWhereTheLineAcrossTheGapDoesNotLead) {
   for (const double off_px : {0.0, 30.0}) {

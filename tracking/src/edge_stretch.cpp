@@ -13,6 +13,8 @@
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
+
+static_assert(Profile::kMost <= stretch::kMostSamples);
 namespace {
 
 using stretch::Block;

@@ -11,7 +11,7 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr double kLittle = 0.5;  // of what usually speaks for the body
+constexpr double kFaint = 0.5;  // of what usually speaks for the body
 
 cv::Rect box_around(const Eigen::Vector2d& centre_px, double half_px, const cv::Size& picture) {
   const cv::Rect box(static_cast<int>(centre_px.x() - half_px),
@@ -103,8 +103,8 @@ bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double
   const double clear = clearness(seen);
   const bool strange = clear < kPlainly && !palette_.fits(seen.evidence.face, gain_);
   if (strange && (lost_ > 0 || strange_ >= kMostStrange)) return false;
-  const bool may_be_what_hides_it = strange || (lost_ > 0 && clear < kLittle);
-  const double whole = may_be_what_hides_it ? kLeast : wholeness(seen);
+  const bool may_be_what_hides_it = strange || (lost_ > 0 && clear < kFaint);
+  const double whole = may_be_what_hides_it ? std::min(kLeast, wholeness(seen)) : wholeness(seen);
   const double surprise = forecast_.surprise_px();
   const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
   if (whole >= kWhole) return lost_ > 3 || apart_px(seen, predicted) < far;
@@ -258,7 +258,7 @@ void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predic
   const bool whole = wholeness(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
   const double shape_off = (seen.rim.shape_px - predicted.rim.shape_px).norm();
   strange_ = palette_.fits(seen.evidence.face, gain_) ? 0 : strange_ + 1;
-  faint_ = std::max(0, clearness(seen) < kLittle ? faint_ + 1 : faint_ - 2);
+  faint_ = std::max(0, clearness(seen) < kFaint ? faint_ + 1 : faint_ - 2);
   if (whole) {
     palette_.learn(seen.evidence.face, gain_);
     if (lost_ == 0)

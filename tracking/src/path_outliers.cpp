@@ -208,6 +208,34 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
   }
 }
 
+void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kGap = 2;
+  constexpr double kFaint = 0.55;
+  const auto speaks = [](const Glimpse& g) { return g.seen->accepted * g.seen->pose->evidence; };
+  std::vector<double> usual;
+  for (const Glimpse& g : glimpses)
+    if (g.posed()) usual.push_back(speaks(g));
+  if (usual.empty()) return;
+  const double least = kFaint * data::median(std::move(usual));
+  // From the gap on, in either direction of time; the ends of the recording are no gaps.
+  const auto forget = [&](auto from, auto to) {
+    std::size_t lost = 0;
+    bool seen = false;
+    for (; from != to; ++from) {
+      if (!from->posed()) {
+        ++lost;
+      } else if (seen && lost >= kGap && speaks(*from) < least) {
+        from->seen.reset();
+      } else {
+        lost = 0;
+        seen = true;
+      }
+    }
+  };
+  forget(glimpses.begin(), glimpses.end());
+  forget(glimpses.rbegin(), glimpses.rend());
+}
+
 void forget_what_tells_nothing(std::vector<Glimpse>& glimpses) {
   constexpr double kOfRadius = 0.3;  // as far as a jump that no impact makes
   for (Glimpse& g : glimpses) {

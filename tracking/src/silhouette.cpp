@@ -106,7 +106,7 @@ bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Di
   cv::subtract(d.now, plate, d.brighter);
   // Averaging factor^2 pixels beats the noise down; compression and grain leave a floor.
   d.threshold = std::max(7.0, 4.5 * background.noise_levels / d.factor);
-  if (frame.chroma.empty() || background.chroma.empty()) return true;
+  if (frame.chroma.empty()) return true;
   const cv::Rect half =
       cv::Rect(d.box.x / 2, d.box.y / 2, (d.box.width + 1) / 2, (d.box.height + 1) / 2) &
       cv::Rect({}, frame.chroma.size());
@@ -116,8 +116,9 @@ bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Di
                d.factor > 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
     return out;
   };
-  const double colour_threshold = std::max(6.0, 5.0 * background.chroma_noise_levels);
   d.chroma = to_size(frame.chroma);
+  if (background.chroma.empty()) return true;
+  const double colour_threshold = std::max(6.0, 5.0 * background.chroma_noise_levels);
   d.colour = colour_off(d.now, plate, d.chroma, to_size(background.chroma),
                         d.threshold / colour_threshold);
   d.size = cv::max(d.size, d.colour);
@@ -204,17 +205,23 @@ std::vector<Silhouette> find_coloured_like(const Palette& body, double gain, con
         d.size.at<std::uint8_t>(y, x) = 0;
     }
   const std::vector<Contour> contours = contours_above(d.size, d.threshold);
-  Contour together;
+  double largest = 0.0;
+  for (const Contour& contour : contours) largest = std::max(largest, cv::contourArea(contour));
+  constexpr double kPart = 0.1;  // a speck elsewhere is none of the body
+  Contour together, hull;
   double area = 0.0;
+  int parts = 0;
   for (const Contour& contour : contours) {
     bodies.push_back(describe(contour, d.factor, d.box.tl(), frame.luma.size()));
+    if (cv::contourArea(contour) < kPart * largest) continue;
     together.insert(together.end(), contour.begin(), contour.end());
-    area += bodies.back().detection.area_px2;
+    area += cv::contourArea(contour);
+    ++parts;
   }
-  if (contours.size() > 1) {
-    Silhouette all = describe(together, d.factor, d.box.tl(), frame.luma.size());
-    all.solidity *= area / std::max(1.0, all.detection.area_px2);
-    all.detection.area_px2 = area;
+  if (parts > 1) {
+    cv::convexHull(together, hull);
+    Silhouette all = describe(hull, d.factor, d.box.tl(), frame.luma.size());
+    all.solidity = area / cv::contourArea(hull);
     bodies.push_back(std::move(all));
   }
   std::erase_if(bodies, [](const Silhouette& b) { return b.detection.area_px2 <= 0.0; });

@@ -7,6 +7,7 @@
 namespace trochoid::tracking::stretch {
 
 inline constexpr int kLanes = 8;
+inline constexpr int kMostSamples = 96;  ///< of a look
 inline constexpr int kAlign =
     8 * kLanes;  // of structures: what it would be depends on the instruction set
 using Floats = float __attribute__((vector_size(4 * kLanes)));

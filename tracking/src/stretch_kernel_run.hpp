@@ -157,7 +157,6 @@ void reduce(Block& b, Floats square_sum, const double* largest) {
 }
 
 void sum_columns(Block& b, const Sample* samples, const Variances& noise, const double* largest) {
-  constexpr int kMostSamples = 96;
   WeighedRow rows[kMostSamples];
   const Floats inverse_sharp = 1.0f / b.sharp_px;
   for (int k = 0; k < b.samples; ++k) {

@@ -327,6 +327,7 @@ class Tracking {
         glimpses.back().seen = std::move(at->second.seen);
     }
     forget_what_the_path_jumps_to(glimpses);
+    forget_what_is_faint_beside_gaps(glimpses);
     const auto doubts = decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     mend_from_one_side(background_, *finder_, glimpses);
