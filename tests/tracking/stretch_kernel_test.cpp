@@ -54,16 +54,14 @@ Block fitted(const Kernel& kernel, unsigned seed) {
   return block;
 }
 
-// The order of sums and fused products differ: by rounding of single precision, of some twenty
-// samples of up to 140 levels, over a contrast of 80.
+// To the last bit: products are fused into sums in neither. Without AVX2 both are the same kernel.
 TEST(StretchKernel, EveryMachineFindsTheSameOffsets) {
-  constexpr float kRounding_px = 1e-5f;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Block here = fitted(kernel(), seed), plain = fitted(isa_baseline, seed);
     for (int l = 0; l < kLanes; ++l) {
       ASSERT_NE(here.found[l], 0) << "seed " << seed << ", look " << l;
-      EXPECT_NEAR(here.offset_px[l], plain.offset_px[l], kRounding_px) << "seed " << seed;
-      EXPECT_NEAR(here.information[l] / plain.information[l], 1.0f, 1e-4f) << "seed " << seed;
+      EXPECT_EQ(here.offset_px[l], plain.offset_px[l]) << "seed " << seed;
+      EXPECT_EQ(here.information[l], plain.information[l]) << "seed " << seed;
     }
   }
 }
