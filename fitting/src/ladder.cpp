@@ -102,7 +102,7 @@ void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
 
 // Friction that spin weakens looks like air that slows: the path has to choose between them.
 Term unseen_spin(const Scene& scene) {
-  constexpr double kFastest = 4.0;  // of the natural rate: a rim of a metre and a half per second
+  constexpr double kFastest = 4.0;  // of the natural rate: a rim of 4 sqrt(g R)
   const double rate_rad_s = std::sqrt(scene.model.gravity_m_s2 / scene.body->radius_m);
   return {"unseen spin",
           [rate_rad_s](Scene& s) {

@@ -13,8 +13,9 @@ using Starter = std::function<std::vector<Start>(const ArcData& window)>;
 /// Where a search ended.
 struct Found {
   Solution solution;
-  std::string path = "none";          ///< which start won
-  double reduced_chi2 = 0.0;          ///< on the full arc but strays, before robust weights; a top's fast twin's counts twice
+  std::string path = "none";  ///< which start won
+  /// On the full arc but strays, before robust weights; that of a top's fast twin counts twice.
+  double reduced_chi2 = 0.0;
   double unexplained = 1.0;           ///< chi-square over that of knowing nothing (null_chi2)
   bool passed = false;                ///< the chi-square gate
   bool cut_short = false;             ///< the search ended at its limit before anything passed

@@ -38,6 +38,13 @@ struct Recorded {
   }
 };
 
+std::vector<int> unseen(const std::vector<Glimpse>& glimpses) {
+  std::vector<int> out;
+  for (const Glimpse& g : glimpses)
+    if (!g.seen) out.push_back(static_cast<int>(g.frame->index));
+  return out;
+}
+
 std::vector<int> doubted(const std::vector<Glimpse>& glimpses) {
   std::vector<int> out;
   for (const Glimpse& g : glimpses)
@@ -83,10 +90,7 @@ std::vector<int> forgotten(double accepted, const Eigen::Vector2d& off_px) {
     recorded.glimpses[i].seen->centre_px += off_px;
   }
   forget_what_the_path_jumps_to(recorded.glimpses);
-  std::vector<int> out;
-  for (const Glimpse& g : recorded.glimpses)
-    if (!g.seen) out.push_back(static_cast<int>(g.frame->index));
-  return out;
+  return unseen(recorded.glimpses);
 }
 
 TEST(PathOutliers, WhatHidesTheBodyAndIsTakenForItIsForgotten) {
@@ -110,10 +114,7 @@ std::vector<int> forgotten_beside_a_gap(double before, double after) {
   for (std::size_t i = 12; i < 15; ++i) recorded.glimpses[i].seen->pose->evidence *= after;
   for (std::size_t i = 8; i < 12; ++i) recorded.glimpses[i].seen.reset();
   forget_what_is_faint_beside_gaps(recorded.glimpses);
-  std::vector<int> out;
-  for (const Glimpse& g : recorded.glimpses)
-    if (!g.seen) out.push_back(static_cast<int>(g.frame->index));
-  return out;
+  return unseen(recorded.glimpses);
 }
 
 TEST(PathOutliers, WhatIsSeenLittleBesideAGapIsForgottenOnEitherSide) {

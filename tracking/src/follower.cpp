@@ -195,8 +195,8 @@ Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const 
 std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
                                              const Others& others) {
   const double size = usual_major_px_;
-  // The longer it has been lost, the farther it may have gone; after a while, anywhere. What is
-  // seen little of for as long may be what hides it, left behind in its place.
+  // The longer it has been lost, the farther it may have gone; after a while, anywhere. What
+  // has been faint for as long may be what hides it, left behind in its place.
   const int astray = std::max(lost_, faint_);
   const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
   const double gate = astray > 30 ? 1e9 : 0.5 * size + 0.5 * speed + 0.25 * size * astray;

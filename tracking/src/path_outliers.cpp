@@ -209,6 +209,8 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
 }
 
 void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
+  // For an arm in the body's place a third to a half speaks of what usually does, for a body half
+  // hidden by it half to two thirds: some of the latter go with the former.
   constexpr std::size_t kGap = 2;
   constexpr double kFaint = 0.55;
   const auto speaks = [](const Glimpse& g) { return g.seen->accepted * g.seen->pose->evidence; };

@@ -29,7 +29,7 @@ struct Silhouette {
 [[nodiscard]] std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
                                                   cv::Rect box = {});
 
-/// What differs from the background and has a body's own colours: each region, and all of them
+/// What differs from the background and has a body's own colours: each region, and the larger ones
 /// together, as where a bar lies across the body. Tells it from a hand that touches it.
 [[nodiscard]] std::vector<Silhouette> find_coloured_like(const Palette& body, double gain,
                                                          const Frame& frame,
