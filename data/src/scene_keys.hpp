@@ -109,6 +109,8 @@ void model_keys(Visit&& visit) {
   visit("couple_regularisation_rad_s", &M::couple_regularisation_rad_s, kPositive);
   visit("drag_transverse_N_m_s", &M::drag_transverse_N_m_s, kNonNegative);
   visit("drag_spin_N_m_s", &M::drag_spin_N_m_s, kNonNegative);
+  visit("drag_spin_dry_N_m", &M::drag_spin_dry_N_m, kNonNegative);
+  visit("drag_spin_quadratic_N_m_s2", &M::drag_spin_quadratic_N_m_s2, kNonNegative);
   visit("spin_down_dry_rad_s2", &M::spin_down_dry_rad_s2, kNonNegative);
   visit("spin_down_weakening_s_rad", &M::spin_down_weakening_s_rad, kNonNegative);
   visit("spin_down_viscous_1_s", &M::spin_down_viscous_1_s, kNonNegative);

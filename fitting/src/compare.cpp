@@ -391,6 +391,30 @@ std::size_t step_up_while_worth(const Ladder& ladder, std::span<const data::Trac
   return current;
 }
 
+// A rung that explains the track where `known` does not, with another law for one of its losses.
+std::optional<Rung> by_another_law(const Ladder& ladder, std::span<const data::Track> tracks,
+                                   const FitOptions& options, const Rung& known) {
+  std::vector<Rung> tried;
+  std::vector<const Term*> added;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
+    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    if (!term.instead_of || !known.terms.contains(*term.instead_of)) continue;
+    std::set<int> terms = known.terms;
+    terms.erase(*term.instead_of);
+    terms.insert(index);
+    tried.push_back(rung_with(ladder, terms));
+    added.push_back(&term);
+  }
+  FitOptions one = options;
+  one.threads = 1;
+  in_parallel(static_cast<int>(tried.size()), options.threads, [&](int i) {
+    Rung& rung = tried[static_cast<std::size_t>(i)];
+    fit_rung(tracks, &known, added[static_cast<std::size_t>(i)], options_for(rung, one), rung);
+  });
+  const Rung* best = least_bic(tried);  // of the others a longer way may make more
+  return best != nullptr && explains(*best) ? std::optional(*best) : std::nullopt;
+}
+
 // Where the plainest model explains nothing its solution leads nowhere, and neither does that of
 // one with a single loss if several act: all usual losses together, then fewer of them. Where that
 // explains a first part of the track alone, further losses act as well, of which one is added at a
@@ -405,6 +429,11 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[all], options), rungs[all]);
   if (explains(rungs[all])) {
     step_down(ladder, tracks, options, all, rungs);
+    return true;
+  }
+  if (auto other = by_another_law(ladder, tracks, options, rungs[all])) {
+    rungs.push_back(*std::move(other));
+    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
     return true;
   }
   const std::map<std::string, double> first_part = rungs[all].first_part;

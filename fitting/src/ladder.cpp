@@ -121,6 +121,25 @@ void add_puck_terms(const Scene& scene, bool spin_seen, Ladder& ladder) {
     ladder.terms.push_back(unseen_spin(scene));
 }
 
+// Air acts on nearly every top, along and across its axis; at the pivot's tip, or where the air is
+// turbulent, the spin goes by another law.
+void add_top_drags(Ladder& ladder) {
+  constexpr double kTypical_1_s = 0.05;
+  const auto drag = [](std::optional<double> ModelSettings::*field) {
+    // Tops are fitted by groups, whose starts are other ones.
+    return [field](Scene& s) { s.model.*field = 1e-6; };
+  };
+  ladder.terms = {
+      {"transverse drag",
+       drag(&ModelSettings::drag_transverse_N_m_s),
+       {{"gamma1_1_s", kTypical_1_s}}},
+      {"spin drag", drag(&ModelSettings::drag_spin_N_m_s), {{"gamma3_1_s", kTypical_1_s}}},
+      {"dry spin drag", drag(&ModelSettings::drag_spin_dry_N_m), {}},
+      {"quadratic spin drag", drag(&ModelSettings::drag_spin_quadratic_N_m_s2), {}}};
+  ladder.terms[0].usual = ladder.terms[1].usual = true;
+  ladder.terms[2].instead_of = ladder.terms[3].instead_of = 1;
+}
+
 }  // namespace
 
 Ladder ladder_of(const Scene& scene, bool spin_seen) {
@@ -143,12 +162,7 @@ Ladder ladder_of(const Scene& scene, bool spin_seen) {
   } else if (ladder.law == "pivot") {
     add_spin_down_terms(scene, ladder);
   } else if (ladder.law == "top") {
-    ladder.terms.push_back({"drag",
-                            [](Scene& s) {
-                              s.model.drag_transverse_N_m_s = 1e-6;
-                              s.model.drag_spin_N_m_s = 1e-6;
-                            },
-                            {{"gamma1_1_s", 0.05}, {"gamma3_1_s", 0.05}}});
+    add_top_drags(ladder);
   }
   return ladder;
 }

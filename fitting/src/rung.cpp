@@ -182,21 +182,56 @@ double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& ru
 // Of the typical size of a parameter: near the solution without it; and what no residual sees.
 constexpr double kLittle = 0.02, kNext = 1e-6;
 
-// Parameters of a rung that `known` does not have at a share of their typical size.
-std::map<std::string, double> further_parameters(const Rung& known, const Rung& rung,
-                                                 double share) {
-  std::map<std::string, double> further;
+using Values = std::map<std::string, double>;
+
+// The power of the spin b by which each of a top's drags on it goes, over b itself: how fast it
+// slows the spin.
+constexpr std::pair<const char*, double> kSpinDrags[] = {
+    {"gamma3_dry_1_s2", -1.0}, {"gamma3_1_s", 0.0}, {"gamma3_quadratic", 1.0}};
+
+// Typical size of a parameter beside known values: drags slow the spin at like rates.
+double typical_size(const model::ParameterInfo& info, const Values& known) {
+  constexpr double kTypical_1_s = 0.1;
+  const auto spin = known.find("b_1_s");
+  if (spin == known.end() || spin->second == 0.0) return info.value;
+  for (const auto& [name, power] : kSpinDrags)
+    if (info.name == name && power != 0.0)
+      return kTypical_1_s * std::pow(std::abs(spin->second), -power);
+  return info.value;
+}
+
+// What took the place of another drag on the spin begins by slowing it at the same rate, halfway
+// through the record: from nothing the way is long.
+void hand_over_spin_drag(const data::Fit& known, const Values& before, Values& start,
+                         const std::set<std::string>& own) {
+  const auto spin = before.find("b_1_s");
+  if (spin == before.end() || spin->second == 0.0) return;
+  double b_1_s = std::abs(spin->second), rate_1_s = 0.0;
+  for (const auto& [name, power] : kSpinDrags)
+    if (const auto drag = before.find(name); drag != before.end() && !own.contains(name))
+      rate_1_s += drag->second * std::pow(b_1_s, power);
+  b_1_s *= std::exp(-0.5 * rate_1_s * (known.arcs[0].to_s - known.arcs[0].from_s));
+  for (const auto& [name, power] : kSpinDrags)
+    if (rate_1_s > 0.0 && own.contains(name) && !before.contains(name))
+      start[name] = rate_1_s * std::pow(b_1_s, -power);
+}
+
+// Parameters of a rung that are not among the known values, at a share of their typical size.
+Values further_parameters(const Values& known, const Rung& rung, double share) {
+  Values further;
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())
-    if (info.role == model::ParameterInfo::Role::dynamics && known.fit.find(info.name) == nullptr)
-      further[info.name] = share * info.value;
+    if (info.role == model::ParameterInfo::Role::dynamics && !known.contains(info.name))
+      further[info.name] = share * typical_size(info, known);
   return further;
 }
 
 // From a known rung's values on.
-std::map<std::string, double> extended_start(const Rung& known, const Rung& rung) {
-  std::map<std::string, double> start = values_of(known.fit);
-  start.merge(further_parameters(known, rung, kLittle));
+Values extended_start(const Rung& known, const Rung& rung) {
+  Values start = values_of(known.fit);
+  start.merge(further_parameters(values_of_all_arcs(known.fit), rung, kLittle));
+  if (known.fit.arcs.size() == 1)
+    hand_over_spin_drag(known.fit, values_of(known.fit), start, parameters_of(rung.scene));
   return start;
 }
 
@@ -251,6 +286,9 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       own.start = options.start;
       if (term != nullptr)
         for (const auto& [name, value] : term->start) own.start[name] = value;
+      if (extends)
+        hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
+                            parameters_of(rung.scene));
       own.strategy = "auto";
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
@@ -270,7 +308,7 @@ std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung&
   FitOptions at = options;
   at.start = values_of_all_arcs(known.fit);
   std::set<std::string> further;
-  for (const auto& [name, value] : further_parameters(known, larger, kNext)) {
+  for (const auto& [name, value] : further_parameters(at.start, larger, kNext)) {
     at.start[name] = value;
     further.insert(name);
   }

@@ -62,7 +62,8 @@ double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector
 void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
   using model::Observable;
   if (problem.arcs.size() != 1) return;
-  const bool drag = fit.find("gamma1_1_s") != nullptr;
+  const bool drag = std::any_of(fit.parameters.begin(), fit.parameters.end(),
+                                [](const auto& one) { return one.name.starts_with("gamma"); });
   const ArcData& arc = problem.arcs[0];
   if (arc.observable_index(Observable::x_m) < 0 || arc.observable_index(Observable::theta_rad) >= 0)
     return;

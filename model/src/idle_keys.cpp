@@ -34,6 +34,8 @@ const std::vector<Readers>& readers() {
       {"model.couple_regularisation_rad_s", rim},
       {"model.drag_transverse_N_m_s", top},
       {"model.drag_spin_N_m_s", top},
+      {"model.drag_spin_dry_N_m", top},
+      {"model.drag_spin_quadratic_N_m_s2", top},
       {"model.spin_down_dry_rad_s2", {"pivot"}},
       {"model.spin_down_weakening_s_rad", {"pivot"}},
       {"model.spin_down_viscous_1_s", {"pivot"}},

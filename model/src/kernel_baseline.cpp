@@ -5,7 +5,7 @@
 namespace trochoid::model {
 
 void run_top_dop853(const TopRun& run, TopResult& result) {
-  top_kernel::run_with<DormandPrince, double>(run, result);
+  top_kernel::run_with<DormandPrince, double, double>(run, result);
 }
 
 }  // namespace trochoid::model

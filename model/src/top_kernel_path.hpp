@@ -73,7 +73,7 @@ void write_path(const Series<S>& kx, const Series<S>& ky, double t0_s, const dou
         path.by_phi[n + 1] = xy[n] - px;
       }
     }
-    for (int lane = 0; lane < kTopLanes; ++lane) {
+    for (int lane = 0; lane < S::kLanes; ++lane) {
       double* column = path.by_variable[lane];
       if (column == nullptr) continue;
       for (int n = 0; n <= kTaylorOrder; ++n) {

@@ -87,27 +87,50 @@ class Run {
     stepper.prepare_dense();
     hand_out(stepper, run_.start_s);
     StepEnd end = StepEnd::accepted;
-    while (stepper.t_s() < run_.end_s && end == StepEnd::accepted) {
-      end = stepper.step(run_.end_s);
-      if (end == StepEnd::accepted) after_step(stepper);
+    while (stepper.t_s() < run_.end_s) {
+      end = stepper.step(next_stop_s(stepper.t_s()));
+      if (end != StepEnd::accepted) break;
+      after_step(stepper);
+      if constexpr (requires { System::kDry; }) {
+        if (System::kDry && stepper.t_s() == run_.spin_stops_s) stop_spin(stepper);
+      }
     }
     finish(stepper, end);
   }
 
  private:
+  [[nodiscard]] double next_stop_s(double t_s) const {
+    return t_s < run_.spin_stops_s && run_.spin_stops_s < run_.end_s ? run_.spin_stops_s
+                                                                     : run_.end_s;
+  }
+  /// Where dry drag has used up the spin it holds it. All states are continuous there, and the rate
+  /// of no other one jumps: their derivatives go on as they are, that of the spin is gone.
+  void stop_spin(Stepper& stepper) {
+    auto y = stepper.y();
+    y[System::kSpin] = S(0.0);
+    stepper.system().sense = 0.0;
+    stepper.start(stepper.t_s(), y);
+  }
   System make_system(const S& b, const AxisAndMomentum<S>& start,
                      State<S, System::kStates>& y) const {
     const S a = variable<S>(run_, kTopA), gamma1 = variable<S>(run_, kTopGamma1),
             gamma3 = variable<S>(run_, kTopGamma3);
     System system;
     if constexpr (kAngles) {
-      State<S, System::kStates - 1> base;
+      State<S, System::kAngle> base;
       static_cast<typename System::Base_&>(system) = System::at(a, b, gamma1, gamma3, start, base);
-      for (int i = 0; i + 1 < System::kStates; ++i) y[i] = base[i];
+      for (int i = 0; i < System::kAngle; ++i) y[i] = base[i];
       system.side = value_of(start.k[2]) < -0.5 ? -1.0 : 1.0;
-      y[System::kStates - 1] = S(run_.phi_rad);  // phi + psi, or phi - psi: psi counts from zero
+      y[System::kAngle] = S(run_.phi_rad);  // phi + psi, or phi - psi: psi counts from zero
+      if constexpr (System::kCountsTurns) y[System::kTurns] = S(0.0);
     } else {
       system = System::at(a, b, gamma1, gamma3, start, y);
+    }
+    if constexpr (requires { system.sense; }) {
+      const double spin = run_.variable[kTopB];
+      system.sense = spin > 0.0 ? 1.0 : spin < 0.0 ? -1.0 : 0.0;
+      if constexpr (System::kDry) system.dry_1_s2 = variable<S>(run_, kTopDry);
+      if constexpr (System::kQuadratic) system.quadratic = variable<S>(run_, kTopQuadratic);
     }
     return system;
   }
@@ -157,7 +180,9 @@ class Run {
     if constexpr (kAngles) {
       const S phi = azimuth(kx, ky, azimuth_.follow(value_of(kx), value_of(ky)));
       store(result_, 3, n, phi);
-      store(result_, 4, n, spin_angle(stepper, phi, stepper.dense(System::kStates - 1, u)));
+      store(result_, 4, n, spin_angle(stepper, phi, stepper.dense(System::kAngle, u)));
+      if constexpr (System::kCountsTurns)
+        store(result_, kTopTurns, n, stepper.dense(System::kTurns, u));
     }
     if (result_.value[kTopAngleColumns] != nullptr) write_momentum(stepper, n, u);
   }
@@ -189,7 +214,7 @@ class Run {
     auto y = stepper.y();
     const S kx = y[System::kAxis], ky = y[System::kAxis + 1];
     const S phi = azimuth(kx, ky, azimuth_.follow(value_of(kx), value_of(ky)));
-    y[System::kStates - 1] = 2.0 * phi - y[System::kStates - 1];
+    y[System::kAngle] = 2.0 * phi - y[System::kAngle];
     stepper.system().side = -side;
     stepper.start(stepper.t_s(), y);
   }
@@ -216,7 +241,8 @@ class Run {
     if constexpr (kAngles) {
       phi = azimuth(state.k[0], state.k[1],
                     azimuth_.follow(value_of(state.k[0]), value_of(state.k[1])));
-      store_end(result_, 5, spin_angle(stepper, phi, y[System::kStates - 1]));
+      store_end(result_, 5, spin_angle(stepper, phi, y[System::kAngle]));
+      if constexpr (System::kCountsTurns) store_end(result_, 6, y[System::kTurns]);
     }
     store_end(result_, 0, angles.theta_rad);
     store_end(result_, 1, phi);
@@ -231,20 +257,28 @@ class Run {
   int next_ = 0;
 };
 
-template <template <class> class Method, class S>
-void run_with(const TopRun& run, TopResult& result) {
-  if (run.drag) {
-    if (run.with_angles) {
-      Run<Method, WithSpinAngle<TopWithDrag<S>>>(run, result)();
-    } else {
-      Run<Method, TopWithDrag<S>>(run, result)();
-    }
+template <template <class> class Method, class System>
+void run_system(const TopRun& run, TopResult& result) {
+  if (run.with_angles) {
+    Run<Method, WithSpinAngle<System>>(run, result)();
   } else {
-    if (run.with_angles) {
-      Run<Method, WithSpinAngle<Top<S>>>(run, result)();
-    } else {
-      Run<Method, Top<S>>(run, result)();
-    }
+    Run<Method, System>(run, result)();
+  }
+}
+
+/// @tparam S, Wide  scalars of 8 lanes and of 16, or plain numbers.
+template <template <class> class Method, class S, class Wide>
+void run_with(const TopRun& run, TopResult& result) {
+  if (run.dry && run.quadratic) {
+    run_system<Method, TopWithDrag<Wide, true, true>>(run, result);
+  } else if (run.quadratic) {
+    run_system<Method, TopWithDrag<Wide, false, true>>(run, result);
+  } else if (run.dry) {
+    run_system<Method, TopWithDrag<S, true, false>>(run, result);
+  } else if (run.drag) {
+    run_system<Method, TopWithDrag<S>>(run, result);
+  } else {
+    run_system<Method, Top<S>>(run, result);
   }
 }
 
@@ -253,9 +287,9 @@ void run_with(const TopRun& run, TopResult& result) {
 /// By Taylor series.
 void run_top(const TopRun& run, TopResult& result) {
   if (run.with_derivatives) {
-    top_kernel::run_with<Taylor, Dual<kTopLanes>>(run, result);
+    top_kernel::run_with<Taylor, Dual<kTopLanes>, Dual<kTopMostLanes>>(run, result);
   } else {
-    top_kernel::run_with<Taylor, double>(run, result);
+    top_kernel::run_with<Taylor, double, double>(run, result);
   }
 }
 

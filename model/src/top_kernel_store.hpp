@@ -19,9 +19,10 @@ TROCHOID_INLINE S variable(const TopRun& run, TopVariable which) {
 TROCHOID_INLINE void store(TopResult& result, int column, int n, double x) {
   if (result.value[column] != nullptr) result.value[column][n] = x;
 }
-TROCHOID_INLINE void store(TopResult& result, int column, int n, const Dual<kTopLanes>& x) {
+template <int Lanes>
+TROCHOID_INLINE void store(TopResult& result, int column, int n, const Dual<Lanes>& x) {
   store(result, column, n, x.value);
-  for (int lane = 0; lane < kTopLanes; ++lane) {
+  for (int lane = 0; lane < Lanes; ++lane) {
     double* out = result.derivative[column][lane];
     if (out != nullptr) out[n] = x.derivative[lane];
   }
@@ -29,9 +30,10 @@ TROCHOID_INLINE void store(TopResult& result, int column, int n, const Dual<kTop
 TROCHOID_INLINE void store_end(TopResult& result, int i, double x) {
   result.end[i] = x;
 }
-TROCHOID_INLINE void store_end(TopResult& result, int i, const Dual<kTopLanes>& x) {
+template <int Lanes>
+TROCHOID_INLINE void store_end(TopResult& result, int i, const Dual<Lanes>& x) {
   result.end[i] = x.value;
-  for (int lane = 0; lane < kTopLanes; ++lane) {
+  for (int lane = 0; lane < Lanes; ++lane) {
     result.end_derivative[i][lane] = x.derivative[lane];
   }
 }

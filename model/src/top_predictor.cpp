@@ -19,6 +19,8 @@ enum Parameter {
   kL,
   kGamma1,
   kGamma3,
+  kDry,
+  kQuadratic,
   kTheta,
   kPhi,
   kDtheta,
@@ -44,14 +46,19 @@ std::vector<Entry> entries(const TopSettings& top) {
                           {kL,
                            {"l_m", "m", Role::dynamics, 0.0, kInfinity, true, top.l_m, true,
                             "distance from pivot to centre of mass"}}};
-  if (top.drag) {
-    list.push_back({kGamma1,
-                    {"gamma1_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma1_1_s,
-                     top.transverse_drag, "drag across the axis, c1 / I"}});
-    list.push_back({kGamma3,
-                    {"gamma3_1_s", "1/s", Role::dynamics, 0.0, kInfinity, true, top.gamma3_1_s,
-                     top.spin_drag, "drag on the spin, c3 / Is"}});
-  }
+  const auto drag = [&](bool named, Parameter which, const char* name, const char* unit,
+                        double value, const char* meaning) {
+    if (!named) return;
+    list.push_back(
+        {which, {name, unit, Role::dynamics, 0.0, kInfinity, true, value, true, meaning}});
+  };
+  drag(top.transverse_drag, kGamma1, "gamma1_1_s", "1/s", top.gamma1_1_s,
+       "drag across the axis, c1 / I");
+  drag(top.spin_drag, kGamma3, "gamma3_1_s", "1/s", top.gamma3_1_s, "drag on the spin, c3 / Is");
+  drag(top.dry_drag, kDry, "gamma3_dry_1_s2", "1/s^2", top.dry_1_s2,
+       "dry drag on the spin, t0 / I");
+  drag(top.quadratic_drag, kQuadratic, "gamma3_quadratic", "1", top.quadratic,
+       "quadratic drag on the spin, q3 I / Is^2");
   const std::vector<Entry> rest{
       {kTheta, {"theta_rad", "rad", Role::initial, 0.0, M_PI, false, top.theta_rad, true, "tilt"}},
       {kPhi,
@@ -89,6 +96,10 @@ int lane_of(Parameter parameter) {
       return kTopGamma1;
     case kGamma3:
       return kTopGamma3;
+    case kDry:
+      return kTopDry;
+    case kQuadratic:
+      return kTopQuadratic;
     case kTheta:
       return kTopTheta;
     case kDtheta:
@@ -100,7 +111,7 @@ int lane_of(Parameter parameter) {
   }
 }
 
-/// Integral of exp(-g s) over [0, t] and its derivative by g: the spin left under drag.
+/// Integral of exp(-g s) over [0, t] and its derivative by g: the turns left under linear drag.
 struct Decay {
   double integral, by_gamma;
 };
@@ -117,7 +128,7 @@ class TopPredictor : public Predictor {
  public:
   using Kernel = void (*)(const TopRun&, TopResult&);
   TopPredictor(std::string name, Kernel kernel, bool writes_path, const TopSettings& top)
-      : name_(std::move(name)), kernel_(kernel), writes_path_(writes_path), drag_(top.drag) {
+      : name_(std::move(name)), kernel_(kernel), writes_path_(writes_path), top_(top) {
     for (Entry& entry : entries(top)) {
       kinds_.push_back(entry.parameter);
       infos_.push_back(std::move(entry.info));
@@ -140,7 +151,7 @@ class TopPredictor : public Predictor {
   std::string name_;
   Kernel kernel_;
   bool writes_path_;  ///< the kernel knows TopPath
-  bool drag_;
+  TopSettings top_;   ///< for the drags it has
   std::vector<Parameter> kinds_;
   std::vector<ParameterInfo> infos_;
 };
@@ -150,7 +161,7 @@ struct TopPredictor::Work {
   const PredictRequest& request;
   TopRun run;
   TopResult result;
-  double l_m, omega_s, gamma3, psi_rad, pivot_x_m, pivot_y_m;
+  double l_m, omega_s, psi_rad, pivot_x_m, pivot_y_m;
   std::vector<double> values, derivatives;
 
   [[nodiscard]] double value(int column, int n) const { return result.value[column][n]; }
@@ -160,13 +171,35 @@ struct TopPredictor::Work {
   void prepare() {
     const std::size_t count = request.t_s.size();
     const int columns = run.with_angles ? kTopAngleColumns : kTopAxisColumns;
+    const int lanes = !run.with_derivatives ? 0 : run.quadratic ? kTopMostLanes : kTopLanes;
     values.resize(count * columns);
-    if (run.with_derivatives) derivatives.resize(count * columns * kTopLanes);
+    derivatives.resize(count * columns * lanes);
     for (int c = 0; c < columns; ++c) {
       result.value[c] = values.data() + c * count;
-      for (int i = 0; i < kTopLanes && run.with_derivatives; ++i)
-        result.derivative[c][i] = derivatives.data() + (c * kTopLanes + i) * count;
+      for (int i = 0; i < lanes; ++i)
+        result.derivative[c][i] = derivatives.data() + (c * lanes + i) * count;
     }
+  }
+  /// What b does, omega_s does alike: of one radian per second of spin at the start, with the
+  /// derivative of b's part.
+  [[nodiscard]] double share(double of_b) const { return of_b / run.variable[kTopB]; }
+  [[nodiscard]] double share_by(Parameter by, double of_b_by, double share) const {
+    return (of_b_by - (by == kB ? share : 0.0)) / run.variable[kTopB];
+  }
+  /// How far that has turned by time n, and its derivative.
+  [[nodiscard]] double turn_s(int n) const {
+    return counts_turns() ? share(value(kTopTurns, n)) : decayed(n).integral;
+  }
+  [[nodiscard]] double turn_s_by(Parameter by, int n) const {
+    if (!counts_turns()) return by == kGamma3 ? decayed(n).by_gamma : 0.0;
+    return lane_of(by) < 0 ? 0.0 : share_by(by, lane(kTopTurns, n, lane_of(by)), turn_s(n));
+  }
+  /// A top without spin turns by nothing however that would slow it.
+  [[nodiscard]] bool counts_turns() const {
+    return (run.dry || run.quadratic) && run.variable[kTopB] != 0.0;
+  }
+  [[nodiscard]] Decay decayed(int n) const {
+    return decay(run.variable[kTopGamma3], request.t_s[n] - request.start_s);
   }
 };
 
@@ -196,20 +229,24 @@ Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
             {},
             get(values, kL),
             get(values, kOmega),
-            get(values, kGamma3),
             get(values, kPsi),
             get(values, kPivotX),
             get(values, kPivotY),
             {},
             {}};
   TopRun& run = work.run;
-  for (const Parameter which : {kA, kB, kGamma1, kGamma3, kTheta, kDtheta, kDphi})
+  for (const Parameter which : {kA, kB, kGamma1, kGamma3, kDry, kQuadratic, kTheta, kDtheta, kDphi})
     run.variable[lane_of(which)] = get(values, which);
   run.phi_rad = get(values, kPhi);
-  run.drag = drag_;
+  run.drag = top_.drag;
+  run.dry = top_.dry_drag;
+  run.quadratic = top_.quadratic_drag;
   run.with_derivatives = !request.derivatives.empty();
   run.with_angles = wants_angles(request);
   run.start_s = request.start_s;
+  run.spin_stops_s =
+      run.start_s + spin_lasts_s(run.variable[kTopB], run.variable[kTopDry],
+                                 run.variable[kTopGamma3], run.variable[kTopQuadratic]);
   run.t_s = request.t_s.data();
   run.count = static_cast<int>(request.t_s.size());
   run.end_s = request.t_s.empty() ? request.start_s : request.t_s.back();
@@ -287,10 +324,9 @@ double TopPredictor::derivative(const Work& work, Observable what, Parameter by,
     case Observable::phi_rad:
       return lane >= 0 ? work.lane(3, n, lane) : by == kPhi ? 1.0 : 0.0;
     case Observable::psi_rad: {
-      const Decay spin = decay(work.gamma3, work.request.t_s[n] - work.request.start_s);
       double total = lane >= 0 ? work.lane(4, n, lane) : 0.0;
-      if (by == kGamma3) total += work.omega_s * spin.by_gamma;
-      if (by == kOmega) total += spin.integral;
+      total += work.omega_s * work.turn_s_by(by, n);
+      if (by == kOmega) total += work.turn_s(n);
       if (by == kPsi) total += 1.0;
       return total;
     }
@@ -315,8 +351,7 @@ void TopPredictor::fill_observable(const Work& work, int slot, Prediction& predi
       case Observable::psi_rad:
         break;
     }
-    return work.psi_rad + work.value(4, n) +
-           work.omega_s * decay(work.gamma3, request.t_s[n] - request.start_s).integral;
+    return work.psi_rad + work.value(4, n) + work.omega_s * work.turn_s(n);
   };
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const int count = static_cast<int>(request.t_s.size()), reached = work.result.written;
@@ -332,13 +367,18 @@ void TopPredictor::fill_observable(const Work& work, int slot, Prediction& predi
 
 void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
   const TopResult& result = work.result;
-  const Decay spin = decay(work.gamma3, result.reached_s - work.request.start_s);
-  const double left = std::exp(-work.gamma3 * (result.reached_s - work.request.start_s));
+  const double ran_s = result.reached_s - work.request.start_s;
+  const double gamma3 = work.run.variable[kTopGamma3];
+  const Decay linear = decay(gamma3, ran_s);
+  const bool counted = work.counts_turns();
+  // Of one radian per second of spin at the start: what is left, and how far it has turned.
+  const double left = counted ? work.share(result.end[4]) : std::exp(-gamma3 * ran_s);
+  const double turn_s = counted ? work.share(result.end[6]) : linear.integral;
   // In the order of the initial parameters: b, theta, phi, dtheta, dphi, psi, omega_s.
   constexpr int kSource[] = {4, 0, 1, 2, 3, 5};
   prediction.end_state.resize(7);
   for (int i = 0; i < 6; ++i) prediction.end_state[i] = result.end[kSource[i]];
-  prediction.end_state[5] += work.psi_rad + work.omega_s * spin.integral;
+  prediction.end_state[5] += work.psi_rad + work.omega_s * turn_s;
   prediction.end_state[6] = work.omega_s * left;
   prediction.end_state_jacobian.setZero(7,
                                         static_cast<Eigen::Index>(work.request.derivatives.size()));
@@ -350,12 +390,15 @@ void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
     if (by == kPhi) column[2] = 1.0;
     if (by == kPsi) column[5] = 1.0;
     if (by == kOmega) {
-      column[5] = spin.integral;
+      column[5] = turn_s;
       column[6] = left;
     }
-    if (by == kGamma3) {
-      column[5] += work.omega_s * spin.by_gamma;
-      column[6] = -work.omega_s * left * (result.reached_s - work.request.start_s);
+    if (counted && lane >= 0) {
+      column[5] += work.omega_s * work.share_by(by, result.end_derivative[6][lane], turn_s);
+      column[6] = work.omega_s * work.share_by(by, result.end_derivative[4][lane], left);
+    } else if (by == kGamma3) {
+      column[5] += work.omega_s * linear.by_gamma;
+      column[6] = -work.omega_s * left * ran_s;
     }
   }
 }

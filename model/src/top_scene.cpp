@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "trochoid/data/error.hpp"
@@ -75,6 +76,9 @@ void read_body(const data::Scene& scene, TopSettings& top) {
   top.b_1_s = top.Is_kg_m2 * top.omega_s_rad_s / top.I_kg_m2;
   top.gamma1_1_s = scene.model.drag_transverse_N_m_s.value_or(0.0) / top.I_kg_m2;
   top.gamma3_1_s = scene.model.drag_spin_N_m_s.value_or(0.0) / top.Is_kg_m2;
+  top.dry_1_s2 = scene.model.drag_spin_dry_N_m.value_or(0.0) / top.I_kg_m2;
+  top.quadratic = scene.model.drag_spin_quadratic_N_m_s2.value_or(0.0) * top.I_kg_m2 /
+                  (top.Is_kg_m2 * top.Is_kg_m2);
   if (body.mass_kg) {
     top.weight_times_l_J = *body.mass_kg * scene.model.gravity_m_s2 * top.l_m;
     top.a_1_s2 = top.weight_times_l_J / top.I_kg_m2;
@@ -89,15 +93,17 @@ void check(const TopSettings& top) {
     if (!std::isfinite(value))
       throw InputError("the top's scene holds a number that is not finite");
   }
-  if (top.gamma1_1_s < 0.0 || top.gamma3_1_s < 0.0)
-    throw InputError("model.drag_transverse_N_m_s and drag_spin_N_m_s must not be negative");
+  if (top.gamma1_1_s < 0.0 || top.gamma3_1_s < 0.0 || top.dry_1_s2 < 0.0 || top.quadratic < 0.0)
+    throw InputError("model.drag_transverse_N_m_s and drag_spin_* must not be negative");
 }
 
 TopSettings common(const data::Scene& scene) {
   TopSettings top;
   top.transverse_drag = scene.model.drag_transverse_N_m_s.has_value();
   top.spin_drag = scene.model.drag_spin_N_m_s.has_value();
-  top.drag = top.transverse_drag || top.spin_drag;
+  top.dry_drag = scene.model.drag_spin_dry_N_m.has_value();
+  top.quadratic_drag = scene.model.drag_spin_quadratic_N_m_s2.has_value();
+  top.drag = top.transverse_drag || top.spin_drag || top.dry_drag || top.quadratic_drag;
   top.l_m = pivot_distance_m(scene).value_or(0.1);
   top.theta_rad = scene.start.theta_rad.value_or(M_PI / 4.0);
   if (scene.support.pivot_m) {
@@ -118,6 +124,8 @@ TopSettings top_for_prediction(const data::Scene& scene) {
     constexpr double kStart_1_s = 0.1;  // somewhere to start: a tenth of the speed per second
     if (top.transverse_drag) top.gamma1_1_s = kStart_1_s;
     if (top.spin_drag) top.gamma3_1_s = kStart_1_s;
+    if (top.dry_drag) top.dry_1_s2 = kStart_1_s * std::abs(top.b_1_s);
+    if (top.quadratic_drag && top.b_1_s != 0.0) top.quadratic = kStart_1_s / std::abs(top.b_1_s);
   }
   check(top);
   return top;
@@ -138,11 +146,24 @@ TopSettings top_for_simulation(const data::Scene& scene) {
   return top;
 }
 
+double spin_lasts_s(double b_1_s, double dry_1_s2, double gamma3_1_s, double quadratic) {
+  if (!(dry_1_s2 > 0.0)) return std::numeric_limits<double>::infinity();
+  // b = N/M with N' = -dry M - gamma3 N and M' = quadratic N, both linear: N, and with it the spin,
+  // is zero where tanh(root t)/root equals this.
+  const double spin = std::abs(b_1_s);
+  const double length = spin / (dry_1_s2 + 0.5 * gamma3_1_s * spin);
+  const double root2 = 0.25 * gamma3_1_s * gamma3_1_s - dry_1_s2 * quadratic;
+  const double x = std::sqrt(std::abs(root2)) * length;
+  constexpr double kSeries = 1e-4;  // next term x^4/5
+  if (x < kSeries) return length * (1.0 + root2 * length * length / 3.0);
+  return length * (root2 > 0.0 ? std::atanh(x) : std::atan(x)) / x;
+}
+
 TopSettings without_drag(const TopSettings& top) {
   if (top.drag) {
     throw InputError(
         "model \"top-euler\" is the thesis' frictionless top; leave drag_transverse_N_m_s and "
-        "drag_spin_N_m_s out, or use model \"top\"");
+        "drag_spin_* out, or use model \"top\"");
   }
   if (top.theta_rad == 0.0 || top.theta_rad == M_PI)
     throw InputError("model \"top-euler\" is singular at theta_rad = 0 and pi; use model \"top\"");

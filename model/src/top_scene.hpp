@@ -10,8 +10,11 @@ struct TopSettings {
   double l_m = 0.1;                                 ///< pivot to CoM
   double gamma1_1_s = 0.0;                          ///< c1 / I
   double gamma3_1_s = 0.0;                          ///< c3 / Is
-  bool drag = false;                                ///< either of the two
+  double dry_1_s2 = 0.0;                            ///< t0 / I
+  double quadratic = 0.0;                           ///< q3 I / Is^2
+  bool drag = false;                                ///< any of the four
   bool transverse_drag = false, spin_drag = false;  ///< named in the scene
+  bool dry_drag = false, quadratic_drag = false;    ///< likewise
   double omega_s_rad_s = 1.0;
   double theta_rad = 0.0, phi_rad = 0.0, psi_rad = 0.0;
   double dtheta_rad_s = 0.0, dphi_rad_s = 0.0;
@@ -25,6 +28,13 @@ struct TopSettings {
 /// For a run: everything that moves the top must be said.
 /// @throws InputError naming the missing field.
 [[nodiscard]] TopSettings top_for_simulation(const data::Scene& scene);
+
+/// After which time dry drag has used up a spin: b' = -(dry + gamma3 b + quadratic b^2) for b > 0.
+/// Infinite without dry drag, 0 without a spin.
+/// @param b_1_s, dry_1_s2, gamma3_1_s, quadratic  the spin at the start, of either sign, and the
+///        drags, none negative.
+[[nodiscard]] double spin_lasts_s(double b_1_s, double dry_1_s2, double gamma3_1_s,
+                                  double quadratic);
 
 /// The thesis' own equations know no friction. @throws InputError if the scene asks for drag.
 [[nodiscard]] TopSettings without_drag(const TopSettings& top);

@@ -35,11 +35,16 @@ TopRun kernel_run(const TopSettings& top, double tolerance) {
   run.variable[kTopB] = top.b_1_s;
   run.variable[kTopGamma1] = top.gamma1_1_s;
   run.variable[kTopGamma3] = top.gamma3_1_s;
+  run.variable[kTopDry] = top.dry_1_s2;
+  run.variable[kTopQuadratic] = top.quadratic;
   run.variable[kTopTheta] = top.theta_rad;
   run.variable[kTopDtheta] = top.dtheta_rad_s;
   run.variable[kTopDphi] = top.dphi_rad_s;
   run.phi_rad = top.phi_rad;
   run.drag = top.drag;
+  run.dry = top.dry_drag;
+  run.quadratic = top.quadratic_drag;
+  run.spin_stops_s = spin_lasts_s(top.b_1_s, top.dry_1_s2, top.gamma3_1_s, top.quadratic);
   run.with_angles = true;
   run.tolerance = tolerance;
   return run;
@@ -99,6 +104,10 @@ struct DualTop : WithSpinAngle<TopWithDrag<Dual<8>>> {
 
 TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, double tolerance,
                         Method method) {
+  if (top.dry_drag || top.quadratic_drag)
+    throw InputError(
+        "SUNDIALS runs a top with linear drag only; drag_spin_dry_N_m and "
+        "drag_spin_quadratic_N_m_s2 take run.integrator = \"auto\", \"taylor\" or \"dop853\"");
   TopColumns columns(t_s);
   const auto start = axis_and_momentum<double>(
       {top.theta_rad, top.phi_rad, top.dtheta_rad_s, top.dphi_rad_s}, top.b_1_s);
@@ -108,8 +117,12 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   const std::vector<double> fine = refined(t_s, rate, parts);
   StepControl<8> control = uniform_control<8>(tolerance);
   for (int i = 0; i < 3; ++i) control.atol[i] *= rate;
-  const State<double, 8> y0{{start.L[0], start.L[1], start.L[2], start.k[0], start.k[1], start.k[2],
-                             top.b_1_s, top.phi_rad}};
+  State<double, 7> base;
+  const auto axis =
+      TopWithDrag<double>::at(top.a_1_s2, top.b_1_s, top.gamma1_1_s, top.gamma3_1_s, start, base);
+  State<double, 8> y0;
+  for (int i = 0; i < 7; ++i) y0[i] = base[i];
+  y0[7] = top.phi_rad;
   DualTop duals;
   static_cast<WithSpinAngle<TopWithDrag<Dual<8>>>&>(duals) = system_of<Dual<8>>(top);
   const Solution solution = solve(system_of<double>(top), duals, y0, fine, control, method);
@@ -120,13 +133,14 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
     if (y[3] != 0.0 || y[4] != 0.0) phi += std::remainder(raw - phi, 2.0 * M_PI);
     if (row % parts != 0) continue;
     const auto n = static_cast<std::size_t>(row / parts);
+    for (int i = 0; i < 7; ++i) base[i] = y[i];
+    const auto at = axis.unpack(base);
     for (int i = 0; i < 3; ++i) {
-      columns.column[i][n] = y[3 + i];
-      columns.column[kTopAngleColumns + i][n] = y[i];
+      columns.column[i][n] = at.k[i];
+      columns.column[kTopAngleColumns + i][n] = at.L[i];
     }
     columns.column[3][n] = phi;
     columns.column[4][n] = y[7] - phi;
-    columns.column[8][n] = y[6];
     columns.rows = static_cast<int>(n) + 1;
   }
   columns.outcome = solution.outcome;
@@ -152,17 +166,28 @@ Eigen::VectorXd axis_differences(const TopColumns& a, const TopColumns& b) {
   return apart;
 }
 
-/// Integral of the spin rate omega_s exp(-gamma3 t).
-double turned_rad(const TopSettings& top, double t_s) {
+/// Spin rate and how far the top has turned since the start.
+struct Spin {
+  double rate_rad_s, turned_rad;
+};
+Spin spin_of(const TopSettings& top, const TopColumns& run, int n) {
+  const double t_s = run.t_s[n], omega_s = top.omega_s_rad_s;
+  if ((top.dry_drag || top.quadratic_drag) && top.b_1_s != 0.0) {
+    const double per_b = omega_s / top.b_1_s;
+    return {per_b * run.column[kTopAngleColumns + 3][n], per_b * run.column[kTopTurns][n]};
+  }
   const double x = top.gamma3_1_s * t_s;
-  return top.omega_s_rad_s * (x < 1e-9 ? t_s * (1.0 - 0.5 * x) : -std::expm1(-x) / top.gamma3_1_s);
+  const double turn_s = x < 1e-9 ? t_s * (1.0 - 0.5 * x) : -std::expm1(-x) / top.gamma3_1_s;
+  return {omega_s * std::exp(-x), omega_s * turn_s};
 }
 
 /// One row: angles, rates and energy from axis and momentum, (8) and (11).
 void fill_row(const TopSettings& top, const TopColumns& run, int n, double pivot_z_m,
               Eigen::Ref<Eigen::RowVectorXd> row) {
   const auto& c = run.column;
-  const AxisAndMomentum<double> state{{c[0][n], c[1][n], c[2][n]}, {c[5][n], c[6][n], c[7][n]}};
+  const AxisAndMomentum<double> state{
+      {c[0][n], c[1][n], c[2][n]},
+      {c[kTopAngleColumns][n], c[kTopAngleColumns + 1][n], c[kTopAngleColumns + 2][n]}};
   TopAngles<double> angles = angles_of(state);
   const double s = std::hypot(state.k[0], state.k[1]);
   const double across[3] = {state.L[1] * state.k[2] - state.L[2] * state.k[1],
@@ -173,13 +198,13 @@ void fill_row(const TopSettings& top, const TopColumns& run, int n, double pivot
     angles.dphi_rad_s = 0.0;
     angles.dtheta_rad_s = std::sqrt(speed2);
   }
-  const double left = std::exp(-top.gamma3_1_s * run.t_s[n]);
-  const double spin = top.omega_s_rad_s * left;
-  const double psi = top.psi_rad + c[4][n] + turned_rad(top, run.t_s[n]);
-  const double energy = 0.5 * top.I_kg_m2 * speed2 + 0.5 * top.Is_kg_m2 * spin * spin +
+  const Spin spin = spin_of(top, run, n);
+  const double psi = top.psi_rad + c[4][n] + spin.turned_rad;
+  const double energy = 0.5 * top.I_kg_m2 * speed2 +
+                        0.5 * top.Is_kg_m2 * spin.rate_rad_s * spin.rate_rad_s +
                         top.weight_times_l_J * state.k[2];
   row << run.t_s[n], c[3][n], angles.theta_rad, psi, angles.dphi_rad_s, angles.dtheta_rad_s,
-      spin - angles.dphi_rad_s * state.k[2], top.pivot_x_m + top.l_m * state.k[0],
+      spin.rate_rad_s - angles.dphi_rad_s * state.k[2], top.pivot_x_m + top.l_m * state.k[0],
       top.pivot_y_m + top.l_m * state.k[1], pivot_z_m + top.l_m * state.k[2], energy;
 }
 

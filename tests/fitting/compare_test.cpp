@@ -192,7 +192,7 @@ TEST(Compare, SaysWhetherATopNeedsDrag) {
                      {"theta_rad", 0.8},  {"dphi_rad_s", 0.3}, {"gamma1_1_s", 0.03},
                      {"gamma3_1_s", 0.02}};
   EXPECT_EQ(compare_one(track_of(plain, start, 6.0, 200, 5e-4, 3), plain).fit.comparison.size(),
-            2U);
+            5U);
   EXPECT_FALSE(compare_one(track_of(plain, start, 6.0, 200, 5e-4, 3), plain)
                    .scene.model.drag_spin_N_m_s.has_value());
   const Comparison found = compare_one(track_of(drag, start, 6.0, 200, 5e-4, 4), plain);
@@ -210,7 +210,7 @@ TEST(Compare, ListsModelsThatExplainNothingWithTheirReason) {
   for (data::TrackSample& sample : jumping.samples)
     sample.centre_m = Eigen::Vector2d(anywhere(generator), anywhere(generator));
   const Comparison none = compare_one(jumping, top());
-  ASSERT_EQ(none.fit.comparison.size(), 2U);
+  ASSERT_EQ(none.fit.comparison.size(), 5U);
   for (const data::ModelScore& score : none.fit.comparison) {
     EXPECT_FALSE(score.reason.empty()) << score.model;
   }

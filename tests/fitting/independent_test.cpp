@@ -61,6 +61,30 @@ TEST(Independent, TwoLossesThatOnlyTogetherExplainTheTrackAreFound) {
                            {"contour_friction_m", 7.747631453212088e-05}});
 }
 
+// Where only linear drag was known most of the motion had been left unexplained.
+TEST(Independent, ADryDragThatUsesUpATopsSpinIsTold) {
+  const Comparison found = comparison_of("top_dry_spin");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_FALSE(found.scene.model.drag_spin_N_m_s) << found.fit.recommendation;
+  expect_found(found.fit, {{"gamma3_dry_1_s2", 6.312679954436458},
+                           {"gamma1_1_s", 0.02462786212773269},
+                           {"a_1_s2", 210.3614435024626},
+                           {"b_1_s", 35.03579918941425},
+                           {"l_m", 0.028413278155765498}});
+}
+
+// Likewise, with residuals 16 times their noise.
+TEST(Independent, AQuadraticDragOnATopsSpinIsTold) {
+  const Comparison found = comparison_of("top_quadratic_spin");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_FALSE(found.scene.model.drag_spin_N_m_s) << found.fit.recommendation;
+  expect_found(found.fit, {{"gamma3_quadratic", 0.011676987613126974},
+                           {"gamma1_1_s", 0.04700435256861841},
+                           {"a_1_s2", 198.5933531214068},
+                           {"b_1_s", 27.4643366359153},
+                           {"l_m", 0.03246342464575608}});
+}
+
 TEST(Independent, AGapLayerThickerThanAirIsTold) {
   const data::Track track = track_of("air_force");
   data::Scene scene = scene_of("air_force");

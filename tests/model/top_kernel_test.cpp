@@ -12,7 +12,7 @@ namespace {
 
 /// A run of a random top with room for what it writes.
 struct Recorded {
-  std::vector<double> t_s, xy, columns[kTopLanes];
+  std::vector<double> t_s, xy, columns[kTopVariables];
   TopResult result;
 
   Recorded(InstructionSet set, TopRun run, int outputs) : xy(2 * outputs) {

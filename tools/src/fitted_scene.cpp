@@ -85,6 +85,11 @@ void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
     scene.model.drag_transverse_N_m_s = *gamma * *body.I_kg_m2;
   if (const auto gamma = value_of(fit, "gamma3_1_s", arc))
     scene.model.drag_spin_N_m_s = *gamma * *body.Is_kg_m2;
+  if (const auto dry = value_of(fit, "gamma3_dry_1_s2", arc))
+    scene.model.drag_spin_dry_N_m = *dry * *body.I_kg_m2;
+  if (const auto quadratic = value_of(fit, "gamma3_quadratic", arc))
+    scene.model.drag_spin_quadratic_N_m_s2 =
+        *quadratic * *body.Is_kg_m2 * *body.Is_kg_m2 / *body.I_kg_m2;
   Eigen::Vector3d pivot_m = scene.support.pivot_m.value_or(Eigen::Vector3d::Zero());
   pivot_m.x() = value_of(fit, "pivot_x_m", arc).value_or(pivot_m.x());
   pivot_m.y() = value_of(fit, "pivot_y_m", arc).value_or(pivot_m.y());

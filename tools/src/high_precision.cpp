@@ -76,12 +76,13 @@ std::optional<ReferenceRun> run_top(const data::Scene& scene) {
   const Real a = *body.mass_kg * Real(scene.model.gravity_m_s2) * l / I;
   const Real g1 = scene.model.drag_transverse_N_m_s.value_or(0.0) / I;
   const Real g3 = scene.model.drag_spin_N_m_s.value_or(0.0) / Is;
+  const Real quadratic = scene.model.drag_spin_quadratic_N_m_s2.value_or(0.0) * I / (Is * Is);
   const Real b = Is * Real(*scene.start.omega_s_rad_s) / I;
   const auto f = [=](Real, const RealVector<7>& y) {
     const V3 ell = y.head<3>(), k = y.segment<3>(3);
+    const Real lost = (g3 + quadratic * std::abs(y[6])) * y[6];
     RealVector<7> dy;
-    dy << a * V3::UnitZ().cross(k) - g1 * (ell - y[6] * k) - g3 * y[6] * k, ell.cross(k),
-        -g3 * y[6];
+    dy << a * V3::UnitZ().cross(k) - g1 * (ell - y[6] * k) - lost * k, ell.cross(k), -lost;
     return dy;
   };
   RealVector<7> y0;
@@ -207,7 +208,8 @@ std::optional<ReferenceRun> run_sliding(const data::Scene& scene) {
 
 bool has_unknown_terms(const data::ModelSettings& model) {
   return model.air_quadratic_N_m_s2 || model.air_force_N_s_m || model.gap_viscosity_Pa_s ||
-         model.rolling_friction_m || model.pivoting_friction_m || model.contour_friction_m;
+         model.rolling_friction_m || model.pivoting_friction_m || model.contour_friction_m ||
+         model.drag_spin_dry_N_m;  // where that stops the spin the motion is not smooth
 }
 
 }  // namespace

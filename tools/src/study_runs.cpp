@@ -31,7 +31,7 @@ bool loses_energy(const data::ModelSettings& model) {
   return model.air_linear_N_m_s || model.air_quadratic_N_m_s2 || model.air_force_N_s_m ||
          model.gap_viscosity_Pa_s || model.friction || model.rolling_friction_m ||
          model.pivoting_friction_m || model.contour_friction_m || model.drag_transverse_N_m_s ||
-         model.drag_spin_N_m_s;
+         model.drag_spin_N_m_s || model.drag_spin_dry_N_m || model.drag_spin_quadratic_N_m_s2;
 }
 
 std::optional<double> energy_drift(const data::Scene& scene, const model::Trajectory& run) {

@@ -56,6 +56,8 @@ struct ModelSettings {
   std::optional<double> couple_regularisation_rad_s;    ///< eps_omega
   std::optional<double> drag_transverse_N_m_s;          ///< c1 of the top
   std::optional<double> drag_spin_N_m_s;                ///< c3 of the top
+  std::optional<double> drag_spin_dry_N_m;              ///< t0 of the top
+  std::optional<double> drag_spin_quadratic_N_m_s2;     ///< q3 of the top
   std::optional<double> spin_down_dry_rad_s2;           ///< t0/C of the fixed-pivot disc
   std::optional<double> spin_down_weakening_s_rad;      ///< k: dry/(1 + k |w|)
   std::optional<double> spin_down_viscous_1_s;          ///< t1/C
