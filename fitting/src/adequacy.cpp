@@ -104,6 +104,7 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   constexpr double kFollowed_rad = 0.2;
   // Within 1 % of the motion, and not so far off that only the model can be to blame.
   constexpr double kFollowed = 1e-4, kAnyTracker = 8.0;
+  constexpr double kFine = 1.04;  // nobody asks whether the samples scatter as much
   int rows = 0;
   for (const ArcData& arc : problem.arcs)
     for (const Reading& reading : arc.readings)
@@ -116,7 +117,7 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
     const auto channel = static_cast<Channel>(c);
     double scatter = 1.0;
     for (const ArcData& arc : problem.arcs)
-      scatter = std::max(scatter, excess_scatter(arc, channel));
+      if (problem.noise_scale[c] > kFine) scatter = std::max(scatter, excess_scatter(arc, channel));
     double times = problem.noise_scale[c] / scatter;
     if (channel == Channel::position && path_followed) times = std::min(times, kHopeless);
     // Where the angle is all there is, being followed is not enough.

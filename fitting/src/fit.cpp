@@ -184,6 +184,7 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
 void heed_far_side(const Problem& problem, const Solution& solution, const FitOptions& options,
                    Uncertainty& error, data::Fit& fit) {
   constexpr double kWorthWords = 1.3;
+  if (problem.predictor->index_of("friction") < 0) return;
   if (!explains(problem, solution)) return;  // a bar about another path means nothing
   const auto far = far_side_of_friction(problem, solution, error, options.threads);
   if (!far) return;

@@ -56,24 +56,21 @@ class Follower {
   bool settled_ = false;
 };
 
-// Innovations of that filter, each over its standard deviation. @returns the logarithm of the
-// determinant of the correlation matrix.
-double filter(const NoiseKind& kind, const Eigen::MatrixXd& x, Eigen::MatrixXd& out) {
+// Innovations of that filter in place of series, one per row, time along the columns; each over its
+// standard deviation. @returns the logarithm of the determinant of the correlation matrix.
+double filter(const NoiseKind& kind, Eigen::MatrixXd& series) {
   using One = Follower<1>::Array;
   Follower<1> follower(One(kind.share), One(kind.rho));
   const double root = follower.root()[0];
-  // Column by column in memory, row by row in time: worked on transposed.
-  Eigen::MatrixXd rows = x.transpose();
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(x.cols());
-  for (Eigen::Index t = 0; t < rows.cols(); ++t) {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(series.rows());
+  for (Eigen::Index t = 0; t < series.cols(); ++t) {
     const double gain = follower.gain()[0];
-    auto row = rows.col(t);
-    row -= root * mean;
-    mean = kind.rho * (mean + gain * row);
-    row *= std::sqrt(follower.inverse()[0]);
+    auto now = series.col(t);
+    now -= root * mean;
+    mean = kind.rho * (mean + gain * now);
+    now *= std::sqrt(follower.inverse()[0]);
     follower.advance();
   }
-  out = rows.transpose();
   return follower.log_determinant()[0];
 }
 
@@ -82,22 +79,33 @@ struct Likelihood {
   double log_determinant = 0.0, squares = 0.0, left = 0.0;
 };
 
+// What the parameters take of the series of a group and, last, the residuals: one per row, as
+// filter() works on them.
+std::vector<Eigen::MatrixXd> rows_of(const NoiseGroup& group) {
+  std::vector<Eigen::MatrixXd> all;
+  for (const NoiseSeries& one : group) {
+    Eigen::MatrixXd rows(one.taken.cols() + 1, one.residual.size());
+    rows << one.taken.transpose(), one.residual.transpose();
+    all.push_back(std::move(rows));
+  }
+  return all;
+}
+
 // Restricted: what the parameters take is left out of account.
-void add(const NoiseGroup& group, const NoiseKind& kind, Likelihood& sum) {
-  const Eigen::Index taken = group.front().taken.cols();
+void add(const std::vector<Eigen::MatrixXd>& group, const NoiseKind& kind, Likelihood& sum) {
+  const Eigen::Index taken = group.front().rows() - 1;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(taken, taken);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(taken);
   Eigen::MatrixXd whitened;
-  for (const NoiseSeries& one : group) {
-    Eigen::MatrixXd both(one.residual.size(), taken + 1);
-    both.col(0) = one.residual;
-    both.rightCols(taken) = one.taken;
-    sum.log_determinant += filter(kind, both, whitened);
-    const auto w = whitened.rightCols(taken);
-    normal.noalias() += w.transpose() * w;
-    right.noalias() += w.transpose() * whitened.col(0);
-    sum.squares += whitened.col(0).squaredNorm();
-    sum.left += static_cast<double>(one.residual.size());
+  for (const Eigen::MatrixXd& rows : group) {
+    whitened = rows;
+    sum.log_determinant += filter(kind, whitened);
+    const auto w = whitened.topRows(taken);
+    const auto r = whitened.row(taken);
+    normal.noalias() += w * w.transpose();
+    right.noalias() += w * r.transpose();
+    sum.squares += r.squaredNorm();
+    sum.left += static_cast<double>(rows.cols());
   }
   if (taken == 0) return;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(normal);
@@ -148,9 +156,10 @@ std::vector<double> plain_surprises(const std::vector<NoiseGroup>& groups,
   return surprises;
 }
 
-double restricted_surprise(const std::vector<NoiseGroup>& groups, NoiseKind& kind) {
+double restricted_surprise(const std::vector<std::vector<Eigen::MatrixXd>>& groups,
+                           NoiseKind& kind) {
   Likelihood sum;
-  for (const NoiseGroup& group : groups) add(group, kind, sum);
+  for (const auto& group : groups) add(group, kind, sum);
   return surprise(sum, kind.variance);
 }
 
@@ -191,12 +200,18 @@ NoiseEvidence noise_evidence(const std::vector<NoiseGroup>& groups) {
   std::vector<NoiseKind> kinds = candidates(longest);
   std::vector<double> surprises = plain_surprises(groups, kinds);
   const double plain = *std::min_element(surprises.begin(), surprises.end());
-  // The parameters' part of the likelihood is worth some logarithms each: where the plain one is
-  // far beyond those, the plain one says enough.
-  const double far = 30.0 + 8.0 * static_cast<double>(taken);
-  for (std::size_t i = 0; i < kinds.size(); ++i)
-    surprises[i] = surprises[i] > plain + far ? std::numeric_limits<double>::infinity()
-                                              : restricted_surprise(groups, kinds[i]);
+  std::vector<std::vector<Eigen::MatrixXd>> rows_of_all;
+  for (const NoiseGroup& group : groups) rows_of_all.push_back(rows_of(group));
+  // The parameters' part of the likelihood is worth, for each of them, the logarithm of how much
+  // more noise there is at its frequencies, at most the inflation, and a little for what they would
+  // rather follow of such noise: where the plain one is far beyond that, it says enough.
+  constexpr double kFar = 30.0, kRather = 2.0;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const double of_each = kRather + std::log(kinds[i].inflation());
+    surprises[i] = surprises[i] > plain + kFar + of_each * static_cast<double>(taken)
+                       ? std::numeric_limits<double>::infinity()
+                       : restricted_surprise(rows_of_all, kinds[i]);
+  }
   const double least = *std::min_element(surprises.begin(), surprises.end());
   for (std::size_t i = 0; i < kinds.size(); ++i)
     kinds[i].belief *= std::exp(-0.5 * (surprises[i] - least));
@@ -225,9 +240,9 @@ Eigen::MatrixXd seen_through(const NoiseKind& kind, const Eigen::MatrixXd& x) {
 }
 
 Eigen::MatrixXd decorrelated(const NoiseKind& kind, const Eigen::MatrixXd& x) {
-  Eigen::MatrixXd out;
-  filter(kind, x, out);
-  return out;
+  Eigen::MatrixXd series = x.transpose();
+  filter(kind, series);
+  return series.transpose();
 }
 
 }  // namespace trochoid::fitting
