@@ -354,6 +354,24 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   accept(problem, solution, error, worst, lost, fit);
 }
 
+void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  constexpr double kByChance = 1e-6, kNotWhite = 0.01;
+  // Rendered recordings of rolling rings and discs came to 7.
+  constexpr double kOfATracker = 20.0;
+  const Drift& drift = error.drift;
+  const bool passed =
+      fit.verdict == "good" || fit.verdict == "good_correlated" || fit.verdict == "weak";
+  if (!passed || error.whiteness.p_value > kNotWhite) return;
+  if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
+  if (is_tracked(problem) && drift.gain < kOfATracker) return;
+  fit.verdict = "doubtful";
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain it: the second half asks for other "
+      "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
+      "model lacks something, and the error bars are too small",
+      drift.gain);
+}
+
 bool explains(const Problem& problem, const Solution& solution) {
   const Squares sum = squares(problem, solution);
   return explains_path(sum) && misfit(problem, sum).times <= kDoubtful;

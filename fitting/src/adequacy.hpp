@@ -26,7 +26,8 @@ struct Squares {
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
 ///   doubtful         followed, but residuals are beyond 2 times those measures, or a
-///                    hundredth of the positions, three at least, given up
+///                    hundredth of the positions, three at least, given up, or
+///                    doubt_if_drifting() says so
 ///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
@@ -36,6 +37,12 @@ struct Squares {
 /// scatter.
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
+
+/// Lowers a verdict of what is explained to doubtful where the second half of the record asks for
+/// other parameters than the first, its noise allowed for: the model then lacks something that the
+/// parameters stand in for, and their error bars do not know of it. A tracker's errors go with the
+/// motion a little, too: of filmed positions more is asked.
+void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit);
 
 /// Whether a path is neither unexplained nor doubtful for its residuals.
 [[nodiscard]] bool explains(const Problem& problem, const Solution& solution);

@@ -604,7 +604,10 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
       result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
     }
   }
-  if (result.fit.converged) allow_for_rivals(rungs, *chosen, result.fit);
+  if (result.fit.converged) {
+    allow_for_rivals(rungs, *chosen, result.fit);
+    doubt_if_drifting(tracks, *chosen, plain, result.fit);
+  }
   result.fit.comparison = table_of(rungs, chosen);
   result.fit.recommendation = sentence(rungs, *chosen, ladder);
   return result;

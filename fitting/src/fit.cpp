@@ -280,9 +280,13 @@ void give_friction_a_start(data::Scene& scene) {
 
 using FirstPart = std::map<std::string, double>;
 
+/// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
+/// has its own doubts.
+enum class Word { last, one_of_several };
+
 data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
                    const std::vector<Relative>& relatives, const data::Scene& given_scene,
-                   const FitOptions& options, Bars bars = Bars::full,
+                   const FitOptions& options, Word word, Bars bars = Bars::full,
                    FirstPart* first_part = nullptr) {
   if (tracks.empty()) throw TrackError("no track to fit");
   data::Scene scene = given_scene;
@@ -327,6 +331,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
   heed_pivot(problem, scene, fit);
   describe(problem, solution, error, scene, fit);
   judge(problem, solution, error, found.cut_short, fit);
+  if (word == Word::last) doubt_if_drifting(problem, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
     fit.converged = false;
     fit.outcome = fit.verdict = "unexplained";
@@ -355,15 +360,15 @@ void check_given_start(const FitOptions& options, const model::Predictor& predic
 }
 
 data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predictor& predictor,
-                        const data::Scene& scene, const FitOptions& options, Bars bars = Bars::full,
-                        FirstPart* first_part = nullptr) {
+                        const data::Scene& scene, const FitOptions& options, Word word,
+                        Bars bars = Bars::full, FirstPart* first_part = nullptr) {
   const auto relatives = relatives_of(scene);
   std::vector<Relative> plain;
   for (const OwnedRelative& owned : relatives) {
     plain.push_back({owned.model.get(), {}});
     for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
   }
-  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, bars, first_part);
+  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, word, bars, first_part);
   tell_idle_terms(scene, fit);
   return fit;
 }
@@ -394,7 +399,7 @@ void check_first_guess(const std::map<std::string, double>& guess, const std::st
 data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
               const data::Scene& scene, const FitOptions& options) {
   check_given_start(options, predictor, scene);
-  return fit_with(tracks, predictor, {}, scene, options);
+  return fit_with(tracks, predictor, {}, scene, options, Word::last);
 }
 
 data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
@@ -402,13 +407,14 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
   const data::Scene scene = completed(given, options);
   const auto predictor = model::make_predictor(scene);
   check_given_start(options, *predictor, scene);
-  return fit_completed(tracks, *predictor, scene, options);
+  return fit_completed(tracks, *predictor, scene, options, Word::last);
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
                              const FitOptions& options, Bars bars, FirstPart* first_part) {
   const data::Scene scene = completed(given, options);
-  return fit_completed(tracks, *model::make_predictor(scene), scene, options, bars, first_part);
+  return fit_completed(tracks, *model::make_predictor(scene), scene, options, Word::one_of_several,
+                       bars, first_part);
 }
 
 }  // namespace trochoid::fitting

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "adequacy.hpp"
 #include "first_guess.hpp"
 #include "linearise.hpp"
 #include "observed.hpp"
@@ -121,6 +122,12 @@ double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
   const Minimum at(tracks, scene, options);
   const double widened = uncertainty(at.problem, at.u).widened;
   return widened * widened;
+}
+
+void doubt_if_drifting(std::span<const data::Track> tracks, const data::Scene& scene,
+                       const FitOptions& options, data::Fit& fit) {
+  const Minimum at(tracks, scene, options);
+  doubt_if_drifting(at.problem, uncertainty(at.problem, at.u), fit);
 }
 
 }  // namespace trochoid::fitting

@@ -40,4 +40,8 @@ struct Promise {
 [[nodiscard]] double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
                               const FitOptions& options);
 
+/// doubt_if_drifting() for a fit whose values `options.start` holds.
+void doubt_if_drifting(std::span<const data::Track> tracks, const data::Scene& scene,
+                       const FitOptions& options, data::Fit& fit);
+
 }  // namespace trochoid::fitting

@@ -191,7 +191,7 @@ constexpr std::pair<const char*, double> kSpinDrags[] = {
 
 // Typical size of a parameter beside known values: drags slow the spin at like rates.
 double typical_size(const model::ParameterInfo& info, const Values& known) {
-  constexpr double kTypical_1_s = 0.1;
+  constexpr double kTypical_1_s = 5e-4;  // a little of it turns no mark astray
   const auto spin = known.find("b_1_s");
   if (spin == known.end() || spin->second == 0.0) return info.value;
   for (const auto& [name, power] : kSpinDrags)
@@ -320,6 +320,17 @@ std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung&
   } catch (const NumericalError&) {
   }
   return std::nullopt;
+}
+
+void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
+                       const FitOptions& options, data::Fit& fit) {
+  if (!(fit.whiteness_p < kWhite)) return;
+  FitOptions at = options;
+  at.start = values_of_all_arcs(rung.fit);
+  try {
+    doubt_if_drifting(tracks, rung.scene, at, fit);
+  } catch (const NumericalError&) {  // integrated as coarsely as a search does
+  }
 }
 
 double dilution(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options) {

@@ -76,6 +76,11 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
                                               const Rung& larger,
                                               const std::map<int, std::set<std::string>>& others);
 
+/// Doubts a fit of a rung's scene where halves of the record ask for different parameters
+/// (adequacy.hpp). Rungs are compared without that: there it is further terms that take it away.
+void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
+                       const FitOptions& options, data::Fit& fit);
+
 /// How many times less than its change a rung's chi-square tells, for what its residuals have in
 /// common.
 [[nodiscard]] double dilution(std::span<const data::Track> tracks, const Rung& known,

@@ -162,6 +162,7 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
   Noise found;
   const Eigen::MatrixXd unit_steps = seen.axes * seen.inverse.asDiagonal();
   result.whiteness = {};
+  result.drift = {};
   result.surprise = 0.0;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
@@ -176,6 +177,8 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
     if (one.inflation > 1.0)
       for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
         found.offsets.push_back(common_offset(problem, all, channel, axis));
+    if (found.channels.back().drift.gain > result.drift.gain)
+      result.drift = found.channels.back().drift;
     result.whiteness.p_value = std::min(result.whiteness.p_value, one.p_value);
     if (one.inflation > result.whiteness.inflation) {
       result.whiteness.inflation = one.inflation;

@@ -19,6 +19,7 @@ struct Uncertainty {
   double condition = 0.0;
   std::vector<data::NullVector> null_vectors;
   Whiteness whiteness;  ///< of the worst channel
+  Drift drift;          ///< likewise
   /// Times the error bars are wider than those of independent residuals, typically.
   double widened = 1.0;
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,

@@ -1,5 +1,6 @@
 #include "whiteness.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -153,6 +154,53 @@ double excess_of(const NoiseKind& kind, const std::vector<NoiseGroup>& groups) {
   return most;
 }
 
+// Normal equations of the first or the second half of a group's series.
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+  Normal(const Leftover& left, bool late)
+      : matrix(Eigen::MatrixXd::Zero(left.taken[0].cols(), left.taken[0].cols())),
+        right(Eigen::VectorXd::Zero(left.taken[0].cols())) {
+    for (std::size_t i = 0; i < left.taken.size(); ++i) {
+      const Eigen::Index n = left.residuals[i].size(), half = n / 2;
+      const auto w = left.taken[i].middleRows(late ? half : 0, late ? n - half : half);
+      matrix += w.transpose() * w;
+      right += w.transpose() * left.residuals[i].segment(late ? half : 0, late ? n - half : half);
+    }
+  }
+  // What chi-square loses by the best change of the parameters, and by how many of them.
+  [[nodiscard]] std::pair<double, int> gain() const {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(matrix);
+    const double least = 1e-9 * axes.eigenvalues().maxCoeff();
+    std::pair<double, int> sum;
+    for (Eigen::Index i = 0; i < right.size(); ++i) {
+      if (!(axes.eigenvalues()[i] > least)) continue;
+      const double along = axes.eigenvectors().col(i).dot(right);
+      sum.first += along * along / axes.eigenvalues()[i];
+      ++sum.second;
+    }
+    return sum;
+  }
+};
+
+// The likeliest correlation is taken out first.
+Drift drift_of(const NoiseKind& kind, const std::vector<NoiseGroup>& groups) {
+  double gained = 0.0, squares = 0.0, rows = 0.0, parameters = 0.0;
+  for (const NoiseGroup& group : groups) {
+    if (group.front().taken.cols() == 0) continue;
+    const Leftover left = leftover(kind, group);
+    const auto early = Normal(left, false).gain(), late = Normal(left, true).gain();
+    gained += early.first + late.first;
+    parameters += early.second + late.second - static_cast<double>(left.taken[0].cols());
+    for (const Eigen::VectorXd& residual : left.residuals) {
+      squares += residual.squaredNorm();
+      rows += static_cast<double>(residual.size());
+    }
+  }
+  if (!(parameters > 0.0) || !(squares > gained) || rows <= 2.0 * parameters) return {};
+  return {gained / parameters * (rows - 2.0 * parameters) / (squares - gained), parameters};
+}
+
 double step_s(const Problem& problem) {
   double duration_s = 0.0, steps = 0.0;
   for (const ArcData& arc : problem.arcs) {
@@ -178,7 +226,9 @@ ChannelNoise channel_noise(const Problem& problem, const Linearised& all, Channe
     groups.push_back(std::move(group));
   }
   const NoiseEvidence evidence = noise_evidence(groups);
-  ChannelNoise noise{channel, {}, evidence.kinds};
+  ChannelNoise noise;
+  noise.channel = channel;
+  noise.kinds = evidence.kinds;
   noise.surprise = evidence.surprise;
   noise.whiteness.p_value = plain.p_value();
   double white = 0.0, inflation = 0.0;
@@ -190,6 +240,7 @@ ChannelNoise channel_noise(const Problem& problem, const Linearised& all, Channe
       *std::max_element(noise.kinds.begin(), noise.kinds.end(),
                         [](const NoiseKind& a, const NoiseKind& b) { return a.belief < b.belief; });
   noise.excess = excess_of(likeliest, groups);
+  noise.drift = drift_of(likeliest, groups);
   if (white > kCorrelated && noise.excess == 1.0) {
     noise.kinds = {NoiseKind{}};
     return noise;

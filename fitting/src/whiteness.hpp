@@ -19,6 +19,14 @@ struct Whiteness {
   double correlation_time_s = 0.0;
 };
 
+/// By how much of its noise chi-square would fall, per parameter, if each arc's second half had
+/// parameters of its own (Chow, Econometrica 28, 591, 1960): 1 +- sqrt(2/parameters) where the
+/// model is right.
+struct Drift {
+  double gain = 1.0;
+  double parameters = 0.0;  ///< 0: nothing to tell from
+};
+
 /// The same in full.
 struct ChannelNoise {
   Channel channel = Channel::position;
@@ -27,6 +35,7 @@ struct ChannelNoise {
   /// Factor of the variance for what hangs together otherwise, say swings.
   double excess = 1.0;
   double surprise = 0.0;  ///< as in NoiseEvidence
+  Drift drift;
 };
 /// The kinds of noise are those of all arcs together: one tracker made them.
 /// @param scaled     derivatives of all residuals, `all.jacobian` up to the scale of its columns.
