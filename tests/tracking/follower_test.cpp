@@ -77,6 +77,20 @@ class SmearedDisc : public testing::Test {
   std::mt19937 random_{5};
 };
 
+// One sighting tells no speed, and the first picture after it no less far than it goes.
+TEST_F(SmearedDisc, IsFoundAgainAFrameAfterItWasFirstSeenHoweverFastItGoes) {
+  constexpr double kGone_px = 1.7 * kRadius_px;
+  const Eigen::Vector2d at(60.0, 80.0), gone_to = at + kGone_px * Eigen::Vector2d(1.0, 0.1);
+  const Frame first = frame(0, 0.3, at), second = frame(1, 0.3 + kPerFrame_rad, gone_to);
+  const auto one = seen_in(first, 0.3, at);
+  ASSERT_TRUE(one);
+  Follower follower(*finder_, background_, nullptr);
+  follower.start(first, *one);
+  const auto again = follower.follow(second);
+  ASSERT_TRUE(again);
+  EXPECT_LT((again->centre_px - gone_to).norm(), 2.0);
+}
+
 // After a knock it is neither where nor how any guess has it, and a look at one picture alone takes
 // it for still.
 TEST_F(SmearedDisc, IsFoundAgainAfterAKnock) {

@@ -199,7 +199,11 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
   // has been faint for as long may be what hides it, left behind in its place.
   const int astray = std::max(lost_, faint_);
   const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
-  const double gate = astray > 30 ? 1e9 : 0.5 * size + 0.5 * speed + 0.25 * size * astray;
+  // Of a body seen once the speed is not known; one that rolls goes its size in a frame or two.
+  constexpr double kUnknown = 2.0;
+  const double reach = forecast_.knows_speed() ? 0.5 * size + 0.5 * speed + 0.25 * size * astray
+                                               : kUnknown * size * (1.0 + astray);
+  const double gate = astray > 30 ? 1e9 : reach;
   cv::Rect box = gate > 1e8 ? cv::Rect({}, frame.luma.size())
                             : box_around(predicted.centre_px, gate + 2.2 * size, frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
