@@ -35,6 +35,22 @@ TEST_F(Neighbours, ALostFrameIsSoughtWhereItsNeighboursPutIt) {
   EXPECT_NEAR(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn), 0.0, 0.01);
 }
 
+TEST_F(Neighbours, ABodyThatRunsInACircleIsExpectedOnIt) {
+  constexpr double kCircle_m = 0.02, kTurn_rad_s = 25.0;  // a quarter of a turn over a lost frame
+  const auto centre_at = [](double t_s) {
+    return Eigen::Vector3d(kCircle_m * std::cos(kTurn_rad_s * t_s),
+                           kCircle_m * std::sin(kTurn_rad_s * t_s), 0.01);
+  };
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses) g.seen->pose->pose.centre_m = centre_at(g.frame->t_s);
+  glimpses[30].seen.reset();
+  mend_from_neighbours(background_, oracle, glimpses);
+  ASSERT_TRUE(glimpses[30].seen);
+  // The chord's middle lies 0.09 radii inside.
+  EXPECT_LT((glimpses[30].pose().centre_m - centre_at(0.5)).norm(), 0.02 * kCircle_m);
+}
+
 TEST_F(Neighbours, ALongGapIsClosedFromItsEnds) {
   // Found only where it is looked for.
   class Narrow final : public Oracle {
@@ -68,6 +84,20 @@ TEST_F(Neighbours, WrongFramesSideBySideAreOutvotedByThoseAround) {
     EXPECT_NEAR(std::remainder(glimpses[i].pose().phi_rad - phi_at(frames_[i].t_s), kTurn), 0.0,
                 0.01)
         << i;
+}
+
+// A fortieth of a turn would be nothing beside neighbours that scatter; these do not.
+TEST_F(Neighbours, OnASmoothPathLittleIsAContradiction) {
+  constexpr double kOff_rad = 0.025 * kTurn;
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  glimpses[30].seen->pose->pose.phi_rad += kOff_rad;
+  mend_from_neighbours(background_, oracle, glimpses);
+  EXPECT_NEAR(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn), 0.0, 0.01);
+  const StubbornOracle stubborn(30, phi_at(0.5) + kOff_rad);
+  glimpses = tracked(stubborn, [](int) { return false; });
+  doubt_what_is_contradicted(stubborn, glimpses);
+  EXPECT_TRUE(glimpses[30].seen->attitude_doubtful);
 }
 
 TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {

@@ -34,9 +34,14 @@ struct Neighbours {
     const double ta = a.frame->t_s, tb = b.frame->t_s, share = (t_s - ta) / (tb - ta);
     Pose pose = a.pose();
     const Pose& to = poses[static_cast<std::size_t>(&before != &a) + 1];
-    pose.centre_m += share * (to.centre_m - pose.centre_m);
+    std::vector<Eigen::Vector3d> centres;
     std::vector<Eigen::Vector2d> level;  // parts of the axis
-    for (const Pose& p : poses) level.emplace_back(axis_of(p).head<2>());
+    for (const Pose& p : poses) {
+      centres.push_back(p.centre_m);
+      level.emplace_back(axis_of(p).head<2>());
+    }
+    // Whatever rolls on its rim runs in circles: a chord would lead inside.
+    pose.centre_m = through(times, centres, t_s);
     const bool upright = axis_of(pose).z() >= 0.0;
     const double early = rate_between(before, a, alike), late = rate_between(b, after, alike);
     const bool slow = std::max(std::abs(early), std::abs(late)) * frame_s() < kSlowTurn_rad;
@@ -127,9 +132,10 @@ struct Expected {
   double spread_rad = 0.0;  ///< by how much the frames around usually differ on it
 
   /// Whether they cannot all be wrong about what was seen this far off.
-  [[nodiscard]] bool contradicts(double off_rad) const {
-    constexpr double kLeast = 0.2, kSpreads = 2.0;
-    return off_rad >= kLeast + kSpreads * spread_rad;
+  /// @param least_rad no contradiction if they agree perfectly.
+  [[nodiscard]] bool contradicts(double off_rad, double least_rad) const {
+    constexpr double kSpreads = 2.0;
+    return off_rad >= least_rad + kSpreads * spread_rad;
   }
 };
 
@@ -188,10 +194,43 @@ std::optional<Expected> expected_at(const BodyFinder& finder, const std::vector<
     if (sum >= least) continue;
     best = k, least = sum, spread = apart.empty() ? 0.0 : data::median(apart);
   }
+  // Of those that agree the nearest in time knows best.
+  for (std::size_t k = 0; k < best; ++k)
+    if (off_rad(said[k], said[best], alike) <= spread) best = k;
   const Neighbours& pair = pairs[best];
   return Expected{said[best], pair.at(t_s - pair.frame_s(), alike),
                   between_axes(axis_of(pair.a.pose()), axis_of(pair.b.pose()), alike), spread};
 }
+
+/// How far the frames of a recording usually are from what those around them expect: where that is
+/// little, less is a contradiction.
+class Usual {
+ public:
+  Usual(const BodyFinder& finder, const std::vector<Glimpse>& glimpses) {
+    const std::vector<bool> none(glimpses.size(), false);
+    std::vector<double> off;
+    for (std::size_t i = 0; i < glimpses.size(); ++i) {
+      if (!glimpses[i].posed()) continue;
+      if (const auto expected = expected_at(finder, glimpses, i, none))
+        off.push_back(off_rad(*glimpses[i].seen, expected->seen, finder.faces_look_alike()));
+    }
+    if (!off.empty()) off_rad_ = data::median(std::move(off));
+  }
+  /// What may be wrong by more is looked into.
+  [[nodiscard]] double suspicious_rad() const {
+    constexpr double kUsuals = 5.0, kLeast_rad = 0.04;
+    return std::clamp(kUsuals * off_rad_, kLeast_rad, kMost_rad);
+  }
+  [[nodiscard]] double scatter_rad() const {
+    constexpr double kUsuals = 4.0, kLeast_rad = 0.03, kMostScatter_rad = 0.15;
+    return std::clamp(kUsuals * off_rad_, kLeast_rad, kMostScatter_rad);
+  }
+  /// What is wrong by more is so in any recording.
+  static constexpr double kMost_rad = 0.2;
+
+ private:
+  double off_rad_ = kMost_rad;
+};
 
 /// Where a body would have been one frame before `pose`, moving as between its neighbours.
 Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
@@ -234,11 +273,15 @@ std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::
 class Mending {
  public:
   Mending(const BodyFinder& finder, const std::vector<Glimpse>& was)
-      : finder_(finder), was_(was), poor_(poor_fits(was)), none_(was.size(), false) {
+      : finder_(finder),
+        was_(was),
+        poor_(poor_fits(was)),
+        none_(was.size(), false),
+        usual_(finder, was) {
     std::vector<double> worths;
     for (const Glimpse& g : was)
       if (g.posed()) worths.push_back(worth(*g.seen));
-    usual_ = data::median(worths);
+    usual_worth_ = data::median(worths);
   }
 
   [[nodiscard]] std::optional<Sighting> operator()(Measuring& measure, std::size_t i) const {
@@ -261,9 +304,9 @@ class Mending {
   };
 
   /// How likely a sighting is: by what speaks for it, and by how far it is from what is expected.
-  [[nodiscard]] static double likelihood(const Sighting& seen, double off_rad,
-                                         const Expected& expected) {
-    const double usual = 0.15 + expected.spread_rad, off = off_rad / usual;
+  [[nodiscard]] double likelihood(const Sighting& seen, double off_rad,
+                                  const Expected& expected) const {
+    const double off = off_rad / (usual_.scatter_rad() + expected.spread_rad);
     return worth(seen) / (1.0 + off * off);
   }
 
@@ -273,14 +316,14 @@ class Mending {
     const auto& before = was_[i].seen;
     const bool alike = finder_.faces_look_alike();
     const double off = before ? off_rad(*before, expected.seen, alike) : 0.0;
-    if (before && !expected.contradicts(off) && !poor_[i]) return {};
+    if (before && !expected.contradicts(off, usual_.suspicious_rad()) && !poor_[i]) return {};
     auto seen = measure(*was_[i].frame, expected.seen, expected.earlier);
     if (!seen || !seen->pose) return {};
     const double now_off = off_rad(*seen, expected.seen, alike);
-    if (expected.contradicts(now_off)) return {};
+    if (expected.contradicts(now_off, Usual::kMost_rad)) return {};
     const double now = likelihood(*seen, now_off, expected);
     if (!before) {
-      if (worth(*seen) < kUsualShare * usual_) return {};
+      if (worth(*seen) < kUsualShare * usual_worth_) return {};
       return {std::move(seen), now};
     }
     const double gain = now / likelihood(*before, off, expected);
@@ -292,7 +335,8 @@ class Mending {
   const BodyFinder& finder_;
   const std::vector<Glimpse>& was_;
   std::vector<bool> poor_, none_;
-  double usual_ = 0.0;  ///< worth of a sighting
+  Usual usual_;
+  double usual_worth_ = 0.0;  ///< of a sighting
 };
 
 /// Value at time 0 of the parabola that fits values at these times best.
@@ -495,8 +539,9 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
   constexpr double kPoorOff_rad = 0.1;
   const std::vector<Glimpse> was = glimpses;
   const std::vector<bool> poor = poor_fits(was), none(was.size(), false);
+  const double suspicious_rad = Usual(finder, was).suspicious_rad();
   for (std::size_t i = 0; i < was.size(); ++i) {
-    if (!was[i].posed() || was[i].seen->attitude_doubtful) continue;
+    if (!was[i].posed()) continue;
     std::optional<Expected> nearest;
     double least_rad = std::numeric_limits<double>::infinity();
     bool doubted = true;
@@ -504,7 +549,8 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
       auto expected = expected_at(finder, was, i, but);
       if (!expected) continue;
       const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
-      doubted = doubted && (expected->contradicts(off) || (poor[i] && off > kPoorOff_rad));
+      doubted = doubted &&
+                (expected->contradicts(off, suspicious_rad) || (poor[i] && off > kPoorOff_rad));
       if (off < least_rad) least_rad = off, nearest = std::move(expected);
     }
     if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);
