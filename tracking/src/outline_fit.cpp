@@ -109,7 +109,8 @@ double steepest_alike(const data::Body& body) {
 // Where several attitudes explain a picture about as well, the one chosen is no better known than
 // they are apart.
 void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
-  constexpr double kAsGood = 0.97;
+  constexpr double kAsGood =
+      0.9;  // from start to start the evidence of one attitude differs so much
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(motion.count(), motion.count());
   double count = 1.0;
   for (const Fitted& other : others) {
