@@ -43,7 +43,7 @@ std::string one_line(std::string_view text, std::size_t limit) {
 }
 
 std::string in_quotes(std::string_view text) {
-  return "'" + one_line(text, 40) + "'";
+  return fmt::format("'{}'", one_line(text, 40));
 }
 
 namespace {

@@ -67,7 +67,8 @@ double filter(const NoiseKind& kind, Eigen::MatrixXd& series) {
     const double gain = follower.gain()[0];
     auto now = series.col(t);
     now -= root * mean;
-    mean = kind.rho * (mean + gain * now);
+    mean += gain * now;
+    mean *= kind.rho;
     now *= std::sqrt(follower.inverse()[0]);
     follower.advance();
   }
