@@ -100,6 +100,18 @@ TEST_F(Neighbours, OnASmoothPathLittleIsAContradiction) {
   EXPECT_TRUE(glimpses[30].seen->attitude_doubtful);
 }
 
+// Knocked, it goes on otherwise at once: none of the frames around can know.
+TEST_F(Neighbours, AKnockOnASmoothPathIsNoContradiction) {
+  constexpr double kKnock_s = 0.5, kBack_rad_s = -6.0;
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses)
+    if (const double since_s = g.frame->t_s - kKnock_s; since_s > 0.0)
+      g.seen->pose->pose.phi_rad = phi_at(kKnock_s) + kBack_rad_s * since_s;
+  doubt_what_is_contradicted(oracle, glimpses);
+  for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful) << g.frame->index;
+}
+
 TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {
   const double wrong_rad = phi_at(0.5) + 1.2;
   const StubbornOracle oracle(30, wrong_rad);

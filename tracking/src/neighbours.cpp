@@ -465,6 +465,18 @@ class Branch {
   std::size_t kept_ = 0;  ///< frames of the branch up to the best
 };
 
+/// Whether the frames right before frame i or those right after it lead to what was seen in it: it
+/// may be where the body was knocked, which none on the other side can know.
+bool is_led_to(const BodyFinder& finder, const std::vector<Glimpse>& glimpses, std::size_t i,
+               double within_rad) {
+  const auto leads = [&](int side) {
+    const auto expected = led_to(finder, glimpses, i, side);
+    return expected &&
+           off_rad(*glimpses[i].seen, *expected, finder.faces_look_alike()) < within_rad;
+  };
+  return leads(1) || leads(-1);
+}
+
 /// What the frames around still contradict may be where they say instead: its covariance holds
 /// both.
 void doubt(const Expected& expected, Sighting& seen) {
@@ -549,8 +561,10 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
       auto expected = expected_at(finder, was, i, but);
       if (!expected) continue;
       const double off = off_rad(*was[i].seen, expected->seen, finder.faces_look_alike());
-      doubted = doubted &&
-                (expected->contradicts(off, suspicious_rad) || (poor[i] && off > kPoorOff_rad));
+      const bool suspicious =
+          expected->contradicts(off, suspicious_rad) && !is_led_to(finder, was, i, suspicious_rad);
+      doubted = doubted && (suspicious || expected->contradicts(off, Usual::kMost_rad) ||
+                            (poor[i] && off > kPoorOff_rad));
       if (off < least_rad) least_rad = off, nearest = std::move(expected);
     }
     if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);

@@ -109,8 +109,8 @@ double steepest_alike(const data::Body& body) {
 // Where several attitudes explain a picture about as well, the one chosen is no better known than
 // they are apart.
 void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
-  constexpr double kAsGood =
-      0.9;  // from start to start the evidence of one attitude differs so much
+  // From start to start the evidence of one attitude differs by up to a tenth.
+  constexpr double kAsGood = 0.9;
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(motion.count(), motion.count());
   double count = 1.0;
   for (const Fitted& other : others) {
@@ -119,9 +119,8 @@ void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fi
     square += off * off.transpose();
     count += 1.0;
   }
-  if (chosen.attitudes.size() == 0)
-    chosen.attitudes = Eigen::MatrixXd::Zero(square.rows(), square.cols());
-  chosen.attitudes += square / count;
+  if (chosen.attitudes.size() > 0) square += count * chosen.attitudes;
+  chosen.attitudes = square / count;
 }
 
 // How well the pose that was chosen is known.
@@ -204,7 +203,8 @@ void allow_for_hidden_wall(const Scenery& scenery, Fitted& fitted) {
 // What was outlined may be the face alone, in the light beside a wall in the shade: the body seems
 // too small then, or the edges of its wall are missing. A pose for which clearly more speaks, or
 // about as much while the body has its size, is the better one, though the outer edges of the wall
-// are less clear than those of the face. Seen from aside, wall and face are too different for that.
+// are less clear than those of the face. Seen from aside, wall and face are too different for that:
+// what seems too small there keeps its place, with error bars that hold the other.
 std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted> fitted) {
   constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85, kBetter = 1.15;
   constexpr double kFewEdges = 1.05, kLeastFacing = 0.75;
@@ -213,9 +213,9 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
   const bool too_small = seen_px < -kTooSmallPx;
   if (!too_small && fitted->evidence > kFewEdges * outline_px) return fitted;
   std::optional<Fitted> best;
-  const bool told = facing(scenery.camera, fitted->refined.pose) >= kLeastFacing;
+  const bool from_above = facing(scenery.camera, fitted->refined.pose) >= kLeastFacing;
   for (const Side side : {Side::same, Side::mirrored}) {
-    if (!told || (side == Side::mirrored && scenery.motion.pivoted())) break;
+    if (!from_above || (side == Side::mirrored && scenery.motion.pivoted())) break;
     const auto start = face_outlined_like(scenery.body, scenery.camera, scenery.motion,
                                           fitted->refined.pose, side);
     if (!start) continue;
