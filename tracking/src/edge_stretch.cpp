@@ -294,7 +294,7 @@ void Fitting::widen(double step) {
 // are in the end.
 double Fitting::find_shadings(const std::vector<double>& noise2, int rounds,
                               std::optional<double> wider_px) {
-  constexpr double kLittle = 0.02;  // of the largest variance
+  constexpr double kLittle = 0.03;  // of the largest variance
   const auto take = [&](const std::vector<ShadingEstimate>& estimates) {
     for (size_t i = 0; i < looks_.size(); ++i)
       if (looks_[i].usable) set_shading(estimates[i], looks_[i]);

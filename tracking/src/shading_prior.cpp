@@ -94,7 +94,7 @@ std::vector<ShadingEstimate> shadings_given(const std::vector<ShadingEvidence>& 
   const std::vector<Shading> nothing;
   return Looks(looks, nothing)
       .estimates(std::vector<Shading>(looks.size(), Shading::Constant(variance)),
-                 std::vector<double>(looks.size(), kLeastVariance));
+                 std::vector<double>(looks.size(), 0.0));
 }
 
 std::vector<ShadingEstimate> estimate_shadings(const std::vector<ShadingEvidence>& looks,
