@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -147,13 +148,14 @@ TopSettings top_for_simulation(const data::Scene& scene) {
 }
 
 double spin_lasts_s(double b_1_s, double dry_1_s2, double gamma3_1_s, double quadratic) {
-  if (!(dry_1_s2 > 0.0)) return std::numeric_limits<double>::infinity();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!(dry_1_s2 > 0.0)) return kInfinity;
   // b = N/M with N' = -dry M - gamma3 N and M' = quadratic N, both linear: N, and with it the spin,
   // is zero where tanh(root t)/root equals this.
   const double spin = std::abs(b_1_s);
   const double length = spin / (dry_1_s2 + 0.5 * gamma3_1_s * spin);
   const double root2 = 0.25 * gamma3_1_s * gamma3_1_s - dry_1_s2 * quadratic;
-  const double x = std::sqrt(std::abs(root2)) * length;
+  const double x = std::min(std::sqrt(std::abs(root2)) * length, root2 > 0.0 ? 1.0 : kInfinity);
   constexpr double kSeries = 1e-4;  // next term x^4/5
   if (x < kSeries) return length * (1.0 + root2 * length * length / 3.0);
   return length * (root2 > 0.0 ? std::atanh(x) : std::atan(x)) / x;

@@ -187,6 +187,28 @@ TEST(TopSpinDrag, ASpinLastsAsLongAsItsLossesAllow) {
   }
   EXPECT_EQ(spin_lasts_s(kSpin, 0.0, 0.1, 0.1), INFINITY);
   EXPECT_EQ(spin_lasts_s(0.0, 1.0, 0.1, 0.1), 0.0);
+  // So little dry drag that tanh(root t) rounds to more than 1.
+  EXPECT_GT(spin_lasts_s(kSpin, 1e-30, 0.47, 0.0), 100.0);
+}
+
+// A spin so small that it is gone within rounding of the first sample's time is no spin: dry drag
+// that went on would turn the top the other way round.
+TEST(TopSpinDrag, HoldsASpinThatIsUsedUpAtOnce) {
+  const auto predictor = make_predictor(scene_of(kDry));
+  Eigen::VectorXd values = defaults(*predictor);
+  const std::vector<double> t_s{5.0, 6.0, 7.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = t_s.front();
+  request.tolerance = 1e-12;
+  const int spin = predictor->index_of("b_1_s");
+  values[spin] = 0.0;
+  const Eigen::VectorXd none = predictor->predict(values, request).values;
+  for (const double b_1_s : {1e-17, -1e-17}) {
+    values[spin] = b_1_s;
+    const Eigen::VectorXd little = predictor->predict(values, request).values;
+    EXPECT_LT((little - none).cwiseAbs().maxCoeff(), 1e-10) << b_1_s;
+  }
 }
 
 TEST(TopSpinDrag, IsRefusedWhereTheIntegratorDoesNotKnowIt) {
