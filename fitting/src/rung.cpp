@@ -189,13 +189,17 @@ using Values = std::map<std::string, double>;
 constexpr std::pair<const char*, double> kSpinDrags[] = {
     {"gamma3_dry_1_s2", -1.0}, {"gamma3_1_s", 0.0}, {"gamma3_quadratic", 1.0}};
 
-// Typical size of a parameter beside known values: drags slow the spin at like rates.
+// Typical size of a parameter beside known values: drags slow the spin at like rates, and one
+// beside another has little left to do.
 double typical_size(const model::ParameterInfo& info, const Values& known) {
   constexpr double kTypical_1_s = 5e-4;  // a little of it turns no mark astray
   const auto spin = known.find("b_1_s");
   if (spin == known.end() || spin->second == 0.0) return info.value;
+  const bool beside_another =
+      std::any_of(std::begin(kSpinDrags), std::end(kSpinDrags),
+                  [&](const auto& drag) { return known.contains(drag.first); });
   for (const auto& [name, power] : kSpinDrags)
-    if (info.name == name && power != 0.0)
+    if (info.name == name && (power != 0.0 || beside_another))
       return kTypical_1_s * std::pow(std::abs(spin->second), -power);
   return info.value;
 }
@@ -210,7 +214,9 @@ void hand_over_spin_drag(const data::Fit& known, const Values& before, Values& s
   for (const auto& [name, power] : kSpinDrags)
     if (const auto drag = before.find(name); drag != before.end() && !own.contains(name))
       rate_1_s += drag->second * std::pow(b_1_s, power);
-  b_1_s *= std::exp(-0.5 * rate_1_s * (known.arcs[0].to_s - known.arcs[0].from_s));
+  // Nor where next to nothing is left: a drag that goes by its inverse would have to be infinite.
+  constexpr double kMost = 3.0;
+  b_1_s *= std::exp(-std::min(kMost, 0.5 * rate_1_s * (known.arcs[0].to_s - known.arcs[0].from_s)));
   for (const auto& [name, power] : kSpinDrags)
     if (rate_1_s > 0.0 && own.contains(name) && !before.contains(name))
       start[name] = rate_1_s * std::pow(b_1_s, -power);

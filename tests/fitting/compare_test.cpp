@@ -201,6 +201,26 @@ TEST(Compare, SaysWhetherATopNeedsDrag) {
             4.0 * found.fit.find("gamma1_1_s")->sigma);
 }
 
+// A law that another one has replaced comes back beside it with little left to do. It began at a
+// size that turned the axis astray, ended in a minimum hundreds of chi-square above that without it
+// and was called neither needed nor ruled out.
+TEST(Compare, AddsALawOfATopsSpinBesideAnotherForWhatThatCosts) {
+  data::Scene quadratic = top();
+  quadratic.model.drag_transverse_N_m_s = quadratic.model.drag_spin_quadratic_N_m_s2 = 1e-6;
+  const Values start{{"a_1_s2", 147.15},          {"b_1_s", 30.0},     {"l_m", 0.03},
+                     {"theta_rad", 0.6},          {"dphi_rad_s", 2.0}, {"gamma1_1_s", 0.01},
+                     {"gamma3_quadratic", 8.9e-4}};
+  const Comparison found = compare_one(track_of(quadratic, start, 10.0, 1001, 2e-4, 1), top());
+  ASSERT_TRUE(found.scene.model.drag_spin_quadratic_N_m_s2.has_value()) << found.fit.recommendation;
+  int larger = 0;
+  for (const data::ModelScore& row : found.fit.comparison) {
+    if (!row.model.ends_with("quadratic spin drag") || row.parameters != 10) continue;
+    ++larger;
+    EXPECT_LT(row.bic, found.fit.bic + std::log(2002.0) + 1.0) << row.model;
+  }
+  EXPECT_EQ(larger, 2) << found.fit.recommendation;
+}
+
 // A body that is now here, now there moves as no top does. Whatever becomes of a model, it is
 // listed.
 TEST(Compare, ListsModelsThatExplainNothingWithTheirReason) {

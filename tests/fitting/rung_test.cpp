@@ -77,6 +77,22 @@ TEST(Rung, ThatLacksATermGoesOnFromTheSolutionOfTheOneAbove) {
   EXPECT_LT(below.held_back_rms_sigma, 2.0);
 }
 
+// A fit that explains nothing may hold that the spin is gone at once. What goes by another law then
+// began without bounds, from where nothing can be predicted.
+TEST(Rung, TakesOverADragThatLeavesNoSpin) {
+  const data::Track track = track_of_a_top();
+  Rung above, other;
+  above.scene = top_with_drag();
+  fit_rung(std::span(&track, 1), nullptr, nullptr, {}, above);
+  ASSERT_TRUE(above.fitted) << above.reason;
+  for (data::FitParameter& parameter : above.fit.parameters)
+    if (parameter.name == "gamma3_1_s") parameter.value = 400.0;
+  other.scene = top();
+  other.scene.model.drag_spin_quadratic_N_m_s2 = 1e-6;
+  fit_neighbour(std::span(&track, 1), above, {}, other);
+  EXPECT_TRUE(other.fitted) << other.reason;
+}
+
 TEST(Rung, OfSeveralArcsIsSearchedForAnew) {
   data::Fit two;
   two.parameters.push_back({"friction", 0.2, 0.01, "", data::ParameterStatus::free, true, ""});
