@@ -115,7 +115,6 @@ TEST(Verdict, DoesNotTakeAWobbleForNoise) {
   EXPECT_EQ(fit.verdict, "good_correlated") << fit.verdict_words;
 }
 
-// Residuals of three times the noise, whose sigmas somebody stated: followed, but not explained.
 // Linear drag in the place of a quadratic one leaves hardly more than the noise, and was called
 // good_correlated; halves of the record tell that it is not what slows the top.
 TEST(Verdict, IsDoubtfulWhereHalvesOfTheRecordAskForOtherParameters) {
@@ -134,6 +133,7 @@ TEST(Verdict, IsDoubtfulWhereHalvesOfTheRecordAskForOtherParameters) {
   EXPECT_THAT(wrong.verdict_words, testing::HasSubstr("second half"));
 }
 
+// Residuals of three times the noise, whose sigmas somebody stated: followed, but not explained.
 TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
   const auto drifting = [path = nutating_top()](double t) -> Eigen::Vector2d {
     return path(t) + 5.0 * kSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));

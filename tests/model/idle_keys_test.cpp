@@ -96,6 +96,8 @@ TEST_P(IdleKeys, AreThoseThatChangeNothing) {
   if (model != std::string("top-euler")) {  // which refuses them
     changes["model.drag_transverse_N_m_s"] = "0.1";
     changes["model.drag_spin_N_m_s"] = "0.1";
+    changes["model.drag_spin_dry_N_m"] = "0.1";
+    changes["model.drag_spin_quadratic_N_m_s2"] = "0.1";
   }
   if (keys().contains("start.omega_s_rad_s")) changes.erase("start.w3_rad_s");  // the same rate
   for (const auto& [key, value] : changes) {
