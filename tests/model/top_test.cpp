@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "derivative_columns.hpp"
 #include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -135,30 +136,9 @@ void check_derivatives(bool drag, unsigned seed) {
   PredictRequest request;
   request.t_s = t_s;
   request.observables = kAll;
-  request.tolerance = 1e-14;
-  request.want_end_state = true;
-  for (int i = 0; i < at.size(); ++i) request.derivatives.push_back(i);
-  const Prediction exact = predictor->predict(at, request);
-  request.derivatives.clear();
-  for (int i = 0; i < at.size(); ++i) {
-    const double h = 2e-3 * std::max(std::abs(at[i]), 1e-2);
-    const auto moved = [&](double steps) {
-      Eigen::VectorXd values = at;
-      values[i] += steps * h;
-      const Prediction run = predictor->predict(values, request);
-      Eigen::VectorXd all(run.values.size() + run.end_state.size());
-      all << run.values, run.end_state;
-      return all;
-    };
-    const Eigen::VectorXd differences =
-        (45.0 * (moved(1) - moved(-1)) - 9.0 * (moved(2) - moved(-2)) + moved(3) - moved(-3)) /
-        (60.0 * h);
-    Eigen::VectorXd ours(differences.size());
-    ours << exact.jacobian.col(i), exact.end_state_jacobian.col(i);
-    EXPECT_LT((ours - differences).cwiseAbs().maxCoeff(),
-              2e-7 * (1.0 + differences.cwiseAbs().maxCoeff()))
-        << predictor->parameters()[static_cast<std::size_t>(i)].name << ", seed " << seed;
-  }
+  for (const DerivativeColumn& column : derivative_columns(*predictor, at, request, 2e-3))
+    EXPECT_LT(column.error(), 2e-7 * (1.0 + column.size()))
+        << column.parameter << ", seed " << seed;
 }
 TEST(Top, DerivativesMatchDifferencesAtRandomPoints) {
   for (unsigned seed = 1; seed <= 10; ++seed) check_derivatives(false, seed);
