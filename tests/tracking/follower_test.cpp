@@ -77,8 +77,8 @@ class SmearedDisc : public testing::Test {
   std::mt19937 random_{5};
 };
 
-// One sighting tells no speed, and the first picture after it no less far than it goes.
-TEST_F(SmearedDisc, IsFoundAgainAFrameAfterItWasFirstSeenHoweverFastItGoes) {
+// One sighting tells no speed: in the next picture the disc may be beyond its own width.
+TEST_F(SmearedDisc, IsFoundAFrameAfterItWasFirstSeenThoughItWentMoreThanItsRadius) {
   constexpr double kGone_px = 1.7 * kRadius_px;
   const Eigen::Vector2d at(60.0, 80.0), gone_to = at + kGone_px * Eigen::Vector2d(1.0, 0.1);
   const Frame first = frame(0, 0.3, at), second = frame(1, 0.3 + kPerFrame_rad, gone_to);

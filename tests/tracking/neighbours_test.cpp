@@ -36,7 +36,7 @@ TEST_F(Neighbours, ALostFrameIsSoughtWhereItsNeighboursPutIt) {
 }
 
 TEST_F(Neighbours, ABodyThatRunsInACircleIsExpectedOnIt) {
-  constexpr double kCircle_m = 0.02, kTurn_rad_s = 25.0;  // a quarter of a turn over a lost frame
+  constexpr double kCircle_m = 0.02, kTurn_rad_s = 25.0;  // an eighth of a turn over a lost frame
   const auto centre_at = [](double t_s) {
     return Eigen::Vector3d(kCircle_m * std::cos(kTurn_rad_s * t_s),
                            kCircle_m * std::sin(kTurn_rad_s * t_s), 0.01);
@@ -100,7 +100,8 @@ TEST_F(Neighbours, OnASmoothPathLittleIsAContradiction) {
   EXPECT_TRUE(glimpses[30].seen->attitude_doubtful);
 }
 
-// Knocked, it goes on otherwise at once: none of the frames around can know.
+// Knocked, it goes on otherwise at once. The frame at which it does is as far from the way between
+// its neighbours as one that is wrong, but on the way of those before it.
 TEST_F(Neighbours, AKnockOnASmoothPathIsNoContradiction) {
   constexpr double kKnock_s = 0.5, kBack_rad_s = -6.0;
   const Oracle oracle([](int) { return 10.0; });
@@ -110,6 +111,19 @@ TEST_F(Neighbours, AKnockOnASmoothPathIsNoContradiction) {
       g.seen->pose->pose.phi_rad = phi_at(kKnock_s) + kBack_rad_s * since_s;
   doubt_what_is_contradicted(oracle, glimpses);
   for (const Glimpse& g : glimpses) EXPECT_FALSE(g.seen->attitude_doubtful) << g.frame->index;
+}
+
+// Its azimuth was in doubt already, for its mirror image; that its tilt is wrong as well is not
+// said by that.
+TEST_F(Neighbours, TheTiltOfADoubtfulFrameIsDoubtedToo) {
+  constexpr double kOff_rad = 0.3;
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  for (Glimpse& g : glimpses) g.seen->pose->sigma_theta_rad = 0.01;
+  glimpses[30].seen->pose->pose.theta_rad -= kOff_rad;
+  glimpses[30].seen->attitude_doubtful = true;
+  doubt_what_is_contradicted(oracle, glimpses);
+  EXPECT_NEAR(glimpses[30].seen->pose->sigma_theta_rad, kOff_rad, 0.02);
 }
 
 TEST_F(Neighbours, WhatTheyContradictForGoodIsDoubted) {

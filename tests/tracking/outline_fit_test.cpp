@@ -520,34 +520,6 @@ TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
 }
 
-// Seen from aside, a wall as dark as the floor leaves nothing but the face's outline, which is that
-// of a whole body a little smaller and more tilted.
-TEST(OutlineFitter, ABodyThatSeemsTooSmallMayBeSeenWithoutItsWallAndItsErrorBarsHoldThat) {
-  FlatDisc disc;
-  disc.body.thickness_m = 0.008;
-  constexpr double kTheta = 0.85, kFloor = 60.0, kFace = 160.0, kHalf_px = 4.0;
-  const Eigen::Vector2d centre(80.2, 70.4);
-  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
-  draw_cylinder(picture, centre, 30.0, kHalf_px, kTheta, kFloor, kFace);
-  std::mt19937 random(15);
-  const cv::Mat luma = developed(picture, 2.0, random);
-  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
-  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
-  data::Pose<> predicted;
-  predicted.theta_rad = 1.0;
-  predicted.centre_m = disc.camera.table_from_image(
-      centre + Eigen::Vector2d(0.0, kHalf_px * std::sin(kTheta)),
-      data::height_on_floor_m(1.0, disc.body.radius_m, disc.body.half_thickness_m()));
-  const auto seen =
-      fitter.measure({.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
-  ASSERT_TRUE(seen);
-  const Eigen::Vector2d off = seen->centre_px - centre;
-  ASSERT_GT(off.norm(), 1.0);
-  constexpr double kSigmas = 3.0;
-  EXPECT_LT(off.dot(seen->covariance_px2.ldlt().solve(off)), kSigmas * kSigmas);
-  EXPECT_LT(std::abs(seen->pose.theta_rad - kTheta), kSigmas * seen->sigma_theta_rad);
-}
-
 // A tilted disc whose wall lies in the shade and is as bright as the floor: the outline of its
 // bright face alone is that of a disc tilted the other way.
 TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {

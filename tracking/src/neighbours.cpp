@@ -195,15 +195,18 @@ std::optional<Expected> expected_at(const BodyFinder& finder, const std::vector<
     best = k, least = sum, spread = apart.empty() ? 0.0 : data::median(apart);
   }
   // Of those that agree the nearest in time knows best.
-  for (std::size_t k = 0; k < best; ++k)
-    if (off_rad(said[k], said[best], alike) <= spread) best = k;
+  for (std::size_t k = 0; k < best; ++k) {
+    if (off_rad(said[k], said[best], alike) > spread) continue;
+    best = k;
+    break;
+  }
   const Neighbours& pair = pairs[best];
   return Expected{said[best], pair.at(t_s - pair.frame_s(), alike),
                   between_axes(axis_of(pair.a.pose()), axis_of(pair.b.pose()), alike), spread};
 }
 
-/// How far the frames of a recording usually are from what those around them expect: where that is
-/// little, less is a contradiction.
+/// How far frames usually are from what those around them expect: where that is little, less is a
+/// contradiction.
 class Usual {
  public:
   Usual(const BodyFinder& finder, const std::vector<Glimpse>& glimpses) {
@@ -216,16 +219,17 @@ class Usual {
     }
     if (!off.empty()) off_rad_ = data::median(std::move(off));
   }
-  /// What may be wrong by more is looked into.
+  /// So far off a frame is measured again, or doubted.
   [[nodiscard]] double suspicious_rad() const {
     constexpr double kUsuals = 5.0, kLeast_rad = 0.04;
     return std::clamp(kUsuals * off_rad_, kLeast_rad, kMost_rad);
   }
+  /// By which the likelihood of being so far off falls.
   [[nodiscard]] double scatter_rad() const {
     constexpr double kUsuals = 4.0, kLeast_rad = 0.03, kMostScatter_rad = 0.15;
     return std::clamp(kUsuals * off_rad_, kLeast_rad, kMostScatter_rad);
   }
-  /// What is wrong by more is so in any recording.
+  /// However much frames scatter, so far off is a contradiction.
   static constexpr double kMost_rad = 0.2;
 
  private:
@@ -478,12 +482,17 @@ bool is_led_to(const BodyFinder& finder, const std::vector<Glimpse>& glimpses, s
 }
 
 /// What the frames around still contradict may be where they say instead: its covariance holds
-/// both.
+/// both. Where it does so for another reading already, which may be the same, the tilt's alone is
+/// seen to.
 void doubt(const Expected& expected, Sighting& seen) {
-  seen.attitude_doubtful = true;
   PoseMeasurement& pose = *seen.pose;
-  pose.sigma_theta_rad =
-      std::hypot(pose.sigma_theta_rad, expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
+  const double off_rad = std::abs(expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
+  if (seen.attitude_doubtful) {
+    pose.sigma_theta_rad = std::max(pose.sigma_theta_rad, off_rad);
+    return;
+  }
+  seen.attitude_doubtful = true;
+  pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, off_rad);
   pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
   allow_for(expected.seen.centre_px - seen.centre_px,
             (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>(), seen);

@@ -119,7 +119,6 @@ void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fi
     square += off * off.transpose();
     count += 1.0;
   }
-  if (chosen.attitudes.size() > 0) square += count * chosen.attitudes;
   chosen.attitudes = square / count;
 }
 
@@ -189,33 +188,22 @@ double larger_px(const Refined& refined) {
   return rim_px > 0.0 ? sum_px / rim_px : 0.0;
 }
 
-// A body that seems too small may be seen without its wall, where that is as dark as the shade
-// beside it: it is then where its face alone has this outline. The covariance holds both.
-void allow_for_hidden_wall(const Scenery& scenery, Fitted& fitted) {
-  const data::Pose<>& pose = fitted.refined.pose;
-  const auto other =
-      face_outlined_like(scenery.body, scenery.camera, scenery.motion, pose, Side::same);
-  if (!other) return;
-  const PoseMotion::Step off = scenery.motion.step_between(pose, *other);
-  fitted.attitudes = off * off.transpose();
-}
-
 // What was outlined may be the face alone, in the light beside a wall in the shade: the body seems
 // too small then, or the edges of its wall are missing. A pose for which clearly more speaks, or
 // about as much while the body has its size, is the better one, though the outer edges of the wall
-// are less clear than those of the face. Seen from aside, wall and face are too different for that:
-// what seems too small there keeps its place, with error bars that hold the other.
+// are less clear than those of the face. Seen from aside, wall and face are too different for that.
 std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted> fitted) {
   constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85, kBetter = 1.15;
   constexpr double kFewEdges = 1.05, kLeastFacing = 0.75;
-  if (!fitted || scenery.motion.rotation() < 0) return fitted;
+  if (!fitted || scenery.motion.rotation() < 0 ||
+      facing(scenery.camera, fitted->refined.pose) < kLeastFacing)
+    return fitted;
   const double seen_px = larger_px(fitted->refined), outline_px = fitted->refined.outline_px;
   const bool too_small = seen_px < -kTooSmallPx;
   if (!too_small && fitted->evidence > kFewEdges * outline_px) return fitted;
   std::optional<Fitted> best;
-  const bool from_above = facing(scenery.camera, fitted->refined.pose) >= kLeastFacing;
   for (const Side side : {Side::same, Side::mirrored}) {
-    if (!from_above || (side == Side::mirrored && scenery.motion.pivoted())) break;
+    if (side == Side::mirrored && scenery.motion.pivoted()) break;
     const auto start = face_outlined_like(scenery.body, scenery.camera, scenery.motion,
                                           fitted->refined.pose, side);
     if (!start) continue;
@@ -227,7 +215,6 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
         (!best || other->evidence > best->evidence))
       best = std::move(other);
   }
-  if (!best && too_small) allow_for_hidden_wall(scenery, *fitted);
   return best ? std::move(best) : std::move(fitted);
 }
 

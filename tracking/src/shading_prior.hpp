@@ -51,7 +51,7 @@ struct ShadingEstimate {
   double unevenness = 1.0;
 };
 
-/// With every look's shading drawn about zero with this variance.
+/// With every look's slopes and bends drawn about zero with this variance; strips as free as ever.
 [[nodiscard]] std::vector<ShadingEstimate> shadings_given(const std::vector<ShadingEvidence>& looks,
                                                           double variance);
 
