@@ -77,7 +77,7 @@ class SmearedDisc : public testing::Test {
   std::mt19937 random_{5};
 };
 
-// One sighting tells no speed: in the next picture the disc may be beyond its own width.
+// One sighting tells no speed: by the next picture the disc may have gone most of its width.
 TEST_F(SmearedDisc, IsFoundAFrameAfterItWasFirstSeenThoughItWentMoreThanItsRadius) {
   constexpr double kGone_px = 1.7 * kRadius_px;
   const Eigen::Vector2d at(60.0, 80.0), gone_to = at + kGone_px * Eigen::Vector2d(1.0, 0.1);

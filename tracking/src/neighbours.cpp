@@ -128,7 +128,6 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
 struct Expected {
   Sighting seen;            ///< placed there
   Pose earlier;             ///< one frame before
-  double step_rad = 0.0;    ///< turn of the axis between the frames it lies between
   double spread_rad = 0.0;  ///< by how much the frames around usually differ on it
 
   /// Whether they cannot all be wrong about what was seen this far off.
@@ -201,8 +200,7 @@ std::optional<Expected> expected_at(const BodyFinder& finder, const std::vector<
     break;
   }
   const Neighbours& pair = pairs[best];
-  return Expected{said[best], pair.at(t_s - pair.frame_s(), alike),
-                  between_axes(axis_of(pair.a.pose()), axis_of(pair.b.pose()), alike), spread};
+  return Expected{said[best], pair.at(t_s - pair.frame_s(), alike), spread};
 }
 
 /// How far frames usually are from what those around them expect: where that is little, less is a

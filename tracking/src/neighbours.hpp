@@ -26,8 +26,9 @@ void measure_again(const Background& background, const BodyFinder& finder, std::
                    std::vector<Glimpse>& glimpses);
 
 /// Doubts attitudes that the frames around still contradict: their covariance then holds both
-/// places. A poor fit is doubted sooner; whichever frames around are asked, with the poor ones and
-/// without, have to agree.
+/// places. A poor fit is doubted sooner, and so is any where the frames around usually lead exactly
+/// there, unless one side still does: it may have been knocked. Whichever frames around are asked,
+/// with the poor ones and without, have to agree.
 void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& glimpses);
 
 }  // namespace trochoid::tracking
