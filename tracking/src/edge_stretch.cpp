@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -44,6 +45,15 @@ Shading largest_shading() {
 using Noise = std::array<float, 3>;  // variance of a sample inside, outside and on the edge
 constexpr Noise kEqual{1.0f, 1.0f, 1.0f};
 
+enum Side { kInside, kOutside };
+
+// The level to one side of an edge, over that of the plate if there is one.
+struct Level {
+  double value = 0.0, variance = 0.0;
+  double off = 0.0;       // from that of the whole surface
+  double per_unit = 1.0;  // light per unit
+};
+
 // What one look says; shading over the most it can be.
 struct Look {
   bool usable = false;
@@ -58,6 +68,7 @@ struct Look {
   // on it: pixels that an edge crosses are noisier than either side (coding, sampling of the
   // scene).
   double light_square = 0.0;  // of all samples, in levels of light
+  std::array<Level, 2> levels{};
   Eigen::Array3d noise_square = Eigen::Array3d::Zero(), noise_freedom = Eigen::Array3d::Zero();
 };
 
@@ -77,6 +88,9 @@ class Fitting {
                                      std::optional<double> wider_px = {});
   void widen(double step);
   void find_noise(const std::vector<Noise>& assumed);
+  void find_levels(Side side, const std::vector<double>& noise2);
+  [[nodiscard]] double change_of_levels(size_t i) const;
+  void expect_levels(Side side);
   [[nodiscard]] std::vector<Noise> noise_of_neighbours() const;
   void find_offsets(const std::vector<Noise>& noise);
   void describe_edge(size_t i);
@@ -128,6 +142,7 @@ Fitting::Fitting(std::vector<StretchProfile>& profiles, const ShadingMemory& kno
     looks_[i].usable = evidence_[i].usable = block_of(i).usable[i % kLanes] != 0;
     evidence_[i].curve = profiles[i].curve;
     evidence_[i].direction_rad = profiles[i].direction_rad;
+    profiles[i].edge.unlike_rest = 1.0;
     looks_[i].freedom = std::max(0.5, profiles[i].profile.count / profiles[i].profile.shared - 5.0);
   }
   if (known.empty()) return;
@@ -355,6 +370,80 @@ std::vector<Noise> Fitting::noise_of_neighbours() const {
   return out;
 }
 
+// Light of the background plate beside an edge; 1 without.
+double light_of_plate(const Profile& profile) {
+  if (!profile.plate) return 1.0;
+  double sum = 0.0;
+  for (int k = 0; k < profile.count; ++k)
+    sum += static_cast<double>(profile.background[static_cast<size_t>(k)]);
+  return std::max(1.0, sum / profile.count);
+}
+
+// The levels of a side as every look by itself knows them, and how far they are from the middle one
+// of their surface.
+void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
+  const auto surface = [&](size_t i) {
+    return side == kOutside ? profiles_[i].outside : profiles_[i].curve;
+  };
+  std::map<int, std::vector<double>> values;
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    if (!looks_[i].usable) continue;
+    const Block& b = block_of(i);
+    const size_t l = i % kLanes;
+    Level& level = looks_[i].levels[side];
+    level.per_unit = side == kOutside ? light_of_plate(profiles_[i].profile) : 1.0;
+    level.value = static_cast<double>(side == kOutside ? b.outer[l] : b.inner[l]) / level.per_unit;
+    level.variance = noise2[i] * static_cast<double>(b.level_variance[side][l]) /
+                     (level.per_unit * level.per_unit);
+    values[surface(i)].push_back(level.value);
+  }
+  std::map<int, double> usual;
+  for (auto& [at, all] : values) usual[at] = data::upper_median(std::move(all));
+  for (size_t i = 0; i < looks_.size(); ++i)
+    if (looks_[i].usable)
+      looks_[i].levels[side].off = looks_[i].levels[side].value - usual[surface(i)];
+}
+
+// By how much the levels of a look may differ from those of the whole surface because the light
+// beside it changes across the edge, and so may along it.
+double Fitting::change_of_levels(size_t i) const {
+  constexpr double kChange_px = 40.0;
+  constexpr double kNoise = 0.006;  // so uneven does noise make even light
+  double uneven = looks_[i].estimate.unevenness - kNoise;
+  if (!expected_.empty()) uneven += expected_[i].squaredNorm();
+  const double light = blocks_[i / kLanes].light[i % kLanes];
+  return kChange_px * largest_shading()[0] * light * std::sqrt(std::max(0.0, uneven));
+}
+
+// What the levels of a side are by those of the whole surface, as far as a stretch of the outline
+// agrees with these.
+void Fitting::expect_levels(Side side) {
+  constexpr double kShare = 0.3, kFewest = 8.0, kLeast = 1e-3;  // the last of the level
+  const auto sums =
+      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()), [side](const Look& look) {
+        const Level& level = look.levels[side];
+        return Eigen::Array4d(1.0, level.off, level.off * level.off, level.variance);
+      });
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    const double count = sums[i][0];
+    if (!looks_[i].usable || count < kFewest) continue;
+    const double off = sums[i][1] / count, square = sums[i][2] / count, noise = sums[i][3] / count;
+    const Level& level = looks_[i].levels[side];
+    // What neighbours differ by beyond their noise, and a standard deviation more.
+    const double differ = std::max(0.0, square - noise) + noise * std::sqrt(2.0 / count);
+    const double sd = std::hypot(level.per_unit * std::sqrt(differ), change_of_levels(i),
+                                 kLeast * level.per_unit * level.value);
+    Block& b = block_of(i);
+    const size_t l = i % kLanes;
+    b.expected_level[side][l] = static_cast<float>(level.per_unit * (level.value - level.off));
+    b.level_precision[side][l] = static_cast<float>(1.0 / (sd * sd));
+    if (side == kInside) continue;
+    const double contrast = std::abs(static_cast<double>(b.outer[l] - b.inner[l]));
+    profiles_[i].edge.unlike_rest =
+        level.per_unit * (std::abs(off) + std::sqrt(noise / count)) / std::max(1.0, contrast);
+  }
+}
+
 // The level beside the edge at a distance from it.
 float shaded(float level, float slope, float bend, float s) {
   return level + s * (slope + s * bend);
@@ -431,6 +520,8 @@ StretchFit Fitting::run(bool weighed) {
   find_noise(equal);
   std::vector<Noise> noise = noise_of_neighbours();
   if (weighed) {
+    const std::vector<double> noise2 = noise_of_looks();
+    for (const Side side : {kInside, kOutside}) find_levels(side, noise2), expect_levels(side);
     sum(noise);
     out.wider_px = find_shadings(std::vector<double>(looks_.size(), 1.0), 2, out.wider_px);
     find_noise(noise);

@@ -20,6 +20,7 @@ struct StretchProfile {
   bool curved = false;  ///< light out of levels by the usual transfer curve: noise is even in these
   bool plate = false;   ///< the outer level is a multiple of the background plate
   int curve = 0;        ///< neighbours are profiles of the same curve
+  int outside = 0;      ///< number of the surface there, such as the floor around a silhouette
   double direction_rad = 0.0;  ///< of the normal, in the picture
   /// Distance inwards to an edge of the body itself, too near to look between: a strip of unknown
   /// level; 0: none.
@@ -38,10 +39,13 @@ struct StretchFit {
 /// noisy. Each has its own levels, which may change along the normal, linearly and with a bend, by
 /// a few per cent of the light (shading, soft shadows; along with an edge that moves); how noisy
 /// either side is, is common to neighbours: the relief of a coin and the floor are not equally
-/// noisy, and a single profile has too few degrees of freedom to know its own.
+/// noisy, and a single profile has too few degrees of freedom to know its own. Where the levels of
+/// a surface are alike all along the outline, as on a plain floor under even light, profiles know
+/// them from each other.
 /// @param known what other frames show of the light beside these curves.
 /// @param weighed light and blur too, by how noisy samples inside, outside and on the edge are, in
-/// a second pass over what a first one leaves; without, only the offsets.
+/// a second pass over what a first one leaves; without, only the offsets, and each profile knows
+/// its own levels only.
 StretchFit fit_stretches(std::vector<StretchProfile>& profiles, const ShadingMemory& known = {},
                          bool weighed = true);
 

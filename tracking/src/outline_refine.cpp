@@ -85,6 +85,7 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
                            sample.normal_px, {inside, outside}, look.profile);
   if (!sampled) return false;
   look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8) + (colour ? 16 : 0);
+  look.outside = sample.silhouette ? (colour ? -2 : -1) : look.curve;
   look.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
   look.curved = !colour && scenery.camera.transfer != data::Transfer::linear;
@@ -160,15 +161,16 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
 // By how much an edge is seen too far out beside the shadow of a body darker than the floor [px].
 // Where the floor gets brighter farther out there is a penumbra, and between it and the rim what
 // the lamp does not reach at all, narrower than the blur and about as dark as the body; near the
-// contact the light of the room is missing too. The higher above the floor, the farther from the
-// rim all that is. Sizes: means over recordings made by two ray tracers, edges about the true
-// outline.
-double shadow_px(const Surroundings& around, double height_px) {
+// contact the light of the room is missing too, unless the floor is as bright there as elsewhere.
+// The higher above the floor, the farther from the rim all that is. Sizes: means over recordings
+// made by two ray tracers, edges about the true outline.
+double shadow_px(const Surroundings& around, const ProfileEdge& edge, double height_px) {
   constexpr double kPerRisePx2 = 2.5, kMostPx = 0.6, kPenumbraHeightPx = 25.0;
-  constexpr double kContactPx = 0.04, kContactHeightPx = 12.0;
+  constexpr double kContactPx = 0.04, kContactHeightPx = 12.0, kContactDims = 0.03;
   if (!around.darker) return 0.0;
   return std::min(kMostPx, kPerRisePx2 * around.rise) * std::exp(-height_px / kPenumbraHeightPx) +
-         kContactPx * std::exp(-height_px / kContactHeightPx);
+         kContactPx * std::min(1.0, edge.unlike_rest / kContactDims) *
+             std::exp(-height_px / kContactHeightPx);
 }
 
 // What the sliver of a slightly rounded rim, too narrow to be seen apart, moves an edge by [px]: it
@@ -306,7 +308,7 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
     EdgeEquation equation = equation_of(sample, looks[i], colour);
     equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
     if (sample.silhouette && !colour)
-      allow_for_shadow(shadow_px(around[i], sample.height_px), equation);
+      allow_for_shadow(shadow_px(around[i], looks[i].edge, sample.height_px), equation);
     keep(sample, looks[i].edge, equation, out);
     out.shading.push_back(fit.shading[i]);
     out.blurs_px.push_back(looks[i].blur_px);

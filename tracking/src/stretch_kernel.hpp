@@ -52,6 +52,9 @@ struct alignas(kAlign) Block {
   Floats curved = {};     ///< 1: noise is even in levels that are not proportional to light
   Floats own_share = {};  ///< independent samples per sample
   Floats reach_px = {};
+  // Given or 0: what the levels inside and outside are expected to be, and how surely, as the
+  // inverse variance.
+  Floats expected_level[2] = {}, level_precision[2] = {};
   // By find_columns.
   Masks usable = {};
   Floats inner = {}, outer = {};  ///< levels of the plain step
@@ -64,8 +67,8 @@ struct alignas(kAlign) Block {
   // Given for find_noise and find_offsets.
   Floats shading[kShading] = {};
   // By find_noise: sums of squared residuals in light, then in levels with their degrees of freedom
-  // inside, outside and on the edge.
-  Floats light_square, noise_square[3], noise_freedom[3];
+  // inside, outside and on the edge; variances of the levels over those of the noise.
+  Floats light_square, noise_square[3], noise_freedom[3], level_variance[2];
   // By find_offsets.
   Masks found;
   Floats offset_px, information, pull[kShading];
@@ -87,8 +90,9 @@ struct CurveLooks {
 struct Kernel {
   /// Columns of the model, levels of the plain step, gains.
   void (*find_columns)(Block&, Sample*, const Tables&);
-  /// Sums of all columns, samples weighed by their noise; projects levels and offset out of those
-  /// for shading and blur, and shading as large as it can be (of unit light) out of the square.
+  /// Sums of all columns, samples weighed by their noise, with what is expected of the levels;
+  /// projects levels and offset out of those for shading and blur, and shading as large as it can
+  /// be (of unit light) out of the square.
   void (*sum_columns)(Block&, const Sample*, const Variances&, const double* largest_shading);
   /// Residuals beside and on the edge about the best step with the given shading, whose levels it
   /// keeps, and the degrees of freedom that the fit has left them.

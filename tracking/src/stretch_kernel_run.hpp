@@ -186,6 +186,12 @@ void sum_columns(Block& b, const Sample* samples, const Variances& noise, const 
   Floats last[kAll + 1];
   sum_row<9>(rows, n, last);
   for (int i = 0; i < kAll; ++i) b.right[i] = last[i];
+  for (int i = 0; i < 2; ++i) {
+    const Floats off = b.expected_level[i] - (i == 0 ? b.inner : b.outer);
+    b.normal[at(i, i)] += b.level_precision[i];
+    b.right[i] += b.level_precision[i] * off;
+    last[kAll] += b.level_precision[i] * off * off;
+  }
   reduce(b, last[kAll], largest);
 }
 
@@ -230,6 +236,7 @@ void find_noise(Block& b, const Sample* samples, const Variances& assumed) {
   }
   b.inner = inner, b.outer = outer;
   b.light_square = light_square;
+  b.level_variance[0] = l00, b.level_variance[1] = l11;
   for (int i = 0; i < 3; ++i) b.noise_square[i] = square[i], b.noise_freedom[i] = freedom[i];
 }
 
@@ -260,6 +267,8 @@ void find_offsets(Block& b, const Sample* samples, const Variances& noise) {
       of_d[i] += wd * c.shading[i];
     }
   }
+  aa += b.level_precision[0], ar += b.level_precision[0] * (b.expected_level[0] - b.inner);
+  bb += b.level_precision[1], br += b.level_precision[1] * (b.expected_level[1] - b.outer);
   const Floats determinant = aa * bb - ab * ab;
   // d with the levels projected out.
   const Floats in = (bb * ad - ab * bd) / determinant, out = (aa * bd - ab * ad) / determinant;
