@@ -1,5 +1,6 @@
 #include "valley.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace trochoid::fitting {
@@ -51,14 +52,26 @@ Chords Valley::chords() const {
   return chords;
 }
 
-Eigen::MatrixXd Valley::bends(const Chords& chords, const Eigen::VectorXd& sd) const {
-  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(chords.derivatives.rows(), sd.size());
-  for (Eigen::Index k = 0; k < sd.size(); ++k) {
-    if (!(sd[k] > 0.0) || sd[k] > kNearlyUnseen) continue;
-    Eigen::VectorXd ahead, behind;
-    if (both_sides(k, sd[k], ahead, behind)) bend.col(k) = 0.5 * (ahead + behind) - all.residuals;
+// Where one side leads out of a parameter's range, as below a loss that is hardly there, or out of
+// the model, the other has to do.
+Eigen::VectorXd Valley::bend(Eigen::Index k, double distance,
+                             const Eigen::VectorXd& derivatives) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(all.residuals.size()), there;
+  int sides = 0;
+  for (const double step : {distance, -distance}) {
+    if (!displaced(step * values.col(k), there)) continue;
+    sum += there - all.residuals - step * derivatives;
+    ++sides;
   }
-  Eigen::MatrixXd w = inverse.asDiagonal() * chords.derivatives.transpose() * bend;
+  return sum / std::max(1, sides);
+}
+
+Eigen::MatrixXd Valley::bends(const Chords& chords, const Eigen::VectorXd& sd) const {
+  Eigen::MatrixXd bent = Eigen::MatrixXd::Zero(chords.derivatives.rows(), sd.size());
+  for (Eigen::Index k = 0; k < sd.size(); ++k)
+    if (sd[k] > 0.0 && sd[k] <= kNearlyUnseen)
+      bent.col(k) = bend(k, sd[k], chords.derivatives.col(k));
+  Eigen::MatrixXd w = inverse.asDiagonal() * chords.derivatives.transpose() * bent;
   w.diagonal().setZero();
   return w;
 }

@@ -25,13 +25,15 @@ struct Valley {
   [[nodiscard]] Chords chords() const;
 
   /// How far the valley bends: when the solution is moved to either side by `sd` along a direction
-  /// k, the mean of the two residual vectors leaves the tangent plane, and the other directions
-  /// follow by w(., k), in the standard deviations of independent residuals. Measured over the
-  /// distances that correlated residuals let the solution move: ripples do not grow with the
-  /// square of those. One column per direction.
+  /// k, the mean of the two residual vectors (or the only one, beside a parameter's limit) leaves
+  /// the tangent plane, and the other directions follow by w(., k), in the standard deviations of
+  /// independent residuals. Measured over the distances that correlated residuals let the solution
+  /// move: ripples do not grow with the square of those. One column per direction.
   [[nodiscard]] Eigen::MatrixXd bends(const Chords& chords, const Eigen::VectorXd& sd) const;
 
  private:
+  [[nodiscard]] Eigen::VectorXd bend(Eigen::Index k, double distance,
+                                     const Eigen::VectorXd& derivatives) const;
   [[nodiscard]] bool displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const;
   [[nodiscard]] bool both_sides(Eigen::Index k, double distance, Eigen::VectorXd& ahead,
                                 Eigen::VectorXd& behind) const;

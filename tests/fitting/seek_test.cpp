@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "problem.hpp"
-#include "valley.hpp"
+#include "statistics.hpp"
 
 // The minimiser and what is said of a valley's bends, on models whose valley is known.
 namespace trochoid::fitting {
@@ -15,6 +15,11 @@ class Bent : public model::Predictor {
  public:
   /// @param error  of the values, in turn up and down, in runs without derivatives.
   explicit Bent(double steepness, double error = 0.0) : steepness_(steepness), error_(error) {}
+  /// The first parameter is a loss: nothing or more, known if its error is small against `given`.
+  void make_the_first_a_loss(double given) {
+    infos_[0].logarithmic = true;
+    infos_[0].value = given;
+  }
   [[nodiscard]] const std::string& model_name() const override { return name_; }
   [[nodiscard]] const std::vector<model::ParameterInfo>& parameters() const override {
     return infos_;
@@ -53,17 +58,19 @@ class Bent : public model::Predictor {
   }
 };
 
-// Measured as (1, 0), a sigma more or less: the minimum is at (1, 1).
-Problem problem_of(const Bent& bent, double sigma) {
+constexpr int kSamples = 12;
+
+// Measured as (across, 0), a sigma more or less: the minimum is at (across, across^2).
+Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
   data::Track track;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < kSamples; ++i) {
     data::TrackSample sample;
     sample.t_s = 0.1 * i;
-    sample.centre_m = Eigen::Vector2d(1.0, 0.0).array() + (i % 2 == 0 ? sigma : -sigma);
+    sample.centre_m = Eigen::Vector2d(across, 0.0).array() + (i % 2 == 0 ? sigma : -sigma);
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
     track.samples.push_back(sample);
   }
-  return make_problem(bent, {make_arc(track, 0, 12, {}, false)}, {});
+  return make_problem(bent, {make_arc(track, 0, kSamples, {}, false)}, {});
 }
 
 // Straight steps are as short as the valley is narrow: the steps a minimiser has by default would
@@ -108,6 +115,26 @@ TEST(Seek, HeedsWhatIsKnownBeforehand) {
   const Solution plain = solve(problem, Eigen::Vector2d(0.0, 0.0));
   EXPECT_NEAR(solution.u[0], plain.u[0], 1e-3 * kSigma);
   EXPECT_NEAR(solution.chi2, plain.chi2, 1e-4);
+}
+
+// What lies along the valley follows the square of what lies across it, whose error s is that of a
+// mean: the mean square of that is 3 s^4, for a normal error and for its positive half alike. A
+// loss has that half only where it came out as nothing, or as less than its error.
+TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
+  constexpr double kSigma = 1.0, kNothing = 1e-6;
+  const double s = kSigma / std::sqrt(kSamples);
+  for (const double loss : {kNothing, 0.1 * s}) {
+    Bent bent(10.0);
+    bent.make_the_first_a_loss(10.0);
+    const Problem problem = problem_of(bent, kSigma, loss);
+    const Eigen::Vector2d minimum(std::log(loss), loss * loss);
+    const Eigen::MatrixXd covariance = uncertainty(problem, minimum).covariance;
+    // A dozen samples know their own scatter to a fifth, and error bars allow for that.
+    constexpr double kFew = 0.2;
+    EXPECT_NEAR(std::sqrt(covariance(0, 0)), s, kFew * s) << loss;
+    const double bend = std::sqrt(3.0) * s * s;
+    EXPECT_NEAR(std::sqrt(covariance(1, 1)), bend, 2.0 * kFew * bend) << loss;
+  }
 }
 
 }  // namespace
