@@ -167,6 +167,34 @@ TEST(RimPredictor, DifferentiatesAcrossStickAndSlip) {
                            1e-4);
 }
 
+// Where slip begins and ends its direction settles at once: the path is smooth, its neighbours run
+// together faster than a step chosen for the path alone can follow. A fit integrates coarsely and
+// its derivatives have to hold there as well.
+TEST(RimPredictor, DifferentiatesStickAndSlipIntegratedCoarselyToo) {
+  constexpr double kFine = 1e-12, kCoarse = 1e-8, kStep = 1e-5, kAllowed = 1e-3;
+  const auto predictor = make_predictor(reference_scene("s10_stick_slip_event"));
+  const Eigen::VectorXd at = defaults(*predictor);
+  const std::vector<double> t_s{0.3, 0.8, 1.2, 1.6, 2.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  for (const char* name : {"theta_rad", "w2_rad_s", "vx_m_s", "friction", "rolling_friction_m"}) {
+    const int i = predictor->index_of(name);
+    const double h = kStep * std::abs(at[i]);
+    request.tolerance = kFine;
+    request.derivatives.clear();
+    const auto moved = [&](double by) {
+      Eigen::VectorXd values = at;
+      values[i] += by;
+      return predictor->predict(values, request).values;
+    };
+    const Eigen::VectorXd difference = (moved(h) - moved(-h)) / (2.0 * h);
+    request.tolerance = kCoarse;
+    request.derivatives = {i};
+    const Eigen::VectorXd ours = predictor->predict(at, request).jacobian.col(0);
+    EXPECT_LE((ours - difference).norm(), kAllowed * difference.norm()) << name;
+  }
+}
+
 // The record sticks and slips: no single phase takes as many steps as the run.
 TEST(RimPredictor, CountsTheStepsOfAllPhasesAgainstTheLimit) {
   const auto predictor = make_predictor(reference_scene("s10_stick_slip_event"));

@@ -47,7 +47,8 @@ struct StepControl {
   double first_step_s = 0.0;  ///< 0: chosen from the derivatives
   double max_step_s = 0.0;    ///< 0: unlimited
   int max_steps = 1000000;
-  bool control_derivatives = false;  ///< Dual only: lanes must meet the tolerance as well
+  /// Dual only: lanes must meet the tolerance as well, down to 1e-11.
+  bool control_derivatives = false;
 };
 
 /// The same tolerance for every component, relative and absolute.
@@ -262,7 +263,10 @@ class DormandPrince {
     }
     return error;
   }
+  /// What draws in fast rounds off more than that, and shorter steps only add to it.
+  static constexpr double kFinestOfDerivatives = 1e-11;
   [[nodiscard]] double lane_error_norm(double h, int lane) const {
+    const double rtol = control_.rtol > kFinestOfDerivatives ? control_.rtol : kFinestOfDerivatives;
     double third = 0.0, fifth = 0.0, largest = 0.0;
     for (int c = 0; c < kN; ++c) {
       const double size = __builtin_fabs(y_next_[c].derivative[lane]);
@@ -272,7 +276,7 @@ class DormandPrince {
     for (int c = 0; c < kN; ++c) {
       add_component(
           c, [lane](const S& x) TROCHOID_LAMBDA_INLINE { return x.derivative[lane]; },
-          control_.rtol * largest, third, fifth);
+          rtol * largest, third, fifth);
     }
     return combine(h, third, fifth);
   }
