@@ -206,20 +206,6 @@ Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const No
   return covariance;
 }
 
-// Second moment of how far a bent valley takes the solution from the straight one. A displacement
-// w t^2 with a standard normal t has the second moment 3 w w^T.
-Eigen::MatrixXd of_bends(const Directions& seen, const Eigen::MatrixXd& w,
-                         const Eigen::VectorXd& sd) {
-  constexpr double kMostBend = 5.0;
-  Eigen::MatrixXd follow = seen.axes * seen.inverse.asDiagonal() * w;
-  for (Eigen::Index k = 0; k < w.cols(); ++k) {
-    if (!(seen.inverse[k] > 0.0)) continue;
-    const double most = kMostBend * sd[k] / seen.inverse[k];
-    follow.col(k) *= std::min(1.0, most / std::max(w.col(k).norm(), 1e-300));
-  }
-  return 3.0 * follow * follow.transpose();
-}
-
 // Median over the parameters of how many times wider the error bars are than those of independent
 // residuals.
 double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& plain) {
@@ -262,7 +248,8 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
         seen.bread(i, i) > 0.0 ? std::max(1.0, covariance(i, i) / seen.bread(i, i)) : 1.0;
   const Eigen::VectorXd sd =
       (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
-  covariance += of_bends(seen, valley_along(seen).bends(chords, sd), sd);
+  const Eigen::MatrixXd to_sizes = seen.axes * seen.inverse.asDiagonal();
+  covariance += to_sizes * valley_along(seen).bends(chords, sd) * to_sizes.transpose();
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);

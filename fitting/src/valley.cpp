@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace trochoid::fitting {
 namespace {
@@ -52,28 +53,54 @@ Chords Valley::chords() const {
   return chords;
 }
 
-// Where one side leads out of a parameter's range, as below a loss that is hardly there, or out of
-// the model, the other has to do.
-Eigen::VectorXd Valley::bend(Eigen::Index k, double distance,
-                             const Eigen::VectorXd& derivatives) const {
+// How the other directions follow a step to both sides. Where one side leads out of a parameter's
+// range, as below a loss that is hardly there, or out of the model, the other has to do.
+Eigen::VectorXd Valley::bend(const Chords& chords, const Eigen::VectorXd& distances) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(all.residuals.size()), there;
   int sides = 0;
-  for (const double step : {distance, -distance}) {
-    if (!displaced(step * values.col(k), there)) continue;
-    sum += there - all.residuals - step * derivatives;
+  for (const double side : {1.0, -1.0}) {
+    if (!displaced(side * values * distances, there)) continue;
+    sum += there - all.residuals - side * chords.derivatives * distances;
     ++sides;
   }
-  return sum / std::max(1, sides);
+  return inverse.asDiagonal() * chords.derivatives.transpose() * sum / std::max(1, sides);
+}
+
+// What a bend does to the directions other than those it is seen along, j and k; no more than some
+// error bars: where the cost has ripples or the model ends, no parabola holds.
+Eigen::VectorXd Valley::sideways(Eigen::VectorXd bend, const Eigen::VectorXd& sd, Eigen::Index j,
+                                 Eigen::Index k) const {
+  constexpr double kMostBend = 5.0;
+  bend[j] = bend[k] = 0.0;
+  const double most = kMostBend * std::max(sd[j] / inverse[j], sd[k] / inverse[k]);
+  return bend * std::min(1.0, most / std::max(bend.norm(), 1e-300));
 }
 
 Eigen::MatrixXd Valley::bends(const Chords& chords, const Eigen::VectorXd& sd) const {
-  Eigen::MatrixXd bent = Eigen::MatrixXd::Zero(chords.derivatives.rows(), sd.size());
-  for (Eigen::Index k = 0; k < sd.size(); ++k)
-    if (sd[k] > 0.0 && sd[k] <= kNearlyUnseen)
-      bent.col(k) = bend(k, sd[k], chords.derivatives.col(k));
-  Eigen::MatrixXd w = inverse.asDiagonal() * chords.derivatives.transpose() * bent;
-  w.diagonal().setZero();
-  return w;
+  constexpr std::size_t kPaired = 4;  // directions; of the others' pairs nothing shows
+  const Eigen::Index count = sd.size();
+  const auto along = [&](Eigen::Index k) { return sd[k] * Eigen::VectorXd::Unit(count, k); };
+  Eigen::MatrixXd alone = Eigen::MatrixXd::Zero(count, count), single = alone;
+  std::vector<Eigen::Index> directions;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (!(sd[k] > 0.0 && inverse[k] > 0.0 && sd[k] <= kNearlyUnseen)) continue;
+    alone.col(k) = bend(chords, along(k));
+    single.col(k) = sideways(alone.col(k), sd, k, k);
+    directions.push_back(k);
+  }
+  const Eigen::VectorXd sum = single.rowwise().sum();
+  Eigen::MatrixXd moment = 2.0 * single * single.transpose() + sum * sum.transpose();
+  std::sort(directions.begin(), directions.end(),
+            [&](Eigen::Index j, Eigen::Index k) { return sd[j] > sd[k]; });
+  directions.resize(std::min(directions.size(), kPaired));
+  for (std::size_t i = 0; i < directions.size(); ++i)
+    for (std::size_t other = 0; other < i; ++other) {
+      const Eigen::Index j = directions[i], k = directions[other];
+      const Eigen::VectorXd mixed =
+          sideways(bend(chords, along(j) + along(k)) - alone.col(j) - alone.col(k), sd, j, k);
+      moment += mixed * mixed.transpose();
+    }
+  return moment;
 }
 
 }  // namespace trochoid::fitting

@@ -24,16 +24,20 @@ struct Valley {
   /// elsewhere.
   [[nodiscard]] Chords chords() const;
 
-  /// How far the valley bends: when the solution is moved to either side by `sd` along a direction
-  /// k, the mean of the two residual vectors (or the only one, beside a parameter's limit) leaves
-  /// the tangent plane, and the other directions follow by w(., k), in the standard deviations of
-  /// independent residuals. Measured over the distances that correlated residuals let the solution
-  /// move: ripples do not grow with the square of those. One column per direction.
+  /// Second moment of how far bends take the solution aside, in the standard deviations of
+  /// independent residuals along the directions. When the solution is moved to either side by `sd`
+  /// along a direction k, or by those of two at once, the mean of both residual vectors (or the
+  /// only one, beside a parameter's limit) leaves the tangent plane and the other directions
+  /// follow. With standard normal t they follow by sum_k w_k t_k^2 + sum_j<k w_jk t_j t_k, of which
+  /// the second moment is 2 sum w_k w_k^T + (sum w_k)(sum w_k)^T + sum w_jk w_jk^T. Pairs are those
+  /// of the least certain directions. Measured over the distances that correlated residuals let
+  /// the solution move: ripples do not grow with the square of those.
   [[nodiscard]] Eigen::MatrixXd bends(const Chords& chords, const Eigen::VectorXd& sd) const;
 
  private:
-  [[nodiscard]] Eigen::VectorXd bend(Eigen::Index k, double distance,
-                                     const Eigen::VectorXd& derivatives) const;
+  [[nodiscard]] Eigen::VectorXd bend(const Chords& chords, const Eigen::VectorXd& distances) const;
+  [[nodiscard]] Eigen::VectorXd sideways(Eigen::VectorXd bend, const Eigen::VectorXd& sd,
+                                         Eigen::Index j, Eigen::Index k) const;
   [[nodiscard]] bool displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const;
   [[nodiscard]] bool both_sides(Eigen::Index k, double distance, Eigen::VectorXd& ahead,
                                 Eigen::VectorXd& behind) const;

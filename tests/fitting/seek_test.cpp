@@ -137,5 +137,65 @@ TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
   }
 }
 
+// x = left and half of right in turn, y = 10 (product - left right): what is seen of the product
+// is bent by both of the others together and by none of them alone.
+class Saddle : public model::Predictor {
+ public:
+  [[nodiscard]] const std::string& model_name() const override { return name_; }
+  [[nodiscard]] const std::vector<model::ParameterInfo>& parameters() const override {
+    return infos_;
+  }
+  [[nodiscard]] model::Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                          const model::PredictRequest& request) const override {
+    model::Prediction out;
+    const auto rows = static_cast<Eigen::Index>(2 * request.t_s.size());
+    out.values.resize(rows);
+    out.jacobian.setZero(rows, static_cast<Eigen::Index>(request.derivatives.size()));
+    for (Eigen::Index row = 0; row < rows; row += 2) {
+      const Eigen::Vector3d by_x =
+          row % 4 == 0 ? Eigen::Vector3d(1.0, 0.0, 0.0) : Eigen::Vector3d(0.0, 0.5, 0.0);
+      const Eigen::Vector3d by_y = 10.0 * Eigen::Vector3d(-values[1], -values[0], 1.0);
+      out.values[row] = by_x.dot(values.head<3>());
+      out.values[row + 1] = 10.0 * (values[2] - values[0] * values[1]);
+      for (std::size_t c = 0; c < request.derivatives.size(); ++c) {
+        out.jacobian(row, static_cast<Eigen::Index>(c)) = by_x[request.derivatives[c]];
+        out.jacobian(row + 1, static_cast<Eigen::Index>(c)) = by_y[request.derivatives[c]];
+      }
+    }
+    return out;
+  }
+
+ private:
+  std::string name_ = "saddle";
+  std::vector<model::ParameterInfo> infos_{parameter("left_rad_s"), parameter("right_rad_s"),
+                                           parameter("product_1_s2")};
+  static model::ParameterInfo parameter(const char* name) {
+    return {name, "rad/s", model::ParameterInfo::Role::dynamics, -INFINITY, INFINITY, false, 0.0,
+            true, ""};
+  }
+};
+
+// The mean square of a product of two independent errors is that of their mean squares.
+TEST(Bend, OfTwoParametersTogetherIsInTheErrorBarOfAThird) {
+  constexpr double kSigma = 0.5;
+  const Saddle saddle;
+  data::Track track;
+  for (int i = 0; i < kSamples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = 0.1 * i;
+    const double signs[] = {1.0, 1.0, -1.0, -1.0};  // of no mean over either half
+    sample.centre_m = Eigen::Vector2d(signs[i % 4], -signs[i % 4]) * kSigma;
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma * kSigma;
+    track.samples.push_back(sample);
+  }
+  const Problem problem = make_problem(saddle, {make_arc(track, 0, kSamples, {}, false)}, {});
+  const Eigen::MatrixXd covariance = uncertainty(problem, Eigen::Vector3d::Zero()).covariance;
+  const double left = kSigma / std::sqrt(kSamples / 2), right = 2.0 * left;
+  constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
+  EXPECT_NEAR(std::sqrt(covariance(0, 0)), left, kFew * left);
+  EXPECT_NEAR(std::sqrt(covariance(1, 1)), right, kFew * right);
+  EXPECT_NEAR(std::sqrt(covariance(2, 2)), left * right, 2.0 * kFew * left * right);
+}
+
 }  // namespace
 }  // namespace trochoid::fitting
