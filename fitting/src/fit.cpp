@@ -91,6 +91,22 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
   return solution;
 }
 
+// Downhill by so many steps, and so many again as long as they gain: a bent valley's floor is found
+// only once the integration's noise no longer covers it.
+Solution seek_while_it_gains(const Problem& problem, const Eigen::VectorXd& u, int steps) {
+  constexpr double kWorth = 0.1;  // of chi-square, a third of an error bar
+  constexpr int kMostRounds = 5;
+  const SolveOptions options{.iterations = steps, .function_tolerance = 1e-7};
+  Solution found = seek(problem, u, options);
+  for (int round = 1; round < kMostRounds && found.usable && found.iterations == steps; ++round) {
+    Solution farther = seek(problem, found.u, options);
+    if (!farther.usable || farther.chi2 > found.chi2 - kWorth) break;
+    farther.converged = farther.converged || found.converged;
+    found = std::move(farther);
+  }
+  return found;
+}
+
 // Integrates ever finer until that no longer shows. @returns the integration error left, in sigma.
 double silence_integration(Problem& problem, Solution& solution, double fixed_tolerance) {
   constexpr double kSilent = 0.01, kFinest = 1e-12;
@@ -101,7 +117,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     const double coarse = problem.tolerance;
     problem.tolerance *= 1e-2;
     const int steps = affordable_steps(problem, 2.0, kMostSteps);
-    Solution finer = seek(problem, solution.u, {.iterations = steps, .function_tolerance = 1e-7});
+    Solution finer = seek_while_it_gains(problem, solution.u, steps);
     if (!finer.usable) {  // so fine a run exceeds the step limit
       problem.tolerance = coarse;
       break;

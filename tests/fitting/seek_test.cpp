@@ -4,6 +4,7 @@
 
 #include "problem.hpp"
 #include "statistics.hpp"
+#include "trochoid/fitting/fit.hpp"
 
 // The minimiser and what is said of a valley's bends, on models whose valley is known.
 namespace trochoid::fitting {
@@ -61,15 +62,20 @@ class Bent : public model::Predictor {
 constexpr int kSamples = 12;
 
 // Measured as (across, 0), a sigma more or less: the minimum is at (across, across^2).
-Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
+data::Track track_of(int samples, double sigma, double across) {
   data::Track track;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < samples; ++i) {
     data::TrackSample sample;
     sample.t_s = 0.1 * i;
     sample.centre_m = Eigen::Vector2d(across, 0.0).array() + (i % 2 == 0 ? sigma : -sigma);
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
     track.samples.push_back(sample);
   }
+  return track;
+}
+
+Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
+  const data::Track track = track_of(kSamples, sigma, across);
   return make_problem(bent, {make_arc(track, 0, kSamples, {}, false)}, {});
 }
 
@@ -195,6 +201,35 @@ TEST(Bend, OfTwoParametersTogetherIsInTheErrorBarOfAThird) {
   EXPECT_NEAR(std::sqrt(covariance(0, 0)), left, kFew * left);
   EXPECT_NEAR(std::sqrt(covariance(1, 1)), right, kFew * right);
   EXPECT_NEAR(std::sqrt(covariance(2, 2)), left * right, 2.0 * kFew * left * right);
+}
+
+// A long run whose rounding, as coarsely as a fit integrates first, covers what is left of a
+// valley; more finely it does not.
+class Long : public Bent {
+ public:
+  using Bent::Bent;
+  [[nodiscard]] model::Prediction predict(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                          const model::PredictRequest& request) const override {
+    model::Prediction out = Bent::predict(values, request);
+    constexpr double kSteps = 50000, kAmplitude = 1e5;  // of the tolerance
+    out.steps = static_cast<int>(kSteps);
+    for (Eigen::Index row = 0; row < out.values.size(); ++row)
+      out.values[row] += kAmplitude * request.tolerance *
+                         std::sin(1e9 * (values[0] + 2.0 * values[1]) + static_cast<double>(row));
+    return out;
+  }
+};
+
+TEST(Fit, GoesOnDownAValleyThatOnlyFineIntegrationShows) {
+  silence_solver_log();
+  constexpr double kSigma = 1.0;
+  const Long bent(100.0);
+  const data::Track track = track_of(60, kSigma, 1.0);
+  FitOptions options;
+  options.strategy = "single";
+  options.start = {{"w1_rad_s", 0.0}, {"w2_rad_s", 0.0}};
+  const data::Fit found = fit(std::span(&track, 1), bent, {}, options);
+  EXPECT_NEAR(found.find("w1_rad_s")->value, 1.0, 0.05 * kSigma);
 }
 
 }  // namespace
