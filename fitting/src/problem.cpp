@@ -211,6 +211,19 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
     if (!known(name)) complain("bounds", name);
 }
 
+// A value the model cannot have would be refused at every attempt of the search. Attitudes are
+// folded into their range.
+void check_fixed(const model::Predictor& predictor, const data::FitSettings& settings) {
+  for (const ParameterInfo& info : predictor.parameters()) {
+    const auto fixed = settings.fixed.find(info.name);
+    if (fixed == settings.fixed.end() || info.role == ParameterInfo::Role::initial) continue;
+    const double value = fixed->second;
+    if (!(value >= info.lower && value <= info.upper))
+      throw InputError(fmt::format("[fit] fixed: {} = {} must lie between {} and {}", info.name,
+                                   value, info.lower, info.upper));
+  }
+}
+
 Transform transform_of(const ParameterInfo& info, const std::string& model,
                        const data::FitSettings& settings) {
   const auto bounds = settings.bounds.find(info.name);
@@ -255,6 +268,7 @@ bool leaves_choice(const std::string& name) {
 Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                      const data::Scene& scene) {
   check_names(predictor, scene.fit);
+  check_fixed(predictor, scene.fit);
   Problem problem;
   problem.predictor = &predictor;
   problem.arcs = std::move(arcs);

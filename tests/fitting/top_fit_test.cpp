@@ -219,6 +219,19 @@ TEST(TopFit, RefusesUnknownParameterNames) {
   EXPECT_THROW((void)fit_one(track_of({}), scene), InputError);
 }
 
+// The search would try for nothing, and blame the body's dimensions.
+TEST(TopFit, RefusesAFixedDragThatDrives) {
+  data::Scene scene = top_scene();
+  scene.model.drag_spin_N_m_s = 1e-6;
+  scene.fit.fixed["gamma3_1_s"] = -0.1;
+  try {
+    (void)fit_one(track_of({}), scene);
+    FAIL() << "no complaint";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("[fit] fixed: gamma3_1_s = -0.1"));
+  }
+}
+
 TEST(TopFit, RefusesAFirstGuessForWhatTheModelDoesNotHave) {
   FitOptions options;
   options.start = {{"theta_rad", 1.0}, {"length_m", 0.1}};
