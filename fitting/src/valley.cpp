@@ -54,8 +54,10 @@ Chords Valley::chords() const {
 }
 
 // How the other directions follow a step to both sides. Where one side leads out of a parameter's
-// range, as below a loss that is hardly there, or out of the model, the other has to do.
-Eigen::VectorXd Valley::bend(const Chords& chords, const Eigen::VectorXd& distances) const {
+// range, as below a loss that is hardly there, or out of the model, the other has to do; empty
+// where both do.
+std::optional<Eigen::VectorXd> Valley::bend(const Chords& chords,
+                                            const Eigen::VectorXd& distances) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(all.residuals.size()), there;
   int sides = 0;
   for (const double side : {1.0, -1.0}) {
@@ -63,7 +65,8 @@ Eigen::VectorXd Valley::bend(const Chords& chords, const Eigen::VectorXd& distan
     sum += there - all.residuals - side * chords.derivatives * distances;
     ++sides;
   }
-  return inverse.asDiagonal() * chords.derivatives.transpose() * sum / std::max(1, sides);
+  if (sides == 0) return std::nullopt;
+  return inverse.asDiagonal() * chords.derivatives.transpose() * sum / sides;
 }
 
 // What a bend does to the directions other than those it is seen along, j and k; no more than some
@@ -84,7 +87,9 @@ Eigen::MatrixXd Valley::bends(const Chords& chords, const Eigen::VectorXd& sd) c
   std::vector<Eigen::Index> directions;
   for (Eigen::Index k = 0; k < count; ++k) {
     if (!(sd[k] > 0.0 && inverse[k] > 0.0 && sd[k] <= kNearlyUnseen)) continue;
-    alone.col(k) = bend(chords, along(k));
+    const auto own = bend(chords, along(k));
+    if (!own) continue;
+    alone.col(k) = *own;
     single.col(k) = sideways(alone.col(k), sd, k, k);
     directions.push_back(k);
   }
@@ -96,8 +101,10 @@ Eigen::MatrixXd Valley::bends(const Chords& chords, const Eigen::VectorXd& sd) c
   for (std::size_t i = 0; i < directions.size(); ++i)
     for (std::size_t other = 0; other < i; ++other) {
       const Eigen::Index j = directions[i], k = directions[other];
-      const Eigen::VectorXd mixed =
-          sideways(bend(chords, along(j) + along(k)) - alone.col(j) - alone.col(k), sd, j, k);
+      auto both = bend(chords, along(j) + along(k));
+      if (!both) both = bend(chords, along(j) - along(k));  // bends as much, the other way
+      if (!both) continue;
+      const Eigen::VectorXd mixed = sideways(*both - alone.col(j) - alone.col(k), sd, j, k);
       moment += mixed * mixed.transpose();
     }
   return moment;

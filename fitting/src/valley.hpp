@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 
 #include "linearise.hpp"
 
@@ -35,7 +36,8 @@ struct Valley {
   [[nodiscard]] Eigen::MatrixXd bends(const Chords& chords, const Eigen::VectorXd& sd) const;
 
  private:
-  [[nodiscard]] Eigen::VectorXd bend(const Chords& chords, const Eigen::VectorXd& distances) const;
+  [[nodiscard]] std::optional<Eigen::VectorXd> bend(const Chords& chords,
+                                                    const Eigen::VectorXd& distances) const;
   [[nodiscard]] Eigen::VectorXd sideways(Eigen::VectorXd bend, const Eigen::VectorXd& sd,
                                          Eigen::Index j, Eigen::Index k) const;
   [[nodiscard]] bool displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const;

@@ -143,10 +143,15 @@ TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
   }
 }
 
-// x = left and half of right in turn, y = 10 (product - left right): what is seen of the product
-// is bent by both of the others together and by none of them alone.
+// x = left and half of right in turn, y = 10 (product - left right): what is seen of the product is
+// bent by both of the others together and by none of them alone.
 class Saddle : public model::Predictor {
  public:
+  /// The first parameter is a loss, known if its error is small against `given`.
+  void make_left_a_loss(double given) {
+    infos_[0].logarithmic = true;
+    infos_[0].value = given;
+  }
   [[nodiscard]] const std::string& model_name() const override { return name_; }
   [[nodiscard]] const std::vector<model::ParameterInfo>& parameters() const override {
     return infos_;
@@ -181,26 +186,41 @@ class Saddle : public model::Predictor {
   }
 };
 
-// The mean square of a product of two independent errors is that of their mean squares.
-TEST(Bend, OfTwoParametersTogetherIsInTheErrorBarOfAThird) {
-  constexpr double kSigma = 0.5;
-  const Saddle saddle;
+// Nothing seen but noise of no mean over the samples of either parameter.
+Problem noise_about(const Saddle& saddle, double sigma, const data::Scene& scene = {}) {
   data::Track track;
   for (int i = 0; i < kSamples; ++i) {
     data::TrackSample sample;
     sample.t_s = 0.1 * i;
-    const double signs[] = {1.0, 1.0, -1.0, -1.0};  // of no mean over either half
-    sample.centre_m = Eigen::Vector2d(signs[i % 4], -signs[i % 4]) * kSigma;
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma * kSigma;
+    const double signs[] = {1.0, 1.0, -1.0, -1.0};
+    sample.centre_m = Eigen::Vector2d(signs[i % 4], -signs[i % 4]) * sigma;
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
     track.samples.push_back(sample);
   }
-  const Problem problem = make_problem(saddle, {make_arc(track, 0, kSamples, {}, false)}, {});
-  const Eigen::MatrixXd covariance = uncertainty(problem, Eigen::Vector3d::Zero()).covariance;
-  const double left = kSigma / std::sqrt(kSamples / 2), right = 2.0 * left;
+  return make_problem(saddle, {make_arc(track, 0, kSamples, {}, false)}, scene);
+}
+
+// The mean square of a product of two independent errors is that of their mean squares, also if
+// one has its positive half only and the other its negative one.
+TEST(Bend, OfTwoParametersTogetherIsInTheErrorBarOfAThird) {
+  constexpr double kSigma = 0.5, kNothing = 1e-6;
   constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
-  EXPECT_NEAR(std::sqrt(covariance(0, 0)), left, kFew * left);
-  EXPECT_NEAR(std::sqrt(covariance(1, 1)), right, kFew * right);
-  EXPECT_NEAR(std::sqrt(covariance(2, 2)), left * right, 2.0 * kFew * left * right);
+  const double left = kSigma / std::sqrt(kSamples / 2), right = 2.0 * left;
+  for (const bool limited : {false, true}) {
+    Saddle saddle;
+    data::Scene scene;
+    if (limited) {
+      saddle.make_left_a_loss(10.0);
+      scene.fit.bounds["right_rad_s"] = {-INFINITY, 0.0};
+    }
+    const double u = limited ? std::log(kNothing) : 0.0;
+    const Eigen::MatrixXd covariance =
+        uncertainty(noise_about(saddle, kSigma, scene), Eigen::Vector3d(u, u, 0)).covariance;
+    EXPECT_NEAR(std::sqrt(covariance(0, 0)), left, kFew * left);
+    EXPECT_NEAR(std::sqrt(covariance(1, 1)), right, kFew * right);
+    EXPECT_NEAR(std::sqrt(covariance(2, 2)), left * right, 2.0 * kFew * left * right)
+        << (limited ? "on one side of each" : "on both sides");
+  }
 }
 
 // A long run whose rounding, as coarsely as a fit integrates first, covers what is left of a
