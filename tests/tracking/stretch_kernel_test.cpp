@@ -29,6 +29,8 @@ std::vector<Sample> steps_of(unsigned seed, Block& block) {
     block.own_share[l] = 1.0f;
     block.reach_px[l] = 2.0f;
     block.strip_px[l] = l % 2 == 0 ? 0.0f : 2.0f;
+    block.expected_level[1][l] = 139.0f;
+    block.level_precision[1][l] = l % 3 == 0 ? 0.0f : 2.0f;
     const float at_px = 0.3f * noise(random);
     for (int k = 0; k < kSamples; ++k) {
       Sample& s = samples[static_cast<size_t>(k)];

@@ -14,9 +14,9 @@ struct ProfileEdge {
   double contrast = 0.0;    ///< outer minus inner level at the edge
   double mean_level = 0.0;  ///< of both levels at the edge
   double inner_slope = 0.0, outer_slope = 0.0;  ///< of the levels at the edge [1/px]
-  /// By how much of the contrast the light outside may differ from that beside the rest of the same
-  /// surface; 1 where that is not known.
-  double unlike_rest = 1.0;
+  /// By how much of the contrast the light outside may be less than where the same surface is
+  /// brightest along the outline; 1 where that is not known.
+  double dimmed = 1.0;
   double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
   double wider_variance_px2 = 0.0;  ///< of that, from the noise of the samples
   double gain = 0.0;                ///< log-likelihood over "no edge here", of one line

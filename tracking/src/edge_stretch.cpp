@@ -47,11 +47,15 @@ constexpr Noise kEqual{1.0f, 1.0f, 1.0f};
 
 enum Side { kInside, kOutside };
 
-// The level to one side of an edge, over that of the plate if there is one.
+// The light to one side of an edge, in units of that of the plate if there is one.
 struct Level {
   double value = 0.0, variance = 0.0;
-  double off = 0.0;       // from that of the whole surface
-  double per_unit = 1.0;  // light per unit
+  double beyond = 0.0;    // that of the whole surface
+  double per_unit = 1.0;  // light
+  // Of a stretch of the outline around: looks, and their means.
+  double count = 0.0, beyond_there = 0.0, square_there = 0.0, variance_there = 0.0;
+
+  [[nodiscard]] double variance_of_mean() const { return variance_there / count; }
 };
 
 // What one look says; shading over the most it can be.
@@ -90,7 +94,12 @@ class Fitting {
   void find_noise(const std::vector<Noise>& assumed);
   void find_levels(Side side, const std::vector<double>& noise2);
   [[nodiscard]] double change_of_levels(size_t i) const;
+  void find_stretches(Side side);
   void expect_levels(Side side);
+  void compare_with_rest();
+  [[nodiscard]] int surface(size_t i, Side side) const {
+    return side == kOutside ? profiles_[i].outside : profiles_[i].curve;
+  }
   [[nodiscard]] std::vector<Noise> noise_of_neighbours() const;
   void find_offsets(const std::vector<Noise>& noise);
   void describe_edge(size_t i);
@@ -110,6 +119,15 @@ class Fitting {
   std::vector<ShadingEvidence> evidence_;
   std::vector<Shading> expected_;  // empty: nothing is known
 };
+
+// Light of the background plate beside an edge; 1 without.
+double light_of_plate(const Profile& profile) {
+  if (!profile.plate) return 1.0;
+  double sum = 0.0;
+  for (int k = 0; k < profile.count; ++k)
+    sum += static_cast<double>(profile.background[static_cast<size_t>(k)]);
+  return std::max(1.0, sum / profile.count);
+}
 
 // How many steps a profile's edge is the mean of.
 int steps_of(const StretchProfile& p) {
@@ -142,7 +160,7 @@ Fitting::Fitting(std::vector<StretchProfile>& profiles, const ShadingMemory& kno
     looks_[i].usable = evidence_[i].usable = block_of(i).usable[i % kLanes] != 0;
     evidence_[i].curve = profiles[i].curve;
     evidence_[i].direction_rad = profiles[i].direction_rad;
-    profiles[i].edge.unlike_rest = 1.0;
+    profiles[i].edge.dimmed = 1.0;
     looks_[i].freedom = std::max(0.5, profiles[i].profile.count / profiles[i].profile.shared - 5.0);
   }
   if (known.empty()) return;
@@ -172,10 +190,7 @@ void Fitting::fill(size_t block) {
         b.step_part[j][l] = 1.0f / static_cast<float>(steps_of(p));
       }
       // Of mean one, so that levels and slopes compare with those of neighbours without a plate.
-      float sum = 0.0f;
-      for (size_t k = 0; p.plate && k < static_cast<size_t>(count); ++k)
-        sum += profile.background[k];
-      const float scale = static_cast<float>(count) / std::max(sum, 1.0f);
+      const auto scale = static_cast<float>(1.0 / light_of_plate(profile));
       for (int j = 0; j < count; ++j) {
         const auto k = static_cast<size_t>(j);
         samples[j].s_px[l] = profile.s_px[k];
@@ -370,21 +385,10 @@ std::vector<Noise> Fitting::noise_of_neighbours() const {
   return out;
 }
 
-// Light of the background plate beside an edge; 1 without.
-double light_of_plate(const Profile& profile) {
-  if (!profile.plate) return 1.0;
-  double sum = 0.0;
-  for (int k = 0; k < profile.count; ++k)
-    sum += static_cast<double>(profile.background[static_cast<size_t>(k)]);
-  return std::max(1.0, sum / profile.count);
-}
-
-// The levels of a side as every look by itself knows them, and how far they are from the middle one
-// of their surface.
+// The levels of a side as every look by itself knows them, and how far they are beyond the middle
+// one of their surface. That one's own error, about 1.3 of a look's over the root of their number,
+// is in no variance.
 void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
-  const auto surface = [&](size_t i) {
-    return side == kOutside ? profiles_[i].outside : profiles_[i].curve;
-  };
   std::map<int, std::vector<double>> values;
   for (size_t i = 0; i < looks_.size(); ++i) {
     if (!looks_[i].usable) continue;
@@ -395,22 +399,41 @@ void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
     level.value = static_cast<double>(side == kOutside ? b.outer[l] : b.inner[l]) / level.per_unit;
     level.variance = noise2[i] * static_cast<double>(b.level_variance[side][l]) /
                      (level.per_unit * level.per_unit);
-    values[surface(i)].push_back(level.value);
+    values[surface(i, side)].push_back(level.value);
   }
   std::map<int, double> usual;
   for (auto& [at, all] : values) usual[at] = data::upper_median(std::move(all));
   for (size_t i = 0; i < looks_.size(); ++i)
     if (looks_[i].usable)
-      looks_[i].levels[side].off = looks_[i].levels[side].value - usual[surface(i)];
+      looks_[i].levels[side].beyond = looks_[i].levels[side].value - usual[surface(i, side)];
+}
+
+void Fitting::find_stretches(Side side) {
+  constexpr double kShare = 0.3;
+  const auto sums =
+      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()), [side](const Look& look) {
+        const Level& level = look.levels[side];
+        return Eigen::Array4d(1.0, level.beyond, level.beyond * level.beyond, level.variance);
+      });
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    Level& level = looks_[i].levels[side];
+    level.count = sums[i][0];
+    const double count = std::max(1.0, level.count);
+    level.beyond_there = sums[i][1] / count;
+    level.square_there = sums[i][2] / count;
+    level.variance_there = sums[i][3] / count;
+  }
 }
 
 // By how much the levels of a look may differ from those of the whole surface because the light
 // beside it changes across the edge, and so may along it.
 double Fitting::change_of_levels(size_t i) const {
+  // So large that levels are as good as free wherever shading shows; from recordings of a top
+  // beside its shadow, where levels taken from elsewhere pull edges.
   constexpr double kChange_px = 40.0;
-  constexpr double kNoise = 0.006;  // so uneven does noise make even light
+  constexpr double kNoise = 0.006;  // so uneven does noise make even light, by made pictures
   double uneven = looks_[i].estimate.unevenness - kNoise;
-  if (!expected_.empty()) uneven += expected_[i].squaredNorm();
+  if (!expected_.empty()) uneven += expected_[i].squaredNorm() / (kShading - 1);
   const double light = blocks_[i / kLanes].light[i % kLanes];
   return kChange_px * largest_shading()[0] * light * std::sqrt(std::max(0.0, uneven));
 }
@@ -418,29 +441,52 @@ double Fitting::change_of_levels(size_t i) const {
 // What the levels of a side are by those of the whole surface, as far as a stretch of the outline
 // agrees with these.
 void Fitting::expect_levels(Side side) {
-  constexpr double kShare = 0.3, kFewest = 8.0, kLeast = 1e-3;  // the last of the level
-  const auto sums =
-      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()), [side](const Look& look) {
-        const Level& level = look.levels[side];
-        return Eigen::Array4d(1.0, level.off, level.off * level.off, level.variance);
-      });
+  constexpr double kFewest = 8.0;
+  constexpr double kLeastShare = 1e-3;  // of the level: what no surface is more even than
+  // What a stretch as a whole is beyond the surface pulls all of it one way and is known far better
+  // than by squares of single looks, about sqrt(2 count) times: it counts for as much more.
+  constexpr double kTogether = 10.0, kClearly = 2.0;  // the latter in standard deviations
   for (size_t i = 0; i < looks_.size(); ++i) {
-    const double count = sums[i][0];
-    if (!looks_[i].usable || count < kFewest) continue;
-    const double off = sums[i][1] / count, square = sums[i][2] / count, noise = sums[i][3] / count;
     const Level& level = looks_[i].levels[side];
+    if (!looks_[i].usable || level.count < kFewest) continue;
+    const double together = std::max(0.0, level.beyond_there * level.beyond_there -
+                                              kClearly * kClearly * level.variance_of_mean());
     // What neighbours differ by beyond their noise, and a standard deviation more.
-    const double differ = std::max(0.0, square - noise) + noise * std::sqrt(2.0 / count);
+    const double differ = std::max(0.0, level.square_there - level.variance_there) +
+                          level.variance_there * std::sqrt(2.0 / level.count) +
+                          kTogether * together;
     const double sd = std::hypot(level.per_unit * std::sqrt(differ), change_of_levels(i),
-                                 kLeast * level.per_unit * level.value);
+                                 kLeastShare * level.per_unit * level.value);
     Block& b = block_of(i);
     const size_t l = i % kLanes;
-    b.expected_level[side][l] = static_cast<float>(level.per_unit * (level.value - level.off));
+    b.expected_level[side][l] = static_cast<float>(level.per_unit * (level.value - level.beyond));
     b.level_precision[side][l] = static_cast<float>(1.0 / (sd * sd));
-    if (side == kInside) continue;
+  }
+}
+
+// By how much the light outside may be less than where most of it falls on the same surface.
+void Fitting::compare_with_rest() {
+  constexpr double kBright = 0.8, kFewest = 8.0;
+  const auto there = [](const Level& level) {
+    return level.value - level.beyond + level.beyond_there;
+  };
+  const auto known = [&](size_t i) {
+    return looks_[i].usable && looks_[i].levels[kOutside].count >= kFewest;
+  };
+  std::map<int, std::vector<double>> values;
+  for (size_t i = 0; i < looks_.size(); ++i)
+    if (known(i)) values[surface(i, kOutside)].push_back(there(looks_[i].levels[kOutside]));
+  std::map<int, double> bright;
+  for (auto& [at, all] : values) bright[at] = data::quantile(std::move(all), kBright);
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    if (!known(i)) continue;
+    const Level& level = looks_[i].levels[kOutside];
+    const Block& b = block_of(i);
+    const size_t l = i % kLanes;
     const double contrast = std::abs(static_cast<double>(b.outer[l] - b.inner[l]));
-    profiles_[i].edge.unlike_rest =
-        level.per_unit * (std::abs(off) + std::sqrt(noise / count)) / std::max(1.0, contrast);
+    const double less = std::max(0.0, bright[surface(i, kOutside)] - there(level));
+    profiles_[i].edge.dimmed =
+        level.per_unit * (less + std::sqrt(level.variance_of_mean())) / std::max(1.0, contrast);
   }
 }
 
@@ -516,12 +562,17 @@ StretchFit Fitting::run(bool weighed) {
   const std::vector<Noise> equal(looks_.size(), kEqual);
   sum(equal);
   StretchFit out;
-  out.wider_px = find_shadings(noise_of_looks(), weighed ? 1 : 2);
+  const std::vector<double> noise2 = noise_of_looks();
+  out.wider_px = find_shadings(noise2, weighed ? 1 : 2);
   find_noise(equal);
   std::vector<Noise> noise = noise_of_neighbours();
   if (weighed) {
-    const std::vector<double> noise2 = noise_of_looks();
-    for (const Side side : {kInside, kOutside}) find_levels(side, noise2), expect_levels(side);
+    for (const Side side : {kInside, kOutside}) {
+      find_levels(side, noise2);
+      find_stretches(side);
+      expect_levels(side);
+    }
+    compare_with_rest();
     sum(noise);
     out.wider_px = find_shadings(std::vector<double>(looks_.size(), 1.0), 2, out.wider_px);
     find_noise(noise);

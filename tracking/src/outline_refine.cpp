@@ -161,7 +161,7 @@ double model_sd_px(const StretchProfile& look, const Surroundings& around, bool 
 // By how much an edge is seen too far out beside the shadow of a body darker than the floor [px].
 // Where the floor gets brighter farther out there is a penumbra, and between it and the rim what
 // the lamp does not reach at all, narrower than the blur and about as dark as the body; near the
-// contact the light of the room is missing too, unless the floor is as bright there as elsewhere.
+// contact the light of the room is missing too, unless the floor is as bright there as where it is brightest.
 // The higher above the floor, the farther from the rim all that is. Sizes: means over recordings
 // made by two ray tracers, edges about the true outline.
 double shadow_px(const Surroundings& around, const ProfileEdge& edge, double height_px) {
@@ -169,7 +169,7 @@ double shadow_px(const Surroundings& around, const ProfileEdge& edge, double hei
   constexpr double kContactPx = 0.04, kContactHeightPx = 12.0, kContactDims = 0.03;
   if (!around.darker) return 0.0;
   return std::min(kMostPx, kPerRisePx2 * around.rise) * std::exp(-height_px / kPenumbraHeightPx) +
-         kContactPx * std::min(1.0, edge.unlike_rest / kContactDims) *
+         kContactPx * std::min(1.0, edge.dimmed / kContactDims) *
              std::exp(-height_px / kContactHeightPx);
 }
 

@@ -52,8 +52,8 @@ struct alignas(kAlign) Block {
   Floats curved = {};     ///< 1: noise is even in levels that are not proportional to light
   Floats own_share = {};  ///< independent samples per sample
   Floats reach_px = {};
-  // Given or 0: what the levels inside and outside are expected to be, and how surely, as the
-  // inverse variance.
+  // Given or 0: what the levels inside and outside are expected to be, in light, and how surely, as
+  // the inverse variance.
   Floats expected_level[2] = {}, level_precision[2] = {};
   // By find_columns.
   Masks usable = {};
@@ -67,7 +67,8 @@ struct alignas(kAlign) Block {
   // Given for find_noise and find_offsets.
   Floats shading[kShading] = {};
   // By find_noise: sums of squared residuals in light, then in levels with their degrees of freedom
-  // inside, outside and on the edge; variances of the levels over those of the noise.
+  // inside, outside and on the edge; variances of the levels, were that of the noise as
+  // assumed.
   Floats light_square, noise_square[3], noise_freedom[3], level_variance[2];
   // By find_offsets.
   Masks found;
