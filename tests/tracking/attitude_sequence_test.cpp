@@ -42,6 +42,16 @@ TEST_F(AttitudeSequence, AStretchThatErrsAlikeDoesNotOutweighTheJumpItTakes) {
   EXPECT_EQ(count_wrong(glimpses), 0);
 }
 
+// A body that turns by most of a radian from frame to frame is seen anew each time, and frames that
+// err are as many witnesses: it would still have to leap by another radian, and back.
+TEST_F(AttitudeSequence, FramesThatSeeTheBodyAnewAndErrDoNotOutweighTheLeapTheyTake) {
+  for (Frame& frame : frames_) frame.t_s *= 6.0;
+  const Oracle oracle([](int i) { return i >= 20 && i < 38 ? -20.0 : 20.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  decide(oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+}
+
 TEST_F(AttitudeSequence, WhatNothingTellsIsDoubtful) {
   const Oracle oracle([](int) { return 0.0; });
   auto glimpses = tracked(oracle, [](int) { return false; });

@@ -499,6 +499,20 @@ TEST(OutlineFitter, ErrorsOfAFlatDiscAreSmallAndAsLargeAsStated) {
   EXPECT_GT(normalised / kDraws, 0.03);
 }
 
+// All its edges are found where a body half a pixel larger has them, and seen as clearly.
+TEST(OutlineFitter, LessSpeaksForABodyThatLooksSmallerThanItIs) {
+  FlatDisc disc;
+  disc.camera.transfer = data::Transfer::linear;  // as drawn
+  std::mt19937 random(6);
+  const auto seen = disc.measure({80.2, 70.3}, random);
+  disc.body.radius_m += 0.0005;
+  const auto of_larger = disc.measure({80.2, 70.3}, random);
+  ASSERT_TRUE(seen && of_larger);
+  EXPECT_NEAR(seen->larger_px, 0.0, 0.05);
+  EXPECT_NEAR(of_larger->larger_px, -0.5, 0.1);
+  EXPECT_LT(of_larger->evidence, 0.9 * seen->evidence);
+}
+
 // Shadows at the contact darken the floor there as well: on one as bright beside the body as
 // elsewhere the lower half of the outline is taken as it is seen, like the upper one.
 TEST(OutlineFitter, OnAnEvenFloorATiltedDiscIsNotMovedForTheSakeOfAContactShadow) {

@@ -288,7 +288,8 @@ class Chain {
 
   /// What it costs that node i does not go on from the two before it, in these readings.
   [[nodiscard]] double break_cost(std::size_t i, int a, int b, int c) const {
-    constexpr double kMostFrames = 2.5, kLeast = 0.12, kOfStep = 0.35, kMost = 4.0;
+    constexpr double kMostFrames = 2.5, kLeast = 0.12, kOfStep = 0.35;
+    constexpr double kMost = 12.0;  // no body leaps; a pose that is off by itself costs either way
     // All else equal, the slower motion: reading every other frame mirrored goes on evenly as well.
     constexpr double kPerRadian = 0.5;
     const Node &first = nodes_[i - 2], &second = nodes_[i - 1], &third = nodes_[i];

@@ -176,18 +176,6 @@ double moved_px(const Scenery& scenery, const Refined& refined, const data::Pose
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(refined.samples.size())));
 }
 
-// How much farther out the rim is seen than the body's size and this pose put it.
-double larger_px(const Refined& refined) {
-  double sum_px = 0.0, rim_px = 0.0;
-  for (size_t i = 0; i < refined.equations.size(); ++i) {
-    const EdgeEquation& e = refined.equations[i];
-    if (e.weight < 0.5 || !refined.samples[i].silhouette || e.swell < 0.0 || e.colour) continue;
-    sum_px += e.arc_px * (refined.solution.swell_px + e.polarity * refined.solution.polarity_px);
-    rim_px += e.arc_px;
-  }
-  return rim_px > 0.0 ? sum_px / rim_px : 0.0;
-}
-
 // What was outlined may be the face alone, in the light beside a wall in the shade: the body seems
 // too small then, or the edges of its wall are missing. A pose for which clearly more speaks, or
 // about as much while the body has its size, is the better one, though the outer edges of the wall

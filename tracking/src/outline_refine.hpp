@@ -85,8 +85,12 @@ void find_uncertainty(const Scenery& scenery, Refined& refined);
 /// less for a pose that merely has settled among edges.
 [[nodiscard]] double outline_score(const Refined& refined);
 
+/// How much farther out the rim is seen than the body's size and this pose put it.
+[[nodiscard]] double larger_px(const Refined& refined);
+
 /// What speaks for this pose rather than another one with nearly the same silhouette: the gain of
-/// all edges, limited per edge so that no single one decides, less what their residuals take.
+/// all edges, limited per edge so that no single one decides, less what their residuals take, and
+/// a share of it if the body, whose size is known, then looks too large or too small.
 [[nodiscard]] double evidence_of(const Refined& refined);
 
 }  // namespace trochoid::tracking
