@@ -189,6 +189,14 @@ bool listed(const std::vector<std::string>& names, const std::string& name) {
   });
 }
 
+// What [fit] says of a parameter: by its own name, else by that of its group.
+template <class Value>
+const Value* said_of(const std::string& name, const std::map<std::string, Value>& entries) {
+  auto entry = entries.find(name);
+  if (entry == entries.end()) entry = entries.find(name.substr(0, name.find('[')));
+  return entry == entries.end() ? nullptr : &entry->second;
+}
+
 void check_names(const model::Predictor& predictor, const data::FitSettings& settings) {
   const auto known = [&](const std::string& name) {
     return std::any_of(predictor.parameters().begin(), predictor.parameters().end(),
@@ -215,20 +223,18 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
 // folded into their range.
 void check_fixed(const model::Predictor& predictor, const data::FitSettings& settings) {
   for (const ParameterInfo& info : predictor.parameters()) {
-    const auto fixed = settings.fixed.find(info.name);
-    if (fixed == settings.fixed.end() || info.role == ParameterInfo::Role::initial) continue;
-    const double value = fixed->second;
-    if (!(value >= info.lower && value <= info.upper))
+    const double* value = said_of(info.name, settings.fixed);
+    if (value == nullptr || info.role == ParameterInfo::Role::initial) continue;
+    if (!(*value >= info.lower && *value <= info.upper))
       throw InputError(fmt::format("[fit] fixed: {} = {} must lie between {} and {}", info.name,
-                                   value, info.lower, info.upper));
+                                   *value, info.lower, info.upper));
   }
 }
 
 Transform transform_of(const ParameterInfo& info, const std::string& model,
                        const data::FitSettings& settings) {
-  const auto bounds = settings.bounds.find(info.name);
-  if (bounds != settings.bounds.end()) {
-    const auto [lower, upper] = bounds->second;
+  if (const auto* bounds = said_of(info.name, settings.bounds)) {
+    const auto [lower, upper] = *bounds;
     const bool low = std::isfinite(lower), high = std::isfinite(upper);
     if (low && high) return {Transform::Kind::between, lower, upper};
     if (low && !(info.logarithmic && lower <= 0.0)) return {Transform::Kind::above, lower, upper};
@@ -248,7 +254,7 @@ bool is_pivot(const std::string& name) {
 }
 
 bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
-  if (settings.fixed.contains(info.name)) return false;
+  if (said_of(info.name, settings.fixed) != nullptr) return false;
   for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
     if (info.name == asked_for) return true;
   if (is_pivot(info.name)) return settings.free_pivot || listed(settings.free, info.name);
@@ -276,8 +282,8 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
   const int count = static_cast<int>(parameters.size());
   Eigen::VectorXd values(count);
   for (int i = 0; i < count; ++i) {
-    const auto fixed = scene.fit.fixed.find(parameters[i].name);
-    values[i] = fixed != scene.fit.fixed.end() ? fixed->second : parameters[i].value;
+    const double* fixed = said_of(parameters[i].name, scene.fit.fixed);
+    values[i] = fixed != nullptr ? *fixed : parameters[i].value;
   }
   problem.base.assign(problem.arcs.size(), values);
   problem.row_weights.resize(problem.arcs.size());
@@ -287,8 +293,7 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
     FreeParameter parameter{
         index, arc, transform_of(info, predictor.model_name(), scene.fit), {}, {}};
     parameter.given = values[index];
-    const auto prior = scene.fit.prior.find(info.name);
-    if (prior != scene.fit.prior.end()) parameter.prior = prior->second;
+    if (const auto* prior = said_of(info.name, scene.fit.prior)) parameter.prior = *prior;
     // What is known of the camera widens the error bars; a model that is not the whole truth must
     // not bend it.
     const bool camera = info.name == kScale || info.name == kTimeFactor;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 
 #include "arcs.hpp"
@@ -129,6 +130,34 @@ TEST(Pieces, ABodyThatFellFlatLiesStillFromThenOn) {
     EXPECT_EQ((jacobian.row(row) - jacobian.row(row - 2)).norm(), 0.0) << row;
   }
   EXPECT_NE(residuals[1], residuals[rows - 1]) << "it has moved before";
+}
+
+// A term such as an air couple has a coefficient across the axis and one along it.
+TEST(Pieces, WhatIsSaidOfAGroupHoldsForThoseOfItsParametersThatAreNotNamed) {
+  data::Scene scene = slanting_disc();
+  scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-6, 1e-6, 3e-6);
+  scene.model.air_quadratic_N_m_s2 = Eigen::Vector3d(1e-7, 1e-7, 3e-7);
+  scene.fit.fixed = {{"air_linear_N_m_s", 2e-6}, {"air_linear_N_m_s[3]", 5e-6}};
+  scene.fit.bounds = {{"air_quadratic_N_m_s2", {1e-8, 1e-6}}};
+  scene.fit.prior = {{"air_quadratic_N_m_s2", {1e-7, 1e-8}},
+                     {"air_quadratic_N_m_s2[3]", {4e-7, 1e-8}}};
+  const auto predictor = model::make_predictor(scene);
+  const Problem problem = make_problem(*predictor, {ArcData{}}, scene);
+  std::map<std::string, const FreeParameter*> free;
+  for (std::size_t i = 0; i < problem.free.size(); ++i)
+    free[problem.name(static_cast<int>(i))] = &problem.free[i];
+  for (const auto& [name, value_N_m_s] :
+       {std::pair("air_linear_N_m_s[1]", 2e-6), std::pair("air_linear_N_m_s[3]", 5e-6)}) {
+    EXPECT_FALSE(free.contains(name)) << name;
+    EXPECT_EQ(problem.base[0][predictor->index_of(name)], value_N_m_s) << name;
+  }
+  for (const auto& [name, value_N_m_s2] :
+       {std::pair("air_quadratic_N_m_s2[1]", 1e-7), std::pair("air_quadratic_N_m_s2[3]", 4e-7)}) {
+    ASSERT_TRUE(free.contains(name)) << name;
+    EXPECT_EQ(free[name]->transform.kind, Transform::Kind::between) << name;
+    ASSERT_TRUE(free[name]->prior) << name;
+    EXPECT_EQ(free[name]->prior->value, value_N_m_s2) << name;
+  }
 }
 
 // The minimiser draws a reading, d scaled sigmas off, back with a force of w^2 d: the cost of
