@@ -362,19 +362,6 @@ void name_attitudes(Problem& problem) {
 
 namespace {
 
-// Rows after the model's end repeat the last ones before it.
-void lie_still(const ArcData& arc, model::Prediction& prediction) {
-  const auto width = static_cast<Eigen::Index>(arc.observables.size());
-  Eigen::Index last = 0;
-  while (last + width < prediction.values.size() && std::isfinite(prediction.values[last + width]))
-    last += width;
-  for (Eigen::Index row = last + width; row < prediction.values.size(); row += width) {
-    prediction.values.segment(row, width) = prediction.values.segment(last, width);
-    prediction.jacobian.middleRows(row, prediction.jacobian.rows() > 0 ? width : 0) =
-        prediction.jacobian.middleRows(last, prediction.jacobian.rows() > 0 ? width : 0);
-  }
-}
-
 // A step with up to eight derivatives costs about six plain ones.
 void count_work(const Problem& problem, std::size_t derivatives, int steps) {
   if (!problem.work) return;
@@ -398,6 +385,7 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   request.observables = data.observables;
   request.tolerance = problem.tolerance;
   request.max_steps = problem.max_steps();
+  request.lies_where_it_fell = true;
   if (jacobian != nullptr)
     for (const int i : columns)
       if (held_too || !problem.free[i].held) request.derivatives.push_back(problem.free[i].index);
@@ -411,7 +399,6 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
     return false;
   }
   count_work(problem, request.derivatives.size(), prediction.steps);
-  if (prediction.outcome == model::Outcome::flat) lie_still(data, prediction);
   if (jacobian != nullptr && request.derivatives.size() < columns.size()) {
     Eigen::MatrixXd all =
         Eigen::MatrixXd::Zero(prediction.values.size(), static_cast<int>(columns.size()));

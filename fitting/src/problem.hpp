@@ -111,7 +111,7 @@ struct Problem {
                                    const data::Scene& scene);
 
 /// Whitened, weighted residuals of one arc and their derivatives by u (columns_of order). A body
-/// that falls flat before the arc ends lies still from then on.
+/// that falls flat before the arc ends lies where it fell from then on.
 /// Returns false if the model has no prediction there (never leaves NaN behind).
 /// @param held_too  false: derivatives by held parameters are not computed but zero.
 [[nodiscard]] bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u,

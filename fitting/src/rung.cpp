@@ -125,6 +125,7 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   request.t_s = t_s;
   request.start_s = fit.arcs[static_cast<std::size_t>(arc)].from_s;
   request.observables.push_back(model::Observable::psi_rad);
+  request.lies_where_it_fell = true;
   const bool angle_only = fit.model == "pivot";
   const model::Prediction run = has_timing(*predictor)
                                     ? predict_timed(*predictor, values, request, seen_at(samples),

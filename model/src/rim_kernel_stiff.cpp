@@ -51,19 +51,35 @@ Sensitivities sensitivities_of(const RimModel& model, const RimInput<Dual8>& inp
   return s;
 }
 
-State<double, kStates> state_at(const SundialsRun& run, Eigen::Index row, double) {
+using Row = Eigen::Ref<const Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;
+
+State<double, kStates> state_of(const Row& states, const Row&, double) {
   State<double, kStates> y;
-  for (int i = 0; i < kStates; ++i) y[i] = run.states(row, i);
+  for (int i = 0; i < kStates; ++i) y[i] = states[i];
   return y;
 }
-State<Dual8, kStates> state_at(const SundialsRun& run, Eigen::Index row, const Dual8&) {
+State<Dual8, kStates> state_of(const Row& states, const Row& sensitivities, const Dual8&) {
   State<Dual8, kStates> y;
   for (int i = 0; i < kStates; ++i) {
-    y[i] = Dual8(run.states(row, i));
-    for (int p = 0; p < Dual8::kLanes; ++p)
-      y[i].derivative[p] = run.sensitivities(row, i + p * kStates);
+    y[i] = Dual8(states[i]);
+    for (int p = 0; p < Dual8::kLanes; ++p) y[i].derivative[p] = sensitivities[i + p * kStates];
   }
   return y;
+}
+
+/// The state a body fell flat in: the derivatives at that instant, and those of the instant.
+State<double, kStates> fallen(const RimModel&, const RimInput<double>&,
+                              const State<double, kStates>& y, double) {
+  return y;
+}
+State<Dual8, kStates> fallen(const RimModel& model, const RimInput<Dual8>& input,
+                             const State<Dual8, kStates>& y, double t_s) {
+  const auto system = stiff_system<Dual8>(model, input);
+  State<Dual8, kStates> slope;
+  system.derivative(t_s, y, slope);
+  const Dual8& theta = y[Rim::theta];
+  const double rate = std::cos(theta.value) * slope[Rim::theta].value;
+  return moved_to_event(system, t_s, y, event_delay(sin(theta), rate));
 }
 
 }  // namespace
@@ -105,7 +121,7 @@ RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimR
   RimPath<S> path;
   path.end.y = start;
   for (Eigen::Index row = 0; row < run.states.rows(); ++row) {
-    path.end.y = state_at(run, row, S(0.0));
+    path.end.y = state_of(run.states.row(row), run.sensitivities.row(row), S(0.0));
     State<S, 5> seen;
     for (int c = 0; c < 5; ++c) seen[c] = path.end.y[kComponents[c]];
     path.rows.push_back(seen);
@@ -114,6 +130,10 @@ RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimR
   path.end.side = std::cos(value_of(input.theta)) < 0.0 ? -1.0 : 1.0;
   path.end.error_sum = static_cast<double>(run.steps);
   note_end(run, path.end);
+  if (path.end.outcome == Outcome::flat)
+    path.end.y = fallen(
+        model, input,
+        state_of(run.end_state.transpose(), run.end_sensitivities.transpose(), S(0.0)), run.end_s);
   return path;
 }
 

@@ -111,6 +111,8 @@ class RimPredictor : public Predictor {
   template <class S>
   [[nodiscard]] RimPath<S> run(const RimInput<S>& in, const Call& call) const;
   template <class S>
+  [[nodiscard]] RimPath<S> seen(RimPath<S> path, const Call& call) const;
+  template <class S>
   void fill_values(const RimPath<S>& path, Call& call, Prediction& out) const;
   void fill_lanes(const RimPath<Dual8>& path, const Call& call, const std::vector<int>& columns,
                   Prediction& out) const;
@@ -176,6 +178,17 @@ RimPath<S> RimPredictor::run(const RimInput<S>& in, const Call& call) const {
       break;
   }
   return run_sliding(model_, in, call.options, call.t_s);
+}
+
+/// A run's path as far as it was asked for. A body that falls from the least tilt the model follows
+/// is on its face within a millisecond.
+template <class S>
+RimPath<S> RimPredictor::seen(RimPath<S> path, const Call& call) const {
+  if (path.end.outcome != Outcome::flat || !call.request.lies_where_it_fell) return path;
+  const State<S, 10>& y = path.end.y;
+  const double tilt_rad = value_of(y[Rim::theta]) < 0.5 * std::numbers::pi ? 0.0 : std::numbers::pi;
+  path.rows.resize(call.t_s.size(), {y[Rim::phi], S(tilt_rad), y[Rim::psi], y[Rim::x], y[Rim::y]});
+  return path;
 }
 
 /// Initial-state parameters that describe the state at the end of a run.
@@ -296,7 +309,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   std::vector<int> active;  // columns that need a lane
   for (std::size_t c = 0; c < request.derivatives.size(); ++c)
     if (!cyclic(request.derivatives[c])) active.push_back(static_cast<int>(c));
-  if (active.empty()) fill_values(run(input<double>(values), call), call, out);
+  if (active.empty()) fill_values(seen(run(input<double>(values), call), call), call, out);
   for (std::size_t from = 0; from < active.size(); from += Dual8::kLanes) {
     const std::size_t to = std::min(active.size(), from + Dual8::kLanes);
     const std::vector<int> columns(active.begin() + static_cast<std::ptrdiff_t>(from),
@@ -306,7 +319,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
       const int parameter = request.derivatives[static_cast<std::size_t>(columns[lane])];
       slot(in, entries_.slots[static_cast<std::size_t>(parameter)]).derivative[lane] = 1.0;
     }
-    const RimPath<Dual8> path = run(in, call);
+    const RimPath<Dual8> path = seen(run(in, call), call);
     if (from == 0) fill_values(path, call, out);
     fill_lanes(path, call, columns, out);
   }

@@ -24,7 +24,8 @@ struct RimRunOptions {
   double stick_factor = 1.0;  ///< scales the threshold of sticking, to see its influence
 };
 
-/// How a run went; `y` is the state at `end_s`, of `regime` (rolling: the last two are 0).
+/// How a run went; `y` is the state at `end_s`, of `regime` (rolling: the last two are 0). Where
+/// the body fell flat its derivatives are those of the state it fell in, whenever that is.
 template <class S>
 struct RimRunEnd {
   Outcome outcome = Outcome::reached_end;
@@ -227,6 +228,7 @@ class RimRun {
     switch (result.event) {
       case Roll::flat:
         note("flat");
+        end_.y = with_slip(moved_to_event(roll_, result.t_s, result.y, delay), S(0.0), S(0.0));
         return finish(Outcome::flat);
       case Roll::lift_off:
         note("lift_off");
@@ -258,6 +260,7 @@ class RimRun {
     switch (result.event) {
       case Slide::flat:
         note("flat");
+        end_.y = moved_to_event(slide_, result.t_s, result.y, delay);
         return finish(Outcome::flat);
       case Slide::lift_off:
         note("lift_off");

@@ -361,6 +361,8 @@ SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::Vect
   run.states.conservativeResize(rows, Eigen::NoChange);
   run.sensitivities.conservativeResize(rows, Eigen::NoChange);
   run.end_state = state;
+  if (run.event >= 0) stepper->sensitivities(carried);
+  run.end_sensitivities = carried.transpose();
   stepper->count(run);
   return run;
 }

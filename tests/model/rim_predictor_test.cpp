@@ -98,15 +98,16 @@ data::Scene random_scene(std::mt19937& draw, const std::string& name) {
 /// Central differences of order four, step chosen so that truncation and rounding balance.
 void expect_derivatives_match(const Predictor& predictor, const Eigen::VectorXd& values,
                               std::span<const double> t_s, double tolerance,
-                              double relative_step = 2e-4) {
+                              double relative_step = 2e-4, Outcome end = Outcome::reached_end) {
   PredictRequest request;
   request.t_s = t_s;
   request.observables.assign(std::begin(kEverything), std::end(kEverything));
   request.tolerance = 1e-13;
   request.want_end_state = true;
+  request.lies_where_it_fell = true;
   for (int i = 0; i < values.size(); ++i) request.derivatives.push_back(i);
   const Prediction exact = predictor.predict(values, request);
-  ASSERT_EQ(exact.outcome, Outcome::reached_end);
+  ASSERT_EQ(exact.outcome, end);
   request.derivatives.clear();
   for (int i = 0; i < values.size(); ++i) {
     const double h = relative_step * std::max(1e-3 * (values[i] == 0.0), std::abs(values[i]));
@@ -165,6 +166,86 @@ TEST(RimPredictor, DifferentiatesAcrossStickAndSlip) {
   const auto predictor = make_predictor(random_scene(draw, "s10_stick_slip_event"));
   expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.02, 0.2, 0.5, 0.8},
                            1e-4);
+}
+
+/// A disc on a soft floor falls flat within 0.6 s.
+data::Scene soon_flat(const std::string& name) {
+  data::Scene scene = reference_scene(name);
+  scene.start.theta_rad = 0.3;
+  scene.start.phi_rad = 1.0;
+  scene.start.w2_rad_s = 18.0;
+  scene.start.w3_rad_s = 0.5;
+  scene.model.rolling_friction_m = 1.5e-3;
+  scene.model.pivoting_friction_m = 2e-4;
+  return scene;
+}
+
+// The instant of the fall depends on the parameters, and with it all that comes after.
+TEST(RimPredictor, DifferentiatesWhereABodyFellFlat) {
+  const auto check = [](const data::Scene& scene, double tolerance) {
+    constexpr double kStep =
+        2e-5;  // phi runs fast at the end: its error goes by the step's fourth power
+    const auto predictor = make_predictor(scene);
+    expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.05, 0.1, 2.0, 2.5},
+                             tolerance, kStep, Outcome::flat);
+  };
+  check(soon_flat("s06_roll_disc"), 1e-5);
+  data::Scene sliding = soon_flat("s08_slide_disc");
+  check(sliding, 1e-4);
+  sliding.model.slip_regularisation_m_s.reset();
+  check(sliding, 1e-4);
+}
+
+// Up to the fall the explicit method would do, for much longer only a stiff solver: where it lies
+// must not depend on which it was.
+TEST(RimPredictor, AStiffSolverDifferentiatesWhereABodyFellFlatAlike) {
+  data::Scene scene = soon_flat("s08_slide_disc");
+  scene.model.slip_regularisation_m_s = 1e-5;
+  const auto predictor = make_predictor(scene);
+  PredictRequest request;
+  request.observables.assign(std::begin(kEverything), std::end(kEverything));
+  request.lies_where_it_fell = true;
+  for (int i = 0; i < static_cast<int>(predictor->parameters().size()); ++i)
+    request.derivatives.push_back(i);
+  const auto lying_at = [&](double t_s) {
+    request.t_s = {&t_s, 1};
+    return predictor->predict(defaults(*predictor), request);
+  };
+  const Prediction soon = lying_at(1.1), late = lying_at(10.0);
+  ASSERT_EQ(soon.outcome, Outcome::flat);
+  ASSERT_EQ(late.outcome, Outcome::flat);
+  EXPECT_NE(soon.steps, late.steps) << "one method for both";
+  constexpr double kTolerance = 1e-6;  // its derivatives are integrated to 1e-9
+  EXPECT_LE((soon.values - late.values).norm(), kTolerance);
+  for (int i = 0; i < soon.jacobian.cols(); ++i)
+    EXPECT_LE((soon.jacobian.col(i) - late.jacobian.col(i)).norm(),
+              kTolerance * soon.jacobian.col(i).norm())
+        << predictor->parameters()[static_cast<std::size_t>(i)].name;
+}
+
+TEST(RimPredictor, ABodyThatFellFlatLiesWhereItFell) {
+  const auto predictor = make_predictor(soon_flat("s06_roll_disc"));
+  const Eigen::VectorXd values = defaults(*predictor);
+  PredictRequest request;
+  std::vector<double> t_s{0.0, 2.0};
+  request.t_s = t_s;
+  request.observables.assign(std::begin(kEverything), std::end(kEverything));
+  const Prediction ended = predictor->predict(values, request);
+  ASSERT_EQ(ended.outcome, Outcome::flat);
+  EXPECT_TRUE(std::isnan(ended.values[5]));
+  request.lies_where_it_fell = true;
+  constexpr double kJustBefore = 1.0 - 1e-9;
+  t_s = {0.0, kJustBefore * ended.valid_until_s, 2.0, 2.5};
+  request.t_s = t_s;
+  const Prediction run = predictor->predict(values, request);
+  EXPECT_EQ(run.outcome, Outcome::flat);
+  EXPECT_EQ(run.valid_until_s, ended.valid_until_s);
+  const auto falling = run.values.segment<5>(5), lying = run.values.segment<5>(10);
+  constexpr double kNear_m = 1e-9, kNear_rad = 1e-5;
+  EXPECT_LT((lying.head<2>() - falling.head<2>()).norm(), kNear_m);
+  EXPECT_LT((lying.tail<2>() - falling.tail<2>()).norm(), kNear_rad);
+  EXPECT_EQ(lying[2], 0.0);
+  EXPECT_EQ((run.values.segment<5>(15) - lying).norm(), 0.0);
 }
 
 // Where slip begins and ends its direction settles at once: the path is smooth, its neighbours run

@@ -258,6 +258,17 @@ template <class S>
   return shift - value_of(shift);
 }
 
+/// State at an event with the derivatives that it has there: those at a fixed instant, and what the
+/// event's delay adds.
+template <class System, class S, int N>
+[[nodiscard]] auto moved_to_event(const System& system, double t_s, const State<S, N>& y,
+                                  const S& delay) {
+  State<S, N> slope, moved = y;
+  system.derivative(t_s, y, slope);
+  for (int i = 0; i < N; ++i) moved[i] += slope[i] * delay;
+  return moved;
+}
+
 /// State to start the next arc with: the derivatives cross the event by the saltation matrix
 ///   S+ = (dR/dy + (f+ - dR/dy f-) (grad g)^T / (grad g . f-)) S-,
 /// written with duals: go to the moved event along the old motion, reset, and come back along the
@@ -267,10 +278,7 @@ template <class S>
 template <class Before, class After, class S, int N, class Reset>
 [[nodiscard]] auto across_event(const Before& before, const After& after, double t_s,
                                 const State<S, N>& y, const S& delay, Reset&& reset) {
-  State<S, N> slope, moved = y;
-  before.derivative(t_s, y, slope);
-  for (int i = 0; i < N; ++i) moved[i] += slope[i] * delay;
-  auto next = reset(moved);
+  auto next = reset(moved_to_event(before, t_s, y, delay));
   auto next_slope = next;
   after.derivative(t_s, next, next_slope);
   constexpr int kAfter = After::kStates;

@@ -42,10 +42,12 @@ struct PredictRequest {
   int max_steps = 0;
   /// Also return the state at the last time, expressed in the `initial` parameters (for shooting).
   bool want_end_state = false;
+  /// After a body has fallen flat it lies there: rows go on, without tilt, where it fell.
+  bool lies_where_it_fell = false;
 };
 
 /// Row n * observables.size() + o belongs to time n, observable o. After an early end the remaining
-/// rows are NaN, `outcome` says why and `valid_until_s` says when.
+/// rows are NaN (unless it lies_where_it_fell), `outcome` says why and `valid_until_s` says when.
 struct Prediction {
   Eigen::VectorXd values;
   Eigen::MatrixXd jacobian;            ///< rows as values, one column per requested derivative

@@ -53,9 +53,10 @@ struct SundialsOptions {
 };
 
 struct SundialsRun {
-  Eigen::MatrixXd states;         ///< one row per time reached
-  Eigen::MatrixXd sensitivities;  ///< one row per time reached: states x parameters, by column
-  Eigen::VectorXd end_state;      ///< where the run ended: last time, or the event
+  Eigen::MatrixXd states;             ///< one row per time reached
+  Eigen::MatrixXd sensitivities;      ///< one row per time reached: states x parameters, by column
+  Eigen::VectorXd end_state;          ///< where the run ended: last time, or the event
+  Eigen::VectorXd end_sensitivities;  ///< there, as a row of `sensitivities`
   double end_s = 0.0;
   int event = -1;  ///< index of the event function that changed sign, -1 if none
   Outcome outcome = Outcome::reached_end;
