@@ -166,13 +166,7 @@ Found search_path(const Problem& problem, const Quest& quest) {
     return surely_found(problem, best);
   };
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
-  bool searched = false;
   for (const Relative& relative : quest.relatives) {
-    if (relative.model == nullptr) {
-      searched = true;
-      if (take(search(problem, quest.starter))) return best;
-      continue;
-    }
     Problem easier = eased(problem, *relative.model);
     // From positions alone neighbouring valleys are many, and a start has to be near the right one.
     easier.rough = seen;
@@ -202,7 +196,7 @@ Found search_path(const Problem& problem, const Quest& quest) {
     }
     *problem.work = work;
   }
-  if (!searched && !exhausted(problem, best)) take(search(problem, quest.starter));
+  if (!exhausted(problem, best)) take(search(problem, quest.starter));
   return best;
 }
 

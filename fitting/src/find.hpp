@@ -7,7 +7,7 @@ namespace trochoid::fitting {
 /// An easier model, searched without a guess, and the steps from its solution to the model's own:
 /// each is minimised from where the one before it ended.
 struct Relative {
-  const model::Predictor* model = nullptr;  ///< null: now the model itself
+  const model::Predictor* model = nullptr;
   std::vector<const model::Predictor*> bridges;
 };
 
@@ -16,9 +16,8 @@ struct Quest {
   Starter starter;
   const FitOptions* options = nullptr;
   bool start_given = false;
-  /// Easier relatives of the model, tried first: a sliding body may nearly roll, and a softened
-  /// friction law has a smooth cost. Their parameters are found by name. The model itself comes
-  /// last unless it is in the list.
+  /// Easier relatives of the model, tried first: a sliding body may nearly roll, and the equations
+  /// of a softer friction law are less stiff. Their parameters are found by name.
   std::vector<Relative> relatives;
 };
 

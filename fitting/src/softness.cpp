@@ -52,13 +52,11 @@ std::optional<data::Fit> fit_gently(std::span<const data::Track> tracks, const F
   return fit;
 }
 
-// From the gentle law's solution. Coulomb's law makes a rough cost over the whole track, on which a
-// descent stops anywhere; grown from a first part on, it is followed down.
+// From the gentle law's solution, which lies near Coulomb's where the two explain a track alike.
 std::optional<data::Fit> fit_sharply(std::span<const data::Track> tracks, const FitOptions& options,
                                      const data::Scene& scene, const data::Fit& gentle) {
   FitOptions own = going_on_from(gentle, options);
   own.start.erase(kSlipScale);
-  if (own.strategy == "single") own.strategy = "growing";
   return fit_named(tracks, scene, std::move(own), "Coulomb's law, ");
 }
 

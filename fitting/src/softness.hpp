@@ -9,9 +9,10 @@ namespace trochoid::fitting {
 [[nodiscard]] bool softness_is_open(const Rung& rung);
 
 /// Fits a sliding rung whose friction may set in at once (Coulomb's law) or rise with the slip
-/// speed, mu u/sqrt(u^2 + eps^2). The gentle law has a smooth cost and few valleys: it is fitted
-/// first, with eps a parameter like any other, which the rung's scene then names as free. Coulomb's
-/// law is kept where eps does not show by strong evidence.
+/// speed, mu u/sqrt(u^2 + eps^2). The gentle law is fitted first, with eps a parameter like any
+/// other, which the rung's scene then names as free: where friction does rise, Coulomb's law alone
+/// finds no way. Coulomb's law, fitted from there, is kept where eps does not show by strong
+/// evidence.
 /// @param options  start and strategy of the search; a given eps is gone on from.
 void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 

@@ -55,8 +55,8 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
   return [](const ArcData&) { return std::vector<Start>{}; };
 }
 
-// The exact Coulomb law, and a sharply regularised one, make a rough cost and stiff equations; the
-// gentle law's minimum lies far from theirs. Each bridge takes a third of the regularisation.
+// A sharply regularised law makes stiff equations, and the gentle law's minimum lies far from its
+// own: each bridge takes a third of the regularisation. The exact law needs no such way.
 std::vector<OwnedRelative> relatives_of(data::Scene scene) {
   constexpr double kGentle_m_s = 1e-3, kSharpEnough_m_s = 1e-4, kStep = 0.33;
   std::vector<OwnedRelative> relatives;
@@ -67,14 +67,12 @@ std::vector<OwnedRelative> relatives_of(data::Scene scene) {
   const auto& asked = scene.fit.free;
   const bool soft_as_it_may_be =
       given_m_s > 0.0 && std::find(asked.begin(), asked.end(), kSlipScale) != asked.end();
-  if (soft_as_it_may_be || given_m_s >= 0.7 * kGentle_m_s) return relatives;
+  if (given_m_s == 0.0 || soft_as_it_may_be || given_m_s >= 0.7 * kGentle_m_s) return relatives;
   scene.model.name = "sliding";
   const auto softened = [&](double by_m_s) {
     scene.model.slip_regularisation_m_s = by_m_s;
     return model::make_predictor(scene);
   };
-  // The exact law runs as fast as the gentle one, a sharply regularised one does not.
-  if (given_m_s == 0.0) relatives.push_back({nullptr, {}});
   relatives.push_back({softened(kGentle_m_s), {}});
   const double last_m_s = std::max(given_m_s / (0.7 * kStep), kSharpEnough_m_s);
   for (double by_m_s = kStep * kGentle_m_s; by_m_s >= last_m_s; by_m_s *= kStep)
