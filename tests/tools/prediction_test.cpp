@@ -51,5 +51,34 @@ TEST(Prediction, TheGivenPlaceOfAPivotIsNotJudged) {
   EXPECT_TRUE(residuals(file, turning(), 1.0).at(0).empty());
 }
 
+// A disc nearly flat with a strong loss: down within a second, and recorded for two.
+TEST(Prediction, GoesOnWhereABodyFellFlat) {
+  data::Fit fit;
+  fit.model = "rolling";
+  fit.scene_toml = R"([body]
+kind = "disc"
+radius_m = 0.0375
+thickness_m = 0.006
+mass_kg = 0.07
+[support]
+kind = "floor"
+[model]
+name = "rolling"
+rolling_friction_m = 5e-3
+[start]
+theta_rad = 0.1
+w2_rad_s = 10.0
+)";
+  fit.arcs = {{.track = 0, .object = 0, .from_s = 0.0, .to_s = 2.0, .samples = 3}};
+  data::TrackFile file;
+  file.tracks = {{.object = 0, .samples = {seen(0.0, 0.0), seen(1.0, 0.0), seen(2.0, 0.0)}}};
+  const PredictedPath path = replay(fit, file);
+  const auto last = path.at(0, 2.0);
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->theta_rad, 0.0);
+  EXPECT_NEAR(last->centre_m.z(), 0.003, 1e-12);  // half its thickness above the floor
+  EXPECT_EQ(path.arcs.front().ended, "");
+}
+
 }  // namespace
 }  // namespace trochoid::tools

@@ -29,7 +29,7 @@ class TwoReadings final : public BodyFinder {
     guess.rim = Ellipse::from_axes({32.0, 32.0}, 10.0, 8.0, 0.0);
     guess.centre_px = guess.rim.centre_px;
   }
-  [[nodiscard]] std::vector<data::Pose<>> other_readings(const data::Pose<>& pose) const override {
+  [[nodiscard]] OtherReadings other_readings(const data::Pose<>& pose) const override {
     data::Pose<> steeper = pose, flatter = pose;
     steeper.theta_rad += kOff_rad;
     flatter.theta_rad -= kOff_rad;
@@ -54,6 +54,14 @@ class Readings : public GlimpsedSequence {
     }
     (void)choose_readings(background_, finder, glimpses);
     return glimpses;
+  }
+  /// Largest standard deviation of a tilt once other readings are allowed for.
+  double doubted_rad(const BodyFinder& finder) {
+    auto glimpses = tracked(finder, [](int) { return false; });
+    doubt_readings(choose_readings(background_, finder, glimpses), finder, 0, glimpses);
+    double most = 0.0;
+    for (const Glimpse& g : glimpses) most = std::max(most, g.seen->pose->sigma_theta_rad);
+    return most;
   }
   static int count_off(const std::vector<Glimpse>& glimpses) {
     return static_cast<int>(std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) {
@@ -82,6 +90,16 @@ TEST_F(Readings, AStretchThatLeavesThePathIsLedBackThoughALittleMoreSpeaksForIt)
 TEST_F(Readings, ALeapStaysThatThePicturesBearOut) {
   const TwoReadings finder([](int i) { return i < 30 ? 10.0 : -10.0; });
   EXPECT_EQ(count_off(chosen(finder, [](int i) { return i >= 30; })), 30);
+}
+
+TEST_F(Readings, WhatNoPictureTellsApartIsHeldByTheErrorOfTheTilt) {
+  const TwoReadings finder([](int) { return 1.0; });
+  EXPECT_GT(doubted_rad(finder), 0.5 * kOff_rad);
+}
+
+TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {
+  const TwoReadings finder([](int) { return 40.0; });
+  EXPECT_LT(doubted_rad(finder), 0.02 * kOff_rad);
 }
 
 // A wall as high as it is: the face alone is outlined less round than face and wall together.

@@ -119,8 +119,11 @@ PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
   request.t_s = replayed.t_s;
   request.start_s = arc_start_s(fit, arc_index);
   request.observables = observables_of(predictor.model_name());
+  request.lies_where_it_fell = true;
   const model::Prediction run = predictor.predict(values_of(predictor, fit, arc_index), request);
-  if (run.outcome != model::Outcome::reached_end) replayed.ended = sentence(run.outcome);
+  const bool goes_on =
+      run.outcome == model::Outcome::reached_end || run.outcome == model::Outcome::flat;
+  if (!goes_on) replayed.ended = sentence(run.outcome);
   const auto columns = static_cast<Eigen::Index>(request.observables.size());
   for (std::size_t n = 0; n < replayed.t_s.size(); ++n) {
     const auto row = run.values.segment(static_cast<Eigen::Index>(n) * columns, columns);

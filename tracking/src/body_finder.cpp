@@ -139,13 +139,10 @@ class CylinderFinder final : public BodyFinder {
     if (motion_.rotation() < 0 || pivoted_) return std::nullopt;
     return tracking::mirrored(camera_, motion_, pose);
   }
-  [[nodiscard]] std::vector<data::Pose<>> other_readings(const data::Pose<>& pose) const override {
+  [[nodiscard]] OtherReadings other_readings(const data::Pose<>& pose) const override {
     if (motion_.rotation() < 0) return {};
-    std::vector<data::Pose<>> all;
-    for (const auto& other : {face_outlined_like(body_, camera_, motion_, pose, Side::same),
-                              outlined_like_face(body_, camera_, motion_, pose)})
-      if (other) all.push_back(*other);
-    return all;
+    return {face_outlined_like(body_, camera_, motion_, pose, Side::same),
+            outlined_like_face(body_, camera_, motion_, pose)};
   }
   [[nodiscard]] const BodyFinder* lying() const override { return lying_.get(); }
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -53,8 +54,8 @@ class BodyFinder {
   }
   /// Attitudes of a body that may have been taken for this one, part of its outline for another:
   /// its face for the whole of it, its wall's edge for its face's. Not the mirror image.
-  [[nodiscard]] virtual std::vector<data::Pose<>> other_readings(
-      const data::Pose<>& /*pose*/) const {
+  using OtherReadings = std::array<std::optional<data::Pose<>>, 2>;
+  [[nodiscard]] virtual OtherReadings other_readings(const data::Pose<>& /*pose*/) const {
     return {};
   }
   /// For a body on the floor that is known to lie on its face; null where there is no difference.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -58,10 +59,10 @@ class Readings {
     if (!steps_s.empty()) frame_s_ = data::median(std::move(steps_s));
   }
 
-  bool choose() {
+  ReadingDoubt choose() {
     constexpr std::size_t kFewest = 8;
     constexpr int kRounds = 2;  // what was found may be followed on itself
-    if (nodes_.size() < kFewest) return false;
+    if (nodes_.size() < kFewest) return {};
     learn();
     follow(others());
     solve();
@@ -70,15 +71,15 @@ class Readings {
       follow(breaks());
       solve();
     }
-    bool otherwise = false;
+    ReadingDoubt doubt{.may_be = may_be_otherwise()};
     for (Node& node : nodes_) {
       if (node.chosen == 0) continue;
       auto& seen = glimpses_[node.at].seen;
       node.readings[node.chosen].turned_rad = seen->turned_rad;
       seen = std::move(node.readings[node.chosen]);
-      otherwise = true;
+      doubt.otherwise = true;
     }
-    return otherwise;
+    return doubt;
   }
 
  private:
@@ -130,19 +131,24 @@ class Readings {
     return off;
   }
 
+  /// Frame k in another reading; nothing if there is none or the picture leads elsewhere.
+  [[nodiscard]] std::optional<Sighting> read_otherwise(Measuring& measure, std::size_t k,
+                                                       const std::optional<Pose>& other) const {
+    const auto before = other ? one_frame_off(k, *other, 1) : std::nullopt;
+    if (!before) return std::nullopt;
+    auto seen = measured(measure, k, *other, *before);
+    return seen && !same(*seen, nodes_[k].seen()) ? std::move(seen) : std::nullopt;
+  }
+
   /// Other readings of every so many frames for which about as much speaks.
   [[nodiscard]] std::vector<Start> others() {
-    constexpr std::size_t kStride = 12;
     constexpr double kAsGood = -0.05;
     std::vector<std::vector<Start>> found(nodes_.size() / kStride);
     on_both_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
-      for (const Pose& other : finder_.other_readings(nodes_[k].pose())) {
-        const auto before = one_frame_off(k, other, 1);
-        if (!before) continue;
-        const auto seen = measured(measure, k, other, *before);
-        if (!seen || same(*seen, nodes_[k].seen()) || gain(*seen, nodes_[k].seen()) < kAsGood)
-          continue;
+      for (const auto& other : finder_.other_readings(nodes_[k].pose())) {
+        const auto seen = read_otherwise(measure, k, other);
+        if (!seen || gain(*seen, nodes_[k].seen()) < kAsGood) continue;
         for (const int side : {1, -1})
           if (const auto off = one_frame_off(k, seen->pose->pose, side))
             found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
@@ -152,6 +158,33 @@ class Readings {
     for (const auto& some : found) starts.insert(starts.end(), some.begin(), some.end());
     for (const Start& start : starts) add(start.at, start.seen);
     return starts;
+  }
+
+  /// How likely the whole path is to be seen in each of the other readings: what all of its
+  /// pictures say together for one of two has an error that they share.
+  [[nodiscard]] std::array<double, 2> may_be_otherwise() const {
+    constexpr double kShared = 0.08;  // between recordings, where that of one picture is about 0.1
+    struct Gains {
+      std::array<std::optional<double>, 2> of;
+    };
+    std::vector<Gains> gains(nodes_.size() / kStride);
+    on_both_cores(background_, finder_, gains.size(), [&](Measuring& measure, std::size_t i) {
+      const std::size_t k = i * kStride + kStride / 2;
+      const auto others = finder_.other_readings(nodes_[k].pose());
+      for (std::size_t which = 0; which < others.size(); ++which)
+        if (const auto seen = read_otherwise(measure, k, others[which]))
+          gains[i].of[which] = gain(*seen, nodes_[k].seen());
+    });
+    std::array<double, 2> may_be{};
+    for (std::size_t which = 0; which < may_be.size(); ++which) {
+      double sum = 0.0, count = 0.0;
+      for (const Gains& g : gains)
+        if (g.of[which]) sum += *g.of[which], count += 1.0;
+      if (count > 0.0)
+        may_be[which] = count / static_cast<double>(gains.size()) * 0.5 *
+                        std::erfc(-sum / count / (kShared * std::numbers::sqrt2));
+    }
+    return may_be;
   }
 
   /// Where the path breaks, it may have gone on from either side.
@@ -318,6 +351,7 @@ class Readings {
   /// A break costs at most what five frames gain in which a tenth more speaks for another reading;
   /// a leap and the way back are four breaks.
   static constexpr double kMost = 6.0;
+  static constexpr std::size_t kStride = 12;  ///< of the frames that are read otherwise
 
   const Background& background_;
   const BodyFinder& finder_;
@@ -331,9 +365,32 @@ class Readings {
 
 }  // namespace
 
-bool choose_readings(const Background& background, const BodyFinder& finder,
-                     std::vector<Glimpse>& glimpses) {
+ReadingDoubt choose_readings(const Background& background, const BodyFinder& finder,
+                             std::vector<Glimpse>& glimpses) {
   return Readings(background, finder, glimpses).choose();
+}
+
+void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::size_t settled,
+                    std::vector<Glimpse>& glimpses) {
+  constexpr double kLying = 1e-6;  // found to lie on its face, by more than its edges
+  for (std::size_t i = settled; i < glimpses.size(); ++i) {
+    if (!glimpses[i].posed()) continue;
+    Sighting& seen = *glimpses[i].seen;
+    const Pose pose = seen.pose->pose;
+    if (std::sin(pose.theta_rad) < kLying) continue;
+    const auto others = finder.other_readings(pose);
+    for (std::size_t which = 0; which < others.size(); ++which) {
+      if (!others[which]) continue;
+      Sighting other = seen;
+      other.pose->pose = *others[which];
+      finder.place(other);
+      const double share = std::sqrt(doubt.may_be[which]);
+      allow_for(share * (other.centre_px - seen.centre_px),
+                share * (others[which]->centre_m - pose.centre_m).head<2>(), seen);
+      seen.pose->sigma_theta_rad = std::hypot(seen.pose->sigma_theta_rad,
+                                              share * (others[which]->theta_rad - pose.theta_rad));
+    }
+  }
 }
 
 }  // namespace trochoid::tracking

@@ -1,9 +1,16 @@
 #pragma once
+#include <array>
 #include <vector>
 
 #include "glimpse.hpp"
 
 namespace trochoid::tracking {
+
+/// What the pictures of a sequence leave open about how they are read.
+struct ReadingDoubt {
+  bool otherwise = false;          ///< some frame is read otherwise than it was tracked
+  std::array<double, 2> may_be{};  ///< probability of each of BodyFinder::other_readings, all along
+};
 
 /// Decides over a sequence which reading of its pictures was seen. For a stretch of frames the fit
 /// may have sat on another edge, the face taken for the whole body or the edge of its wall for that
@@ -11,8 +18,13 @@ namespace trochoid::tracking {
 /// the path breaks its continuation from either side, are followed as far as the pictures bear
 /// them out; of all paths through what was found the likeliest counts [Viterbi 1967], by what
 /// speaks for its poses and by how evenly it goes on.
-/// @return whether that was another one than tracked in any frame.
-[[nodiscard]] bool choose_readings(const Background& background, const BodyFinder& finder,
-                                   std::vector<Glimpse>& glimpses);
+[[nodiscard]] ReadingDoubt choose_readings(const Background& background, const BodyFinder& finder,
+                                           std::vector<Glimpse>& glimpses);
+
+/// Lets the covariance of every frame hold the other readings, too, as far as they may be right: a
+/// wall that its shade hides may be there, whatever the edges say.
+/// @param settled so many frames at the front stay as they are.
+void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::size_t settled,
+                    std::vector<Glimpse>& glimpses);
 
 }  // namespace trochoid::tracking

@@ -331,8 +331,8 @@ class Tracking {
     const auto doubts = decide_attitudes(background_, *finder_, glimpses);
     mend_from_neighbours(background_, *finder_, glimpses);
     mend_from_one_side(background_, *finder_, glimpses);
-    if (choose_readings(background_, *finder_, glimpses))
-      mend_from_neighbours(background_, *finder_, glimpses);
+    const ReadingDoubt reading = choose_readings(background_, *finder_, glimpses);
+    if (reading.otherwise) mend_from_neighbours(background_, *finder_, glimpses);
     if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
     doubt_attitudes(doubts, glimpses);
     measure_what_lies(background_, *finder_, glimpses);
@@ -340,6 +340,7 @@ class Tracking {
     doubt_what_leaves_the_path(glimpses);
     doubt_what_stands_alone(glimpses);
     forget_what_tells_nothing(glimpses);
+    doubt_readings(reading, *finder_, settled, glimpses);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
