@@ -97,6 +97,17 @@ TEST_F(Readings, WhatNoPictureTellsApartIsHeldByTheErrorOfTheTilt) {
   EXPECT_GT(doubted_rad(finder), 0.5 * kOff_rad);
 }
 
+// The last frames of one stretch are the first of the next.
+TEST_F(Readings, AFrameIsDoubtedOnce) {
+  const TwoReadings finder([](int) { return 1.0; });
+  auto glimpses = tracked(finder, [](int) { return false; });
+  const ReadingDoubt doubt = choose_readings(background_, finder, glimpses);
+  doubt_readings(doubt, finder, 0, glimpses);
+  const double once_rad = glimpses[30].seen->pose->sigma_theta_rad;
+  doubt_readings(doubt, finder, 0, glimpses);
+  EXPECT_EQ(glimpses[30].seen->pose->sigma_theta_rad, once_rad);
+}
+
 TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {
   const TwoReadings finder([](int) { return 40.0; });
   EXPECT_LT(doubted_rad(finder), 0.02 * kOff_rad);

@@ -374,8 +374,9 @@ void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::si
                     std::vector<Glimpse>& glimpses) {
   constexpr double kLying = 1e-6;  // found to lie on its face, by more than its edges
   for (std::size_t i = settled; i < glimpses.size(); ++i) {
-    if (!glimpses[i].posed()) continue;
+    if (!glimpses[i].posed() || glimpses[i].seen->holds_other_readings) continue;
     Sighting& seen = *glimpses[i].seen;
+    seen.holds_other_readings = true;
     const Pose pose = seen.pose->pose;
     if (std::sin(pose.theta_rad) < kLying) continue;
     const auto others = finder.other_readings(pose);
