@@ -275,6 +275,25 @@ TEST(EdgeStretch, ProfilesKnowTheLevelsOfPlainSurfacesFromEachOther) {
   EXPECT_NEAR(mean_square_pull(profiles), 1.0, kPullTolerance);
 }
 
+// What is not known of the shading makes the levels of single profiles scatter; taken for levels
+// that differ along the outline, profiles would know little of them from each other.
+TEST(EdgeStretch, LevelsThatScatterWithTheirShadingAreKnownFromEachOther) {
+  constexpr int kPictures = 100, kOfAnOutline = 100;
+  constexpr double kNoise = 2.0;
+  std::mt19937 random(8);
+  double of_alone = 0.0;
+  for (int picture = 0; picture < kPictures; ++picture) {
+    std::vector<StretchProfile> profiles;
+    for (int i = 0; i < kOfAnOutline; ++i)
+      profiles.push_back(profile_of(0.0, 0.7, 0.0, 0.0, kNoise, random));
+    fit_stretches(profiles);
+    of_alone += mean_square_px2(profiles) /
+                (kNoise * kNoise * least_variance_alone_px2(profiles.front())) / kPictures;
+  }
+  // With both levels known it would be 0.72.
+  EXPECT_LT(of_alone, 0.84);
+}
+
 // Profiles with their edge at 0 around a body; outside, a share of them in a shadow, or a level
 // that comes and goes.
 std::vector<StretchProfile> profiles_on_uneven_floor(bool shadow, double share = 0.25) {

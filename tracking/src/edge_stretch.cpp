@@ -397,7 +397,12 @@ void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
     Level& level = looks_[i].levels[side];
     level.per_unit = side == kOutside ? light_of_plate(profiles_[i].profile) : 1.0;
     level.value = static_cast<double>(side == kOutside ? b.outer[l] : b.inner[l]) / level.per_unit;
-    level.variance = noise2[i] * static_cast<double>(b.level_variance[side][l]) /
+    const Look& look = looks_[i];
+    Shading pull;
+    for (int k = 0; k < kShading; ++k)
+      pull[k] = look.most[k] * static_cast<double>(b.level_pull[side][k][l]);
+    const double of_shading = pull.dot(look.estimate.covariance * pull);
+    level.variance = (noise2[i] * static_cast<double>(b.level_variance[side][l]) + of_shading) /
                      (level.per_unit * level.per_unit);
     values[surface(i, side)].push_back(level.value);
   }

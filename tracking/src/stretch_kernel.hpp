@@ -68,8 +68,9 @@ struct alignas(kAlign) Block {
   Floats shading[kShading] = {};
   // By find_noise: sums of squared residuals in light, then in levels with their degrees of freedom
   // inside, outside and on the edge; variances of the levels, were that of the noise as
-  // assumed.
+  // assumed, and how the levels go with the shading.
   Floats light_square, noise_square[3], noise_freedom[3], level_variance[2];
+  Floats level_pull[2][kShading];
   // By find_offsets.
   Masks found;
   Floats offset_px, information, pull[kShading];

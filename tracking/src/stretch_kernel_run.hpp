@@ -208,9 +208,13 @@ void find_noise(Block& b, const Sample* samples, const Variances& assumed) {
                 i11 = (m00 * m22 - m20 * m20) * inverse, i21 = (m10 * m20 - m00 * m21) * inverse,
                 i22 = (m00 * m11 - m10 * m10) * inverse;
   Doubles r[kOwn];
-  for (int i = 0; i < kOwn; ++i) {
-    r[i] = wide(b.right[i]);
-    for (int k = 0; k < kShading; ++k) r[i] -= wide(b.normal[at(kOwn + k, i)]) * wide(b.shading[k]);
+  for (int i = 0; i < kOwn; ++i) r[i] = wide(b.right[i]);
+  for (int k = 0; k < kShading; ++k) {
+    const Doubles n0 = wide(b.normal[at(kOwn + k, 0)]), n1 = wide(b.normal[at(kOwn + k, 1)]),
+                  n2 = wide(b.normal[at(kOwn + k, 2)]), shading = wide(b.shading[k]);
+    r[0] -= n0 * shading, r[1] -= n1 * shading, r[2] -= n2 * shading;
+    b.level_pull[0][k] = narrow(-(i00 * n0 + i10 * n1 + i20 * n2));
+    b.level_pull[1][k] = narrow(-(i10 * n0 + i11 * n1 + i21 * n2));
   }
   const Floats own0 = narrow(i00 * r[0] + i10 * r[1] + i20 * r[2]),
                own1 = narrow(i10 * r[0] + i11 * r[1] + i21 * r[2]),
