@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 // What the frames of a body become as a track.
 namespace trochoid::tracking {
@@ -45,6 +46,29 @@ TEST(TrackAssembly, CountsAnglesFromWithinHalfATurnOfZero) {
       EXPECT_NEAR(track.samples.back().psi->value_rad - first, 0.5 * 29, 1e-9);
     }
   }
+}
+
+// Frames that scatter twice as far as they claim and may all be off by ten times that.
+TEST(TrackAssembly, WhatAllFramesMayBeOffByDoesNotHideHowFarTheyScatter) {
+  constexpr double kClaimed_m = 1e-4, kOff_m = 1e-3;
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  BodyPath path = turning(0.0, 0.0);
+  for (int i = 0; i < 200; ++i) {
+    path.frames[i] = path.frames[0];
+    BodyPath::At& at = path.frames[i];
+    at.t_s = 0.01 * i;
+    at.seen.pose->pose.centre_m.head<2>() =
+        2.0 * kClaimed_m * Eigen::Vector2d(normal(random), normal(random));
+    at.seen.pose->covariance_m2 = kClaimed_m * kClaimed_m * Eigen::Matrix2d::Identity();
+    at.seen.other_readings.emplace().m2 = kOff_m * kOff_m * Eigen::Matrix2d::Identity();
+  }
+  double mean_m2 = 0.0;
+  for (const auto& sample : assemble_track(path, 0, {}, {}).samples)
+    mean_m2 += sample.covariance_m2(0, 0) / 200.0;
+  // The scatter of the stretches it is taken from.
+  constexpr double kTolerance = 0.3;
+  EXPECT_NEAR((mean_m2 - kOff_m * kOff_m) / (kClaimed_m * kClaimed_m), 4.0, kTolerance * 4.0);
 }
 
 }  // namespace

@@ -20,9 +20,11 @@ struct Sighting {
   std::optional<double> turned_rad;  ///< of the face since the seed frame, image angle, unwrapped
   double turned_sigma_rad = 0.0;
   double rms_px = 0.0;
-  double accepted = 0.0;              ///< share of the outline with an edge
-  bool attitude_doubtful = false;     ///< it may be a mirror image, or a fit that went astray
-  bool holds_other_readings = false;  ///< its covariance does
+  double accepted = 0.0;           ///< share of the outline with an edge
+  bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
+  /// Spread over other readings of the whole path, by how likely these are; its covariance does not
+  /// hold it. Nothing before that is known.
+  std::optional<PoseSpread> other_readings{};
   Evidence evidence{};
   std::vector<EdgePoint> edges;
 };

@@ -374,22 +374,18 @@ void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::si
                     std::vector<Glimpse>& glimpses) {
   constexpr double kLying = 1e-6;  // found to lie on its face, by more than its edges
   for (std::size_t i = settled; i < glimpses.size(); ++i) {
-    if (!glimpses[i].posed() || glimpses[i].seen->holds_other_readings) continue;
+    if (!glimpses[i].posed()) continue;
     Sighting& seen = *glimpses[i].seen;
-    seen.holds_other_readings = true;
+    PoseSpread& spread = seen.other_readings.emplace();
     const Pose pose = seen.pose->pose;
     if (std::sin(pose.theta_rad) < kLying) continue;
     const auto others = finder.other_readings(pose);
     for (std::size_t which = 0; which < others.size(); ++which) {
       if (!others[which]) continue;
-      Sighting other = seen;
-      other.pose->pose = *others[which];
-      finder.place(other);
-      const double share = std::sqrt(doubt.may_be[which]);
-      allow_for(share * (other.centre_px - seen.centre_px),
-                share * (others[which]->centre_m - pose.centre_m).head<2>(), seen);
-      seen.pose->sigma_theta_rad = std::hypot(seen.pose->sigma_theta_rad,
-                                              share * (others[which]->theta_rad - pose.theta_rad));
+      const Eigen::Vector2d off_m = (others[which]->centre_m - pose.centre_m).head<2>();
+      spread.m2 += doubt.may_be[which] * off_m * off_m.transpose();
+      spread.theta_rad2 +=
+          doubt.may_be[which] * std::pow(others[which]->theta_rad - pose.theta_rad, 2);
     }
   }
 }

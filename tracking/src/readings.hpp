@@ -21,8 +21,8 @@ struct ReadingDoubt {
 [[nodiscard]] ReadingDoubt choose_readings(const Background& background, const BodyFinder& finder,
                                            std::vector<Glimpse>& glimpses);
 
-/// Lets the covariance of every frame hold the other readings, too, as far as they may be right: a
-/// wall that its shade hides may be there, whatever the edges say.
+/// Sets Sighting::other_readings of every frame: a wall that its shade hides may be there, whatever
+/// the edges say.
 /// @param settled so many frames at the front stay as they are.
 void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::size_t settled,
                     std::vector<Glimpse>& glimpses);

@@ -134,6 +134,20 @@ void allow_for_scatter(data::Track& track) {
   }
 }
 
+/// All of a path is seen in one reading or in another: frames do not scatter by that, and what they
+/// do scatter by is beside it.
+void allow_for_other_readings(const BodyPath& path, data::Track& track) {
+  auto sample = track.samples.begin();
+  for (const auto& [index, at] : path.frames) {
+    data::TrackSample& of_frame = *sample++;
+    if (!at.seen.other_readings) continue;
+    of_frame.covariance_m2 += at.seen.other_readings->m2;
+    if (auto& theta = of_frame.theta)
+      theta->sigma_rad =
+          std::hypot(theta->sigma_rad, std::sqrt(at.seen.other_readings->theta_rad2));
+  }
+}
+
 }  // namespace
 
 double usual_radius_px(const BodyPath& path) {
@@ -184,6 +198,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     track.samples.push_back(std::move(sample));
   }
   allow_for_scatter(track);
+  allow_for_other_readings(path, track);
   return track;
 }
 
