@@ -35,6 +35,9 @@ struct Node {
   [[nodiscard]] const Pose& pose() const { return seen().pose->pose; }
 };
 
+/// How much more speaks for each of the other readings of a frame, where there is one.
+using Gains = std::array<std::optional<double>, std::tuple_size_v<BodyFinder::OtherReadings>>;
+
 /// A body seen in a frame, and where it was when: how it is followed on.
 struct Start {
   std::size_t at;  ///< of the nodes
@@ -144,11 +147,15 @@ class Readings {
   [[nodiscard]] std::vector<Start> others() {
     constexpr double kAsGood = -0.05;
     std::vector<std::vector<Start>> found(nodes_.size() / kStride);
+    as_tracked_.resize(found.size());
     on_both_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
-      for (const auto& other : finder_.other_readings(nodes_[k].pose())) {
-        const auto seen = read_otherwise(measure, k, other);
-        if (!seen || gain(*seen, nodes_[k].seen()) < kAsGood) continue;
+      const auto others = finder_.other_readings(nodes_[k].pose());
+      for (std::size_t which = 0; which < others.size(); ++which) {
+        const auto seen = read_otherwise(measure, k, others[which]);
+        if (!seen) continue;
+        as_tracked_[i][which] = gain(*seen, nodes_[k].seen());
+        if (as_tracked_[i][which] < kAsGood) continue;
         for (const int side : {1, -1})
           if (const auto off = one_frame_off(k, seen->pose->pose, side))
             found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
@@ -160,26 +167,35 @@ class Readings {
     return starts;
   }
 
+  /// Whether frame k and those beside it are still seen as they were tracked.
+  [[nodiscard]] bool is_as_tracked(std::size_t k) const {
+    const auto end = std::min(nodes_.size(), k + 2);
+    for (std::size_t i = k - std::min<std::size_t>(k, 1); i < end; ++i)
+      if (nodes_[i].chosen != 0) return false;
+    return true;
+  }
+
   /// How likely the whole path is to be seen in each of the other readings: what all of its
   /// pictures say together for one of two has an error that they share.
   [[nodiscard]] std::array<double, 2> may_be_otherwise() const {
     constexpr double kShared = 0.08;  // between recordings, where that of one picture is about 0.1
-    struct Gains {
-      std::array<std::optional<double>, 2> of;
-    };
     std::vector<Gains> gains(nodes_.size() / kStride);
     on_both_cores(background_, finder_, gains.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
+      if (is_as_tracked(k)) {
+        gains[i] = as_tracked_[i];
+        return;
+      }
       const auto others = finder_.other_readings(nodes_[k].pose());
       for (std::size_t which = 0; which < others.size(); ++which)
         if (const auto seen = read_otherwise(measure, k, others[which]))
-          gains[i].of[which] = gain(*seen, nodes_[k].seen());
+          gains[i][which] = gain(*seen, nodes_[k].seen());
     });
     std::array<double, 2> may_be{};
     for (std::size_t which = 0; which < may_be.size(); ++which) {
       double sum = 0.0, count = 0.0;
       for (const Gains& g : gains)
-        if (g.of[which]) sum += *g.of[which], count += 1.0;
+        if (g[which]) sum += *g[which], count += 1.0;
       if (count > 0.0)
         may_be[which] = count / static_cast<double>(gains.size()) * 0.5 *
                         std::erfc(-sum / count / (kShared * std::numbers::sqrt2));
@@ -359,6 +375,7 @@ class Readings {
   bool alike_;
   double frame_s_ = 1.0;
   std::vector<Node> nodes_;
+  std::vector<Gains> as_tracked_;  ///< of the frames that are read otherwise, over how they were
   Miss usual_{1.0, 1.0};
   bool round_ = false;  ///< the centre goes round with the precession
 };
