@@ -56,6 +56,10 @@ struct Level {
   double count = 0.0, beyond_there = 0.0, square_there = 0.0, variance_there = 0.0;
 
   [[nodiscard]] double variance_of_mean() const { return variance_there / count; }
+  // As the looks really differ, where that is less.
+  [[nodiscard]] double seen_variance_of_mean() const {
+    return std::min(variance_there, square_there) / count;
+  }
 };
 
 // What one look says; shading over the most it can be.
@@ -491,7 +495,7 @@ void Fitting::compare_with_rest() {
     const double contrast = std::abs(static_cast<double>(b.outer[l] - b.inner[l]));
     const double less = std::max(0.0, bright[surface(i, kOutside)] - there(level));
     profiles_[i].edge.dimmed =
-        level.per_unit * (less + std::sqrt(level.variance_of_mean())) / std::max(1.0, contrast);
+        level.per_unit * (less + std::sqrt(level.seen_variance_of_mean())) / std::max(1.0, contrast);
   }
 }
 
