@@ -33,24 +33,6 @@ Eigen::MatrixXd reach(const Problem& problem, const Eigen::VectorXd& u, double r
   return cholesky.matrixU().solve(Eigen::MatrixXd::Identity(u.size(), u.size()));
 }
 
-// A Gauss-Newton step with differences over whole error bars for derivatives: ripples smaller than
-// those do not bend it. Empty where the model ends within the error bars.
-Eigen::VectorXd stride(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& L) {
-  constexpr double kLeast = 1e-3;  // of one: what the data do not see stays where it is
-  Eigen::VectorXd middle, ahead, behind;
-  if (!evaluate(problem, 0, u, middle, nullptr)) return {};
-  Eigen::MatrixXd slope(middle.size(), L.cols());
-  for (Eigen::Index k = 0; k < L.cols(); ++k) {
-    if (!evaluate(problem, 0, u + L.col(k), ahead, nullptr) ||
-        !evaluate(problem, 0, u - L.col(k), behind, nullptr))
-      return {};
-    slope.col(k) = 0.5 * (ahead - behind);
-  }
-  Eigen::MatrixXd normal = slope.transpose() * slope;
-  normal.diagonal().array() += kLeast;
-  return L * normal.ldlt().solve(-slope.transpose() * middle);
-}
-
 // A solution for the longest part of the track before an instant that one explains.
 struct Prelude {
   Problem part;
@@ -122,24 +104,11 @@ Found hop(const Problem& problem, Found best, int misses) {
   std::mt19937_64 generator(1);
   std::normal_distribution<double> normal;
   Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
-  bool fresh = true;
   for (int round = 0, missed = 0;
        round < kMostRounds && missed < misses && L.size() > 0 && !exhausted(problem, best);
        ++round) {
     double least = std::numeric_limits<double>::infinity();
     Eigen::VectorXd from;
-    if (fresh) {
-      const Eigen::VectorXd step = stride(problem, best.solution.u, L);
-      Eigen::VectorXd residuals;
-      for (const double share : {1.0, 0.5, 0.25})
-        if (step.size() > 0 &&
-            evaluate(problem, 0, best.solution.u + share * step, residuals, nullptr) &&
-            residuals.squaredNorm() < least) {
-          least = residuals.squaredNorm();
-          from = best.solution.u + share * step;
-        }
-      fresh = false;
-    }
     for (int look = 0; look < kLooks; ++look) {
       Eigen::VectorXd z(L.cols()), residuals;
       for (double& entry : z) entry = normal(generator);
@@ -159,7 +128,6 @@ Found hop(const Problem& problem, Found best, int misses) {
     if (!better(found, best)) continue;
     found.strays_s = best.strays_s;
     best = std::move(found);
-    fresh = true;
     L = reach(problem, best.solution.u, best.reduced_chi2);
   }
   return best;

@@ -295,8 +295,7 @@ TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
   EXPECT_LT(pull(fit, "pivoting_friction_m", 3e-4), kFar);
 }
 
-// The exact law: the cost has ripples wherever a spell of sticking comes or goes, and derivatives
-// at a point say little about its error bars.
+// The exact law: spells of sticking come and go, and derivatives hold across them.
 TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
   Case c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
   c.scene.model.friction = 0.2;  // 0.3 in truth
