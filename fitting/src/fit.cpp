@@ -124,6 +124,9 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     }
     finer.converged = finer.converged || solution.converged;
     solution = std::move(finer);
+    // What only just does not come to lie in a dip may do so once it is integrated more finely.
+    if (problem.arcs.size() == 1)
+      solution = fall_anew(problem, judged(problem, std::move(solution), "")).solution;
     *problem.work = 0.0;
     error = integration_error_sigma(problem, solution.u);
   }

@@ -1,6 +1,8 @@
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 
 #include "strategy.hpp"
@@ -31,25 +33,69 @@ Eigen::MatrixXd reach(const Problem& problem, const Eigen::VectorXd& u, double r
   return cholesky.matrixU().solve(Eigen::MatrixXd::Identity(u.size(), u.size()));
 }
 
-// A Gauss-Newton step with differences over whole error bars for derivatives: ripples smaller than
-// those do not bend it. Empty where the model ends within the error bars.
-Eigen::VectorXd stride(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& L) {
-  constexpr double kLeast = 1e-3;  // of one: what the data do not see stays where it is
-  Eigen::VectorXd middle, ahead, behind;
-  if (!evaluate(problem, 0, u, middle, nullptr)) return {};
-  Eigen::MatrixXd slope(middle.size(), L.cols());
-  for (Eigen::Index k = 0; k < L.cols(); ++k) {
-    if (!evaluate(problem, 0, u + L.col(k), ahead, nullptr) ||
-        !evaluate(problem, 0, u - L.col(k), behind, nullptr))
-      return {};
-    slope.col(k) = 0.5 * (ahead - behind);
+// A solution for the longest part of the track before an instant that one explains.
+struct Prelude {
+  Problem part;
+  Solution solution;
+};
+
+std::optional<Prelude> before(const Problem& problem, const Eigen::VectorXd& u, double t_s) {
+  constexpr int kFewest = 16;
+  constexpr double kLeast = 0.3, kShorter = 0.85;
+  const std::vector<double>& all_s = problem.arcs[0].t_s;
+  const auto samples =
+      static_cast<double>(std::lower_bound(all_s.begin(), all_s.end(), t_s) - all_s.begin());
+  Prelude prelude{problem, {}};
+  prelude.solution.u = u;
+  // The body may have fallen before the model does.
+  for (double share = 1.0; share > kLeast && share * samples > kFewest; share *= kShorter) {
+    prelude.part.arcs[0] = problem.arcs[0].slice(0, static_cast<int>(share * samples));
+    const SolveOptions options{.iterations = 25, .function_tolerance = 1e-4};
+    Solution solution = seek(prelude.part, prelude.solution.u, options);
+    if (!solution.usable) continue;
+    prelude.solution = std::move(solution);
+    if (judged(prelude.part, prelude.solution, "").passed) return prelude;
   }
-  Eigen::MatrixXd normal = slope.transpose() * slope;
-  normal.diagonal().array() += kLeast;
-  return L * normal.ldlt().solve(-slope.transpose() * middle);
+  return std::nullopt;
 }
 
 }  // namespace
+
+Found fall_anew(const Problem& problem, Found found) {
+  constexpr int kRounds = 4, kLooks = 60;
+  constexpr double kSteps[] = {0.5, 1.0, 2.0, 3.0};
+  constexpr double kTellsSomething = 0.3;  // of the variance
+  if (!found.solution.usable || found.passed || found.unexplained > kTellsSomething) return found;
+  const auto fall_s = falls_at_s(problem, found.solution.u);
+  if (!fall_s) return found;
+  const auto prelude = before(problem, found.solution.u, *fall_s);
+  if (!prelude) return found;
+  const Eigen::MatrixXd L = reach(prelude->part, prelude->solution.u, 1.0);
+  if (L.size() == 0) return found;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  for (int round = 0; round < kRounds && !found.passed && !exhausted(problem, found); ++round) {
+    double least = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd from, residuals;
+    for (int look = 0; look < kLooks; ++look) {
+      Eigen::VectorXd z(L.cols());
+      for (double& entry : z) entry = normal(generator);
+      Eigen::VectorXd u = prelude->solution.u + kSteps[look % 4] * (L * z);
+      for (Eigen::Index k = 0; k < u.size(); ++k)
+        if (problem.free[k].held) u[k] = found.solution.u[k];
+      if (!evaluate(problem, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
+        continue;
+      least = residuals.squaredNorm();
+      from = u;
+    }
+    if (from.size() == 0) break;
+    Found other = judged(problem, seek(problem, from), found.path);
+    if (!better(other, found)) continue;
+    other.strays_s = found.strays_s;
+    found = std::move(other);
+  }
+  return found;
+}
 
 Found hop(const Problem& problem, Found best, int misses) {
   if (!best.solution.usable) return best;
@@ -58,24 +104,11 @@ Found hop(const Problem& problem, Found best, int misses) {
   std::mt19937_64 generator(1);
   std::normal_distribution<double> normal;
   Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
-  bool fresh = true;
   for (int round = 0, missed = 0;
        round < kMostRounds && missed < misses && L.size() > 0 && !exhausted(problem, best);
        ++round) {
     double least = std::numeric_limits<double>::infinity();
     Eigen::VectorXd from;
-    if (fresh) {
-      const Eigen::VectorXd step = stride(problem, best.solution.u, L);
-      Eigen::VectorXd residuals;
-      for (const double share : {1.0, 0.5, 0.25})
-        if (step.size() > 0 &&
-            evaluate(problem, 0, best.solution.u + share * step, residuals, nullptr) &&
-            residuals.squaredNorm() < least) {
-          least = residuals.squaredNorm();
-          from = best.solution.u + share * step;
-        }
-      fresh = false;
-    }
     for (int look = 0; look < kLooks; ++look) {
       Eigen::VectorXd z(L.cols()), residuals;
       for (double& entry : z) entry = normal(generator);
@@ -95,7 +128,6 @@ Found hop(const Problem& problem, Found best, int misses) {
     if (!better(found, best)) continue;
     found.strays_s = best.strays_s;
     best = std::move(found);
-    fresh = true;
     L = reach(problem, best.solution.u, best.reduced_chi2);
   }
   return best;

@@ -369,7 +369,39 @@ void count_work(const Problem& problem, std::size_t derivatives, int steps) {
   *problem.work += times * steps;
 }
 
+// What the model says an arc would show at these values.
+model::PredictRequest request_of(const Problem& problem, const ArcData& data) {
+  model::PredictRequest request;
+  request.t_s = data.t_s;
+  request.start_s = data.start_s;
+  request.observables = data.observables;
+  request.tolerance = problem.tolerance;
+  request.max_steps = problem.max_steps();
+  request.lies_where_it_fell = true;
+  return request;
+}
+model::Prediction predicted(const Problem& problem, const ArcData& data,
+                            const Eigen::VectorXd& values, const model::PredictRequest& request) {
+  return has_timing(*problem.predictor)
+             ? predict_timed(*problem.predictor, values, request, data, problem.timing)
+             : problem.predictor->predict(values, request);
+}
+
 }  // namespace
+
+std::optional<double> falls_at_s(const Problem& problem, const Eigen::VectorXd& u) {
+  Eigen::VectorXd values = problem.values(0, u), sign;
+  if (!values.allFinite()) return std::nullopt;
+  fold_tilt(*problem.predictor, values, sign);
+  const ArcData& data = problem.arcs[0];
+  try {
+    const model::Prediction run = predicted(problem, data, values, request_of(problem, data));
+    count_work(problem, 0, run.steps);
+    if (run.outcome == model::Outcome::flat) return run.valid_until_s;
+  } catch (const Error&) {  // outside the model's range
+  }
+  return std::nullopt;
+}
 
 bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
               Eigen::MatrixXd* jacobian, bool held_too) {
@@ -379,21 +411,13 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   Eigen::VectorXd sign;
   fold_tilt(*problem.predictor, values, sign);
   const std::vector<int> columns = problem.columns_of(arc);
-  model::PredictRequest request;
-  request.t_s = data.t_s;
-  request.start_s = data.start_s;
-  request.observables = data.observables;
-  request.tolerance = problem.tolerance;
-  request.max_steps = problem.max_steps();
-  request.lies_where_it_fell = true;
+  model::PredictRequest request = request_of(problem, data);
   if (jacobian != nullptr)
     for (const int i : columns)
       if (held_too || !problem.free[i].held) request.derivatives.push_back(problem.free[i].index);
   model::Prediction prediction;
   try {
-    prediction = has_timing(*problem.predictor)
-                     ? predict_timed(*problem.predictor, values, request, data, problem.timing)
-                     : problem.predictor->predict(values, request);
+    prediction = predicted(problem, data, values, request);
   } catch (const Error&) {  // outside the model's range: a rejected step
     if (problem.shortfalls) problem.shortfalls->count(model::Outcome::out_of_domain);
     return false;

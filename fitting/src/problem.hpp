@@ -118,6 +118,9 @@ struct Problem {
                             Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian,
                             bool held_too = true);
 
+/// When the body of a single-arc problem falls flat at u, if it does so within the record.
+[[nodiscard]] std::optional<double> falls_at_s(const Problem& problem, const Eigen::VectorXd& u);
+
 /// Angle coordinates outside [0, pi] name the same attitude as folded ones: brings theta back and
 /// turns phi, psi and the rates accordingly. `sign` receives the derivative of each folded value.
 void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen::VectorXd& sign);

@@ -375,8 +375,7 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
   FitOptions own = options;
   if (known.fit.arcs.size() == 1) {
     own.start = extended_start(known, rung);
-    // Known of Coulomb's law: its cost is rough.
-    own.strategy = softness_is_open(known) ? "growing" : "single";
+    own.strategy = "single";
   }
   try_rung(rung, [&] {
     if (softness_is_open(rung) && !softness_is_open(known))

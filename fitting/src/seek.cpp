@@ -122,8 +122,9 @@ class Seeker {
   };
 
   // One step downhill, with as much damping as it takes. @returns false where there is none. A step
-  // that is too long for its bend may lead down as well, where the cost has ripples: it is taken if
-  // a few shorter ones are bent too.
+  // that is too long for its bend may lead down as well, far above the valley's floor: it is taken
+  // if a few shorter ones are bent too (bodies seen by their positions alone take twice as long
+  // without, and some end in another valley).
   bool advance() {
     constexpr int kAttempts = 14, kPatience = 3;
     constexpr double kNothing = 1e-12, kSome = 0.25;

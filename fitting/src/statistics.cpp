@@ -223,25 +223,10 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   Uncertainty result;
   Eigen::VectorXd size(count);
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
-  Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
-  Directions seen = directions_of(problem, scaled, result);
-  Noise noise = noise_of(problem, all, scaled, seen, result);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  const Directions seen = directions_of(problem, scaled, result);
+  const Noise noise = noise_of(problem, all, scaled, seen, result);
   Eigen::MatrixXd covariance = sandwich(problem, all, noise, scaled, seen.bread);
-  const auto valley_along = [&](const Directions& by) {
-    return Valley{problem, u, all, scaled * by.axes, size.asDiagonal() * by.axes, by.inverse};
-  };
-  Chords chords = valley_along(seen).chords();
-  // A cost with ripples (sticking that comes and goes) has derivatives that hold nowhere but at one
-  // point: what counts is how it changes over an error bar.
-  if (!chords.straight) {
-    scaled = chords.derivatives * seen.axes.transpose();
-    result.rank = 0;
-    result.null_vectors.clear();
-    seen = directions_of(problem, scaled, result);
-    noise = noise_of(problem, all, scaled, seen, result);
-    covariance = sandwich(problem, all, noise, scaled, seen.bread);
-    chords = valley_along(seen).chords();
-  }
   result.chi2_inflation.resize(count);
   for (int i = 0; i < count; ++i)
     result.chi2_inflation[i] =
@@ -249,7 +234,9 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const Eigen::VectorXd sd =
       (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
   const Eigen::MatrixXd to_sizes = seen.axes * seen.inverse.asDiagonal();
-  covariance += to_sizes * valley_along(seen).bends(chords, sd) * to_sizes.transpose();
+  const Valley valley{problem,     u, all, scaled * seen.axes, size.asDiagonal() * seen.axes,
+                      seen.inverse};
+  covariance += to_sizes * valley.bends(sd) * to_sizes.transpose();
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);

@@ -273,7 +273,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
                     : solve_to_the_end(current);
   Found found = judged(current, std::move(solution), start.path);
   found.strays_s = std::move(strays_s);
-  return found;
+  return fall_anew(current, std::move(found));
 }
 
 }  // namespace trochoid::fitting

@@ -70,6 +70,12 @@ struct Growth {
 /// until one passes the gate or `tries` are used up. Reproducible.
 [[nodiscard]] Found hop(const Problem& problem, Found best, int tries);
 
+/// Where a solution that falls flat does not pass: a body nods as it falls, and the dip of its tilt
+/// in which it comes to lie decides when and where. From one dip to the next the path jumps, and
+/// nothing leads downhill over that. What the track says before the fall leaves few dips to choose
+/// from: looks about as far as that lets it, and goes downhill on all of the track from the best.
+[[nodiscard]] Found fall_anew(const Problem& problem, Found found);
+
 /// The search for a single arc without a guess: windows of 1, 1/2, 1/4, ... of the arc, starts from
 /// each that already say something about it, grown; stops at the first solution that passes the
 /// gate, or after the window in which the path got explained but for a per cent (a track's sigmas

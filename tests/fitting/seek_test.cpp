@@ -143,6 +143,18 @@ TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
   }
 }
 
+// A narrow valley: the bend is a hundred and fifty times as long as the valley is wide. It had been
+// believed up to five times.
+TEST(Bend, OfManyTimesTheValleysWidthIsInTheErrorBars) {
+  constexpr double kSigma = 1.0, kSteepness = 300.0;
+  const Bent bent(kSteepness);
+  const Problem problem = problem_of(bent, kSigma, 0.0);
+  const Eigen::MatrixXd covariance = uncertainty(problem, Eigen::Vector2d::Zero()).covariance;
+  constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
+  const double bend = std::sqrt(3.0) * kSigma * kSigma / kSamples;
+  EXPECT_NEAR(std::sqrt(covariance(1, 1)), bend, 2.0 * kFew * bend);
+}
+
 // x = left and half of right in turn, y = 10 (product - left right): what is seen of the product is
 // bent by both of the others together and by none of them alone.
 class Saddle : public model::Predictor {
