@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "smoothing.hpp"
 #include "starts.hpp"
@@ -53,19 +54,19 @@ struct Window {
   double r_max = 0.0;
 };
 
-Window window_of(const ArcData& arc, const Eigen::Vector2d& pivot_m) {
+Window window_of(const ArcData& arc, const SmoothCurve& curve, const Eigen::Vector2d& pivot_m) {
   Window w;
   w.t_s = arc.t_s;
   Eigen::MatrixXd xy = arc.positions_m();
   xy.rowwise() -= pivot_m.transpose();
-  const SmoothCurve curve = smooth_auto(w.t_s, xy);
   w.x = xy.col(0);
   w.y = xy.col(1);
   w.smooth = curve.value;
+  w.smooth.rowwise() -= pivot_m.transpose();
   w.velocity = curve.first;
-  w.r2 = curve.value.rowwise().squaredNorm();
-  w.h = curve.value.col(0).cwiseProduct(curve.first.col(1)) -
-        curve.value.col(1).cwiseProduct(curve.first.col(0));
+  w.r2 = w.smooth.rowwise().squaredNorm();
+  w.h = w.smooth.col(0).cwiseProduct(w.velocity.col(1)) -
+        w.smooth.col(1).cwiseProduct(w.velocity.col(0));
   w.int_x = integral(w.t_s, w.x);
   w.int_y = integral(w.t_s, w.y);
   w.r_max = std::sqrt(w.r2.maxCoeff());
@@ -175,6 +176,11 @@ Parabola parabola(const Window& w) {
   return result;
 }
 
+// Signs of Z, the height above the pivot.
+Eigen::VectorXd sides(const Window& w, const Parabola& p) {
+  return ((p.c0 - w.h.array()) / p.b).unaryExpr([](double z) { return z < 0.0 ? -1.0 : 1.0; });
+}
+
 // a from energy: v^2/2 + a l Z = constant, v the speed of the CoM.
 std::optional<TopState> from_parabola(const Window& w, const Parabola& p) {
   const Eigen::VectorXd z = (p.c0 - w.h.array()) / (p.l * p.b);
@@ -211,7 +217,7 @@ std::optional<TopState> from_parabola(const Window& w, const Parabola& p) {
 std::vector<Start> top_starts(const ArcData& arc, const Eigen::Vector2d& pivot_m) {
   std::vector<Start> starts;
   if (arc.t_s.size() < 12) return starts;
-  const Window w = window_of(arc, pivot_m);
+  const Window w = window_of(arc, smooth_auto(arc.t_s, arc.positions_m()), pivot_m);
   if (!(w.r_max > 0.0)) return starts;
   const auto add = [&](std::vector<Match> minima) {
     for (std::size_t i = 0; i < std::min<std::size_t>(2, minima.size()); ++i)
@@ -220,8 +226,7 @@ std::vector<Start> top_starts(const ArcData& arc, const Eigen::Vector2d& pivot_m
   add(scan(w, Eigen::VectorXd::Ones(w.x.size())));
   const Parabola p = parabola(w);
   if (!p.valid) return starts;
-  const Eigen::VectorXd sign =
-      ((p.c0 - w.h.array()) / p.b).unaryExpr([](double z) { return z < 0.0 ? -1.0 : 1.0; });
+  const Eigen::VectorXd sign = sides(w, p);
   if (sign.minCoeff() < 0.0) add(scan(w, sign));
   for (const double stretch : {1.0, 0.97, 1.03}) {
     const Match direct = match(w, stretch * p.l, stretch * (p.c0 - w.h.array()) / (p.l * p.b));
@@ -233,20 +238,80 @@ std::vector<Start> top_starts(const ArcData& arc, const Eigen::Vector2d& pivot_m
   return starts;
 }
 
-std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& arc) {
+namespace {
+
+// What the best top about that pivot leaves of the window [m^2].
+double left_about(const ArcData& arc, const SmoothCurve& curve, const Eigen::Vector2d& pivot_m) {
+  const Window w = window_of(arc, curve, pivot_m);
+  if (!(w.r_max > 0.0)) return std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
+  const auto look = [&](const Eigen::VectorXd& sign) {
+    if (const std::vector<Match> minima = scan(w, sign); !minima.empty())
+      least = std::min(least, minima.front().cost);
+  };
+  look(Eigen::VectorXd::Ones(w.x.size()));
+  if (const Parabola p = parabola(w); p.valid)
+    if (const Eigen::VectorXd sign = sides(w, p); sign.minCoeff() < 0.0) look(sign);
+  return least;
+}
+
+// From a place to where a top explains most: steps to the four sides, halved where none is better.
+std::pair<double, Eigen::Vector2d> moved_downhill(const ArcData& arc, const SmoothCurve& curve,
+                                                  std::pair<double, Eigen::Vector2d> best,
+                                                  double step_m) {
+  constexpr int kMostSteps = 20;
+  const double finest_m = step_m / 32.0;
+  for (int i = 0; i < kMostSteps && step_m > finest_m; ++i) {
+    const Eigen::Vector2d from = best.second;
+    bool better = false;
+    for (const Eigen::Vector2d& side : {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(-1.0, 0.0),
+                                        Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, -1.0)}) {
+      const Eigen::Vector2d there = from + step_m * side;
+      const double left = left_about(arc, curve, there);
+      if (!(left < best.first)) continue;
+      best = {left, there};
+      better = true;
+    }
+    if (!better) step_m *= 0.5;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& given) {
+  constexpr int kSamples = 75, kReach = 4;  // in steps of a quarter of the path's extent
+  constexpr std::size_t kGuesses = 4;
+  const auto count = static_cast<int>(given.t_s.size());
+  const ArcData arc = given.slice(0, count, std::max(1, count / kSamples));
   const Eigen::MatrixX2d xy = arc.positions_m();
-  // Algebraic circle x^2 + y^2 + d x + e y + f = 0 through all points.
-  Eigen::MatrixX3d basis(xy.rows(), 3);
-  basis << xy, Eigen::VectorXd::Ones(xy.rows());
-  const Eigen::Vector3d circle =
-      basis.colPivHouseholderQr().solve(Eigen::VectorXd(-xy.rowwise().squaredNorm()));
+  const SmoothCurve curve = smooth_auto(arc.t_s, xy);
   const Eigen::Vector2d low = xy.colwise().minCoeff(), high = xy.colwise().maxCoeff();
   const Eigen::Vector2d mean = xy.colwise().mean();
-  std::vector<Eigen::Vector2d> guesses{-0.5 * circle.head<2>(), 0.5 * (low + high), mean};
-  const double step = 0.25 * (high - low).maxCoeff();
-  for (const double dx : {-step, 0.0, step})
-    for (const double dy : {-step, 0.0, step})
-      if (dx != 0.0 || dy != 0.0) guesses.push_back(mean + Eigen::Vector2d(dx, dy));
+  const double step_m = 0.25 * (high - low).maxCoeff();
+  constexpr int kSide = 2 * kReach + 1;
+  Eigen::MatrixXd left(kSide, kSide);
+  const auto place = [&](int i, int k) -> Eigen::Vector2d {
+    return mean + step_m * Eigen::Vector2d(i - kReach, k - kReach);
+  };
+  for (int i = 0; i < kSide; ++i)
+    for (int k = 0; k < kSide; ++k) left(i, k) = left_about(arc, curve, place(i, k));
+  std::vector<std::pair<double, Eigen::Vector2d>> valleys;
+  for (int i = 0; i < kSide; ++i)
+    for (int k = 0; k < kSide; ++k) {
+      const int i0 = std::max(0, i - 1), k0 = std::max(0, k - 1);
+      const double least =
+          left.block(i0, k0, std::min(kSide, i + 2) - i0, std::min(kSide, k + 2) - k0).minCoeff();
+      if (std::isfinite(left(i, k)) && left(i, k) <= least)
+        valleys.emplace_back(left(i, k), place(i, k));
+    }
+  const auto by_left = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::stable_sort(valleys.begin(), valleys.end(), by_left);
+  valleys.resize(std::min(valleys.size(), kGuesses));
+  for (auto& valley : valleys) valley = moved_downhill(arc, curve, valley, 0.5 * step_m);
+  std::stable_sort(valleys.begin(), valleys.end(), by_left);
+  std::vector<Eigen::Vector2d> guesses;
+  for (const auto& [unexplained, pivot_m] : valleys) guesses.push_back(pivot_m);
   return guesses;
 }
 

@@ -31,7 +31,8 @@ struct Start {
 [[nodiscard]] std::vector<Start> fast_top_starts(const ArcData& arc,
                                                  const Eigen::Vector2d& pivot_m);
 
-/// Places the pivot of a top may be, when nobody knows: from circles through the track.
+/// Places the pivot of a top may be, when nobody knows, best first: where a top about them leaves
+/// least of the path, of all places within the path's extent about its mean.
 [[nodiscard]] std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& arc);
 
 /// A disc or ring on its rim, for starts: lengths [m], moments per mass [m^2].
