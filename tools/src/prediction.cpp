@@ -221,8 +221,9 @@ std::optional<double> spin_residual_rad(const data::TrackSample& sample, int obj
                                         const PredictedPath& path) {
   const PredictedArc* arc = path.arc_at(object, sample.t_s);
   if (!sample.psi || arc == nullptr || !arc->has_spin) return std::nullopt;
-  return std::remainder(sample.psi->value_rad - path.at(object, sample.t_s)->psi_rad,
-                        2.0 * std::numbers::pi);
+  const auto pose = path.at(object, sample.t_s);
+  if (!pose) return std::nullopt;
+  return std::remainder(sample.psi->value_rad - pose->psi_rad, 2.0 * std::numbers::pi);
 }
 
 std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
