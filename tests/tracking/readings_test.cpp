@@ -7,18 +7,19 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr double kOff_rad = 0.3;  // between the two readings of a picture
+constexpr double kOff_rad = 0.3, kOff_m = 1e-3;  // between the two readings of a picture
 
 /// Finds either of two attitudes, whichever it is led to, the true one with more evidence or less.
 class TwoReadings final : public BodyFinder {
  public:
-  explicit TwoReadings(std::function<double(int)> bonus_of_truth)
-      : bonus_of_truth_(std::move(bonus_of_truth)) {}
+  /// @param of_the_way how far off the other one is really found, of how far off it should be.
+  explicit TwoReadings(std::function<double(int)> bonus_of_truth, double of_the_way = 1.0)
+      : bonus_of_truth_(std::move(bonus_of_truth)), found_rad_(of_the_way * kOff_rad) {}
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     Sighting seen = *look.predicted;
     double& theta = seen.pose->pose.theta_rad;
     const bool right = theta < kTilt + 0.5 * kOff_rad;
-    theta = right ? kTilt : kTilt + kOff_rad;
+    theta = right ? kTilt : kTilt + found_rad_;
     seen.pose->pose.phi_rad = phi_at(look.frame.t_s);
     seen.pose->evidence =
         kEvidence + (right ? bonus_of_truth_(static_cast<int>(look.frame.index)) : 0.0);
@@ -33,11 +34,13 @@ class TwoReadings final : public BodyFinder {
     data::Pose<> steeper = pose, flatter = pose;
     steeper.theta_rad += kOff_rad;
     flatter.theta_rad -= kOff_rad;
+    steeper.centre_m.x() += kOff_m;
     return {steeper, flatter};
   }
 
  private:
   std::function<double(int)> bonus_of_truth_;
+  double found_rad_;
 };
 
 class Readings : public GlimpsedSequence {
@@ -55,15 +58,16 @@ class Readings : public GlimpsedSequence {
     (void)choose_readings(background_, finder, glimpses);
     return glimpses;
   }
-  /// Largest standard deviation of a tilt once other readings are allowed for.
-  double doubted_rad(const BodyFinder& finder) {
+  /// What the frame with the largest holds of other readings.
+  PoseSpread doubted(const BodyFinder& finder) {
     auto glimpses = tracked(finder, [](int) { return false; });
     doubt_readings(choose_readings(background_, finder, glimpses), finder, 0, glimpses);
-    double most = 0.0;
+    PoseSpread most;
     for (const Glimpse& g : glimpses)
-      most = std::max(most, std::sqrt(g.seen->other_readings->theta_rad2));
+      if (g.seen->other_readings->theta_rad2 >= most.theta_rad2) most = *g.seen->other_readings;
     return most;
   }
+  double doubted_rad(const BodyFinder& finder) { return std::sqrt(doubted(finder).theta_rad2); }
   static int count_off(const std::vector<Glimpse>& glimpses) {
     return static_cast<int>(std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) {
       return g.pose().theta_rad > kTilt + 0.5 * kOff_rad;
@@ -96,6 +100,20 @@ TEST_F(Readings, ALeapStaysThatThePicturesBearOut) {
 TEST_F(Readings, WhatNoPictureTellsApartIsHeldByTheErrorOfTheTilt) {
   const TwoReadings finder([](int) { return 1.0; });
   EXPECT_GT(doubted_rad(finder), 0.5 * kOff_rad);
+}
+
+TEST_F(Readings, WhatNoPictureTellsApartIsHeldByTheErrorOfTheCentre) {
+  const TwoReadings finder([](int) { return 1.0; });
+  EXPECT_GT(std::sqrt(doubted(finder).m2(0, 0)), 0.5 * kOff_m);
+}
+
+TEST_F(Readings, APictureLookedAtInAnotherReadingIsDoubtedAsFarAsItLeadsThere) {
+  const auto tells_nothing = [](int) { return 1.0; };
+  const double all_the_way_rad = doubted_rad(TwoReadings(tells_nothing));
+  EXPECT_NEAR(doubted_rad(TwoReadings(tells_nothing, 0.6)), 0.6 * all_the_way_rad,
+              0.1 * all_the_way_rad);
+  // Far beyond: that is the mirror image, and not for the sake of this reading to be feared.
+  EXPECT_EQ(doubted_rad(TwoReadings(tells_nothing, 2.5)), 0.0);
 }
 
 TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {

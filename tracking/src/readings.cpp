@@ -35,8 +35,13 @@ struct Node {
   [[nodiscard]] const Pose& pose() const { return seen().pose->pose; }
 };
 
-/// How much more speaks for each of the other readings of a frame, where there is one.
-using Gains = std::array<std::optional<double>, std::tuple_size_v<BodyFinder::OtherReadings>>;
+/// What a frame shows when it is looked at in another reading.
+struct Otherwise {
+  double gain;   ///< how much more speaks for it
+  double share;  ///< how far off it is, of the way to that reading
+};
+using Otherwises =
+    std::array<std::optional<Otherwise>, std::tuple_size_v<BodyFinder::OtherReadings>>;
 
 /// A body seen in a frame, and where it was when: how it is followed on.
 struct Start {
@@ -143,6 +148,21 @@ class Readings {
     return seen && !same(*seen, nodes_[k].seen()) ? std::move(seen) : std::nullopt;
   }
 
+  /// Compares what was seen in frame k with the reading in which it was looked at. Nothing for what
+  /// is farther off than that: the mirror image, or another thing.
+  [[nodiscard]] std::optional<Otherwise> compared(const Pose& reading, const Sighting& seen,
+                                                  std::size_t k) const {
+    constexpr double kFarthest = 2.0, kNear_radii = 0.25;
+    const Sighting& chosen = nodes_[k].seen();
+    const Eigen::Vector3d axis = axis_of(chosen.pose->pose);
+    const double share = between_axes(axis_of(seen.pose->pose), axis, alike_) /
+                         between_axes(axis_of(reading), axis, alike_);
+    if (!(share < kFarthest) ||
+        (seen.centre_px - chosen.centre_px).norm() > kNear_radii * chosen.rim.semi_major_px())
+      return std::nullopt;
+    return Otherwise{gain(seen, chosen), share};
+  }
+
   /// Other readings of every so many frames for which about as much speaks.
   [[nodiscard]] std::vector<Start> others() {
     constexpr double kAsGood = -0.05;
@@ -154,8 +174,8 @@ class Readings {
       for (std::size_t which = 0; which < others.size(); ++which) {
         const auto seen = read_otherwise(measure, k, others[which]);
         if (!seen) continue;
-        as_tracked_[i][which] = gain(*seen, nodes_[k].seen());
-        if (as_tracked_[i][which] < kAsGood) continue;
+        as_tracked_[i][which] = compared(*others[which], *seen, k);
+        if (gain(*seen, nodes_[k].seen()) < kAsGood) continue;
         for (const int side : {1, -1})
           if (const auto off = one_frame_off(k, seen->pose->pose, side))
             found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
@@ -176,29 +196,37 @@ class Readings {
   }
 
   /// How likely the whole path is to be seen in each of the other readings: what all of its
-  /// pictures say together for one of two has an error that they share.
+  /// pictures say together for one of two has an error that they share. Times the mean square of
+  /// how far off that is, of the way to the reading.
   [[nodiscard]] std::array<double, 2> may_be_otherwise() const {
-    constexpr double kShared = 0.08;  // between recordings, where that of one picture is about 0.1
-    std::vector<Gains> gains(nodes_.size() / kStride);
-    on_both_cores(background_, finder_, gains.size(), [&](Measuring& measure, std::size_t i) {
+    // Between recordings, and between pictures. The spread over what is hardly likely is no error
+    // bar: it would be as wide as nothing that was seen.
+    constexpr double kShared = 0.12, kOfOne = 0.1, kHardly = 0.02;
+    std::vector<Otherwises> frames(nodes_.size() / kStride);
+    on_both_cores(background_, finder_, frames.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
       if (is_as_tracked(k)) {
-        gains[i] = as_tracked_[i];
+        frames[i] = as_tracked_[i];
         return;
       }
       const auto others = finder_.other_readings(nodes_[k].pose());
       for (std::size_t which = 0; which < others.size(); ++which)
         if (const auto seen = read_otherwise(measure, k, others[which]))
-          gains[i][which] = gain(*seen, nodes_[k].seen());
+          frames[i][which] = compared(*others[which], *seen, k);
     });
     std::array<double, 2> may_be{};
     for (std::size_t which = 0; which < may_be.size(); ++which) {
-      double sum = 0.0, count = 0.0;
-      for (const Gains& g : gains)
-        if (g[which]) sum += *g[which], count += 1.0;
-      if (count > 0.0)
-        may_be[which] = count / static_cast<double>(gains.size()) * 0.5 *
-                        std::erfc(-sum / count / (kShared * std::numbers::sqrt2));
+      double sum = 0.0, count = 0.0, square = 0.0;
+      for (const Otherwises& frame : frames) {
+        if (!frame[which]) continue;
+        sum += frame[which]->gain, count += 1.0;
+        square += frame[which]->share * frame[which]->share;
+      }
+      if (count == 0.0) continue;
+      const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / count);
+      const double likely = count / static_cast<double>(frames.size()) * 0.5 *
+                            std::erfc(-sum / count / (sd * std::numbers::sqrt2));
+      if (likely > kHardly) may_be[which] = likely * square / count;
     }
     return may_be;
   }
@@ -375,7 +403,7 @@ class Readings {
   bool alike_;
   double frame_s_ = 1.0;
   std::vector<Node> nodes_;
-  std::vector<Gains> as_tracked_;  ///< of the frames that are read otherwise, over how they were
+  std::vector<Otherwises> as_tracked_;  ///< of every kStride-th frame, beside how it was tracked
   Miss usual_{1.0, 1.0};
   bool round_ = false;  ///< the centre goes round with the precession
 };
@@ -403,6 +431,8 @@ void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::si
       spread.m2 += doubt.may_be[which] * off_m * off_m.transpose();
       spread.theta_rad2 +=
           doubt.may_be[which] * std::pow(others[which]->theta_rad - pose.theta_rad, 2);
+      const double turn = std::remainder(others[which]->phi_rad - pose.phi_rad, kTurn);
+      spread.across_rad2 += doubt.may_be[which] * std::pow(std::sin(pose.theta_rad) * turn, 2);
     }
   }
 }

@@ -8,8 +8,10 @@ namespace trochoid::tracking {
 
 /// What the pictures of a sequence leave open about how they are read.
 struct ReadingDoubt {
-  bool otherwise = false;          ///< some frame is read otherwise than it was tracked
-  std::array<double, 2> may_be{};  ///< probability of each of BodyFinder::other_readings, all along
+  bool otherwise = false;  ///< some frame is read otherwise than it was tracked
+  /// Probability of each of BodyFinder::other_readings all along these frames, times the mean
+  /// square of how far off what they then show is, of the way to that reading.
+  std::array<double, 2> may_be{};
 };
 
 /// Decides over a sequence which reading of its pictures was seen. For a stretch of frames the fit

@@ -137,14 +137,22 @@ void allow_for_scatter(data::Track& track) {
 /// All of a path is seen in one reading or in another: frames do not scatter by that, and what they
 /// do scatter by is beside it.
 void allow_for_other_readings(const BodyPath& path, data::Track& track) {
+  const auto grow = [](std::optional<data::MeasuredAngle>& angle, double by_rad) {
+    if (angle) angle->sigma_rad = std::hypot(angle->sigma_rad, by_rad);
+  };
   auto sample = track.samples.begin();
   for (const auto& [index, at] : path.frames) {
     data::TrackSample& of_frame = *sample++;
     if (!at.seen.other_readings) continue;
-    of_frame.covariance_m2 += at.seen.other_readings->m2;
-    if (auto& theta = of_frame.theta)
-      theta->sigma_rad =
-          std::hypot(theta->sigma_rad, std::sqrt(at.seen.other_readings->theta_rad2));
+    const PoseSpread& spread = *at.seen.other_readings;
+    const double theta = at.seen.pose->pose.theta_rad;
+    of_frame.covariance_m2 += spread.m2;
+    grow(of_frame.theta, std::sqrt(spread.theta_rad2));
+    constexpr double kLeastSine = 1e-6;
+    const double turn = std::sqrt(spread.across_rad2) / std::max(kLeastSine, std::sin(theta));
+    grow(of_frame.phi, turn);
+    // Spin is counted from the node line: what precession is wrong by, it takes back.
+    if (of_frame.phi) grow(of_frame.psi, std::cos(theta) * turn);
   }
 }
 
