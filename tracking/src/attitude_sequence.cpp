@@ -478,7 +478,7 @@ void doubt_attitudes(const std::vector<AttitudeDoubt>& doubts, std::vector<Glimp
     if (!seen || !seen->pose || seen->attitude_doubtful) continue;
     seen->attitude_doubtful = true;
     seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
-    seen->pose->sigma_theta_rad = std::hypot(seen->pose->sigma_theta_rad, doubt.off_theta_rad);
+    allow_for_tilt(doubt.off_theta_rad, *seen);
     allow_for(doubt.off_px, doubt.off_m, *seen);
   }
 }

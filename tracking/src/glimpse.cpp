@@ -15,6 +15,11 @@ void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sigh
   seen.pose->covariance_m2 += m2, seen.pose->common.m2 += m2;
 }
 
+void allow_for_tilt(double off_rad, Sighting& seen) {
+  seen.pose->sigma_theta_rad = std::hypot(seen.pose->sigma_theta_rad, off_rad);
+  seen.pose->common.theta_rad2 += off_rad * off_rad;
+}
+
 Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i) {
   constexpr std::size_t kReach = 6;
   Surroundings out;

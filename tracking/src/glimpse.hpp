@@ -52,6 +52,8 @@ struct Surroundings {
 
 /// Allows for the centre being this far off as well, in the picture and on the floor.
 void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen);
+/// The same for its tilt.
+void allow_for_tilt(double off_rad, Sighting& seen);
 /// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
 [[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
 

@@ -490,8 +490,8 @@ void doubt(const Expected& expected, Sighting& seen) {
     return;
   }
   seen.attitude_doubtful = true;
-  pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, off_rad);
   pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  allow_for_tilt(off_rad, seen);
   allow_for(expected.seen.centre_px - seen.centre_px,
             (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>(), seen);
 }

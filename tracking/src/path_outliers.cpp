@@ -163,8 +163,7 @@ void doubt(const Place& place, Sighting& seen) {
   seen.attitude_doubtful = true;
   allow_for(px, place.m - pose.pose.centre_m.head<2>(), seen);
   // A fit that went astray did so in all it says.
-  const double astray_rad = px.norm() / seen.rim.semi_major_px();
-  pose.sigma_theta_rad = std::hypot(pose.sigma_theta_rad, astray_rad);
+  allow_for_tilt(px.norm() / seen.rim.semi_major_px(), seen);
   pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
 }
 
