@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-
+#include <utility>
 #include <vector>
 
 namespace trochoid::tracking {
@@ -33,7 +33,7 @@ struct Recorded {
       seen.pose->pose.centre_m = {1e-3 * seen.centre_px.x(), 1e-3 * seen.centre_px.y(), 0.0};
       seen.pose->covariance_px2 = seen.covariance_px2;
       seen.pose->covariance_m2 = 1e-6 * seen.covariance_px2;
-      glimpses.push_back({&frame, seen});
+      glimpses.push_back({&frame, std::move(seen)});
     }
   }
 };

@@ -61,10 +61,13 @@ class Readings : public GlimpsedSequence {
   /// What the frame with the largest holds of other readings.
   PoseSpread doubted(const BodyFinder& finder) {
     auto glimpses = tracked(finder, [](int) { return false; });
-    doubt_readings(choose_readings(background_, finder, glimpses), finder, 0, glimpses);
+    const ReadingDoubt doubt = choose_readings(background_, finder, glimpses);
+    place_other_readings(finder, 0, glimpses);
     PoseSpread most;
     for (const Glimpse& g : glimpses)
-      if (g.seen->other_readings->theta_rad2 >= most.theta_rad2) most = *g.seen->other_readings;
+      if (const auto spread = spread_over_readings(doubt.tallies, *g.seen);
+          spread.theta_rad2 >= most.theta_rad2)
+        most = spread;
     return most;
   }
   double doubted_rad(const BodyFinder& finder) { return std::sqrt(doubted(finder).theta_rad2); }
@@ -114,6 +117,15 @@ TEST_F(Readings, APictureLookedAtInAnotherReadingIsDoubtedAsFarAsItLeadsThere) {
               0.1 * all_the_way_rad);
   // Far beyond: that is the mirror image, and not for the sake of this reading to be feared.
   EXPECT_EQ(doubted_rad(TwoReadings(tells_nothing, 2.5)), 0.0);
+}
+
+// A stretch of a long recording has few frames that are looked at.
+TEST_F(Readings, WhatALongRecordingTellsApartAStretchOfItMayNot) {
+  const ReadingTally stretch{.looked_at = 2.0, .found = 2.0, .gain = -0.4, .square = 2.0};
+  ReadingTally recording;
+  for (int i = 0; i < 50; ++i) recording.add(stretch);
+  EXPECT_GT(stretch.may_be(), 1.5 * recording.may_be());
+  EXPECT_GT(recording.may_be(), 0.02);
 }
 
 TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {

@@ -22,9 +22,8 @@ struct Sighting {
   double rms_px = 0.0;
   double accepted = 0.0;           ///< share of the outline with an edge
   bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
-  /// Spread over other readings of the whole path, by how likely these are; its covariance does not
-  /// hold it. Nothing before that is known.
-  std::optional<PoseSpread> other_readings{};
+  /// How far off each of BodyFinder::other_readings is; no covariance holds that.
+  std::array<PoseSpread, 2> other_readings{};
   Evidence evidence{};
   std::vector<EdgePoint> edges;
 };

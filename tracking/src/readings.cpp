@@ -79,7 +79,7 @@ class Readings {
       follow(breaks());
       solve();
     }
-    ReadingDoubt doubt{.may_be = may_be_otherwise()};
+    ReadingDoubt doubt{.tallies = tallies()};
     for (Node& node : nodes_) {
       if (node.chosen == 0) continue;
       auto& seen = glimpses_[node.at].seen;
@@ -195,13 +195,8 @@ class Readings {
     return true;
   }
 
-  /// How likely the whole path is to be seen in each of the other readings: what all of its
-  /// pictures say together for one of two has an error that they share. Times the mean square of
-  /// how far off that is, of the way to the reading.
-  [[nodiscard]] std::array<double, 2> may_be_otherwise() const {
-    // Between recordings, and between pictures. The spread over what is hardly likely is no error
-    // bar: it would be as wide as nothing that was seen.
-    constexpr double kShared = 0.12, kOfOne = 0.1, kHardly = 0.02;
+  /// Of every kStride-th frame of the path that was chosen.
+  [[nodiscard]] ReadingTallies tallies() const {
     std::vector<Otherwises> frames(nodes_.size() / kStride);
     on_both_cores(background_, finder_, frames.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
@@ -214,21 +209,17 @@ class Readings {
         if (const auto seen = read_otherwise(measure, k, others[which]))
           frames[i][which] = compared(*others[which], *seen, k);
     });
-    std::array<double, 2> may_be{};
-    for (std::size_t which = 0; which < may_be.size(); ++which) {
-      double sum = 0.0, count = 0.0, square = 0.0;
-      for (const Otherwises& frame : frames) {
+    ReadingTallies sums;
+    for (const Otherwises& frame : frames)
+      for (std::size_t which = 0; which < sums.size(); ++which) {
+        ReadingTally& sum = sums[which];
+        sum.looked_at += 1.0;
         if (!frame[which]) continue;
-        sum += frame[which]->gain, count += 1.0;
-        square += frame[which]->share * frame[which]->share;
+        sum.found += 1.0;
+        sum.gain += frame[which]->gain;
+        sum.square += frame[which]->share * frame[which]->share;
       }
-      if (count == 0.0) continue;
-      const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / count);
-      const double likely = count / static_cast<double>(frames.size()) * 0.5 *
-                            std::erfc(-sum / count / (sd * std::numbers::sqrt2));
-      if (likely > kHardly) may_be[which] = likely * square / count;
-    }
-    return may_be;
+    return sums;
   }
 
   /// Where the path breaks, it may have gone on from either side.
@@ -415,26 +406,54 @@ ReadingDoubt choose_readings(const Background& background, const BodyFinder& fin
   return Readings(background, finder, glimpses).choose();
 }
 
-void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::size_t settled,
-                    std::vector<Glimpse>& glimpses) {
+void place_other_readings(const BodyFinder& finder, std::size_t settled,
+                          std::vector<Glimpse>& glimpses) {
   constexpr double kLying = 1e-6;  // found to lie on its face, by more than its edges
   for (std::size_t i = settled; i < glimpses.size(); ++i) {
     if (!glimpses[i].posed()) continue;
     Sighting& seen = *glimpses[i].seen;
-    PoseSpread& spread = seen.other_readings.emplace();
+    seen.other_readings = {};
     const Pose pose = seen.pose->pose;
     if (std::sin(pose.theta_rad) < kLying) continue;
     const auto others = finder.other_readings(pose);
     for (std::size_t which = 0; which < others.size(); ++which) {
       if (!others[which]) continue;
       const Eigen::Vector2d off_m = (others[which]->centre_m - pose.centre_m).head<2>();
-      spread.m2 += doubt.may_be[which] * off_m * off_m.transpose();
-      spread.theta_rad2 +=
-          doubt.may_be[which] * std::pow(others[which]->theta_rad - pose.theta_rad, 2);
       const double turn = std::remainder(others[which]->phi_rad - pose.phi_rad, kTurn);
-      spread.across_rad2 += doubt.may_be[which] * std::pow(std::sin(pose.theta_rad) * turn, 2);
+      PoseSpread& spread = seen.other_readings[which];
+      spread.m2 = off_m * off_m.transpose();
+      spread.theta_rad2 = std::pow(others[which]->theta_rad - pose.theta_rad, 2);
+      spread.across_rad2 = std::pow(std::sin(pose.theta_rad) * turn, 2);
     }
   }
+}
+
+PoseSpread spread_over_readings(const ReadingTallies& of_path, const Sighting& seen) {
+  PoseSpread sum;
+  for (std::size_t which = 0; which < of_path.size(); ++which) {
+    const double may_be = of_path[which].may_be();
+    const PoseSpread& spread = seen.other_readings[which];
+    sum.m2 += may_be * spread.m2;
+    sum.theta_rad2 += may_be * spread.theta_rad2;
+    sum.across_rad2 += may_be * spread.across_rad2;
+  }
+  return sum;
+}
+
+void ReadingTally::add(const ReadingTally& other) {
+  looked_at += other.looked_at, found += other.found;
+  gain += other.gain, square += other.square;
+}
+
+double ReadingTally::may_be() const {
+  // Between recordings, and between pictures. The spread over what is hardly likely is no error
+  // bar: it would be as wide as nothing that was seen.
+  constexpr double kShared = 0.12, kOfOne = 0.1, kHardly = 0.02;
+  if (found == 0.0) return 0.0;
+  const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / found);
+  const double likely =
+      found / looked_at * 0.5 * std::erfc(-gain / found / (sd * std::numbers::sqrt2));
+  return likely > kHardly ? likely * square / found : 0.0;
 }
 
 }  // namespace trochoid::tracking

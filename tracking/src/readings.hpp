@@ -6,12 +6,22 @@
 
 namespace trochoid::tracking {
 
+/// What frames of a path showed when they were looked at in one of BodyFinder::other_readings.
+struct ReadingTally {
+  double looked_at = 0.0, found = 0.0;  ///< frames
+  double gain = 0.0;    ///< sum over those found of how much more speaks for what was found
+  double square = 0.0;  ///< sum over them of its squared distance, of the way to that reading
+  void add(const ReadingTally& other);
+  /// Probability that the whole path is to be read so, times the mean square of that distance. What
+  /// all pictures of a recording say together for one of two readings has an error that they share.
+  [[nodiscard]] double may_be() const;
+};
+using ReadingTallies = std::array<ReadingTally, 2>;
+
 /// What the pictures of a sequence leave open about how they are read.
 struct ReadingDoubt {
   bool otherwise = false;  ///< some frame is read otherwise than it was tracked
-  /// Probability of each of BodyFinder::other_readings all along these frames, times the mean
-  /// square of how far off what they then show is, of the way to that reading.
-  std::array<double, 2> may_be{};
+  ReadingTallies tallies{};
 };
 
 /// Decides over a sequence which reading of its pictures was seen. For a stretch of frames the fit
@@ -23,10 +33,13 @@ struct ReadingDoubt {
 [[nodiscard]] ReadingDoubt choose_readings(const Background& background, const BodyFinder& finder,
                                            std::vector<Glimpse>& glimpses);
 
-/// Sets Sighting::other_readings of every frame: a wall that its shade hides may be there, whatever
-/// the edges say.
+/// Sets Sighting::other_readings of every frame.
 /// @param settled so many frames at the front stay as they are.
-void doubt_readings(const ReadingDoubt& doubt, const BodyFinder& finder, std::size_t settled,
-                    std::vector<Glimpse>& glimpses);
+void place_other_readings(const BodyFinder& finder, std::size_t settled,
+                          std::vector<Glimpse>& glimpses);
+
+/// What the error of a frame holds for readings that the pictures of its whole path leave open: a
+/// wall that its shade hides may be there, whatever the edges say.
+[[nodiscard]] PoseSpread spread_over_readings(const ReadingTallies& of_path, const Sighting& seen);
 
 }  // namespace trochoid::tracking

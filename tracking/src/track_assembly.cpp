@@ -143,8 +143,8 @@ void allow_for_other_readings(const BodyPath& path, data::Track& track) {
   auto sample = track.samples.begin();
   for (const auto& [index, at] : path.frames) {
     data::TrackSample& of_frame = *sample++;
-    if (!at.seen.other_readings) continue;
-    const PoseSpread& spread = *at.seen.other_readings;
+    if (!at.seen.pose) continue;
+    const PoseSpread spread = spread_over_readings(path.readings, at.seen);
     const double theta = at.seen.pose->pose.theta_rad;
     of_frame.covariance_m2 += spread.m2;
     grow(of_frame.theta, std::sqrt(spread.theta_rad2));

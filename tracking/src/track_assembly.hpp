@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "body_finder.hpp"
+#include "readings.hpp"
 #include "spin_profile.hpp"
 #include "trochoid/data/camera.hpp"
 #include "trochoid/data/scene.hpp"
@@ -21,6 +22,7 @@ struct BodyPath {
   using Frames = std::map<std::int64_t, At>;
   Frames frames;
   std::shared_ptr<const SpinProfile> marks;
+  ReadingTallies readings{};  ///< of all its frames
 };
 
 /// How pixels become metres in a track measured by rims alone.

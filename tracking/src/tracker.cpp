@@ -340,7 +340,9 @@ class Tracking {
     doubt_what_leaves_the_path(glimpses);
     doubt_what_stands_alone(glimpses);
     forget_what_tells_nothing(glimpses);
-    doubt_readings(reading, *finder_, settled, glimpses);
+    place_other_readings(*finder_, settled, glimpses);
+    for (std::size_t which = 0; which < path.readings.size(); ++which)
+      path.readings[which].add(reading.tallies[which]);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
