@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <span>
 
 #include "strategy.hpp"
 
@@ -32,6 +33,37 @@ Eigen::MatrixXd reach(const Problem& problem, const Eigen::VectorXd& u, double r
   if (cholesky.info() != Eigen::Success) return {};
   return cholesky.matrixU().solve(Eigen::MatrixXd::Identity(u.size(), u.size()));
 }
+
+// Looks at random places about a solution instead of going downhill from each: values are far
+// cheaper than derivatives. Reproducible.
+class Looks {
+ public:
+  explicit Looks(const Problem& problem) : problem_(problem) {}
+  // The place that leaves least, by steps in turn along the columns of L; empty where the model
+  // ends at all of them. What is held stays as it is in `held`.
+  Eigen::VectorXd best(int count, const Eigen::VectorXd& about, const Eigen::MatrixXd& L,
+                       std::span<const double> steps, const Eigen::VectorXd& held) {
+    double least = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd from, residuals;
+    for (int look = 0; look < count; ++look) {
+      Eigen::VectorXd z(L.cols());
+      for (double& entry : z) entry = normal_(generator_);
+      Eigen::VectorXd u = about + steps[static_cast<std::size_t>(look) % steps.size()] * (L * z);
+      for (Eigen::Index k = 0; k < u.size(); ++k)
+        if (problem_.free[k].held) u[k] = held[k];
+      if (!evaluate(problem_, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
+        continue;
+      least = residuals.squaredNorm();
+      from = u;
+    }
+    return from;
+  }
+
+ private:
+  const Problem& problem_;
+  std::mt19937_64 generator_{1};
+  std::normal_distribution<double> normal_;
+};
 
 // A solution for the longest part of the track before an instant that one explains.
 struct Prelude {
@@ -72,22 +104,10 @@ Found fall_anew(const Problem& problem, Found found) {
   if (!prelude) return found;
   const Eigen::MatrixXd L = reach(prelude->part, prelude->solution.u, 1.0);
   if (L.size() == 0) return found;
-  std::mt19937_64 generator(1);
-  std::normal_distribution<double> normal;
+  Looks looks(problem);
   for (int round = 0; round < kRounds && !found.passed && !exhausted(problem, found); ++round) {
-    double least = std::numeric_limits<double>::infinity();
-    Eigen::VectorXd from, residuals;
-    for (int look = 0; look < kLooks; ++look) {
-      Eigen::VectorXd z(L.cols());
-      for (double& entry : z) entry = normal(generator);
-      Eigen::VectorXd u = prelude->solution.u + kSteps[look % 4] * (L * z);
-      for (Eigen::Index k = 0; k < u.size(); ++k)
-        if (problem.free[k].held) u[k] = found.solution.u[k];
-      if (!evaluate(problem, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
-        continue;
-      least = residuals.squaredNorm();
-      from = u;
-    }
+    const Eigen::VectorXd from =
+        looks.best(kLooks, prelude->solution.u, L, kSteps, found.solution.u);
     if (from.size() == 0) break;
     Found other = judged(problem, seek(problem, from), found.path);
     if (!better(other, found)) continue;
@@ -100,26 +120,13 @@ Found fall_anew(const Problem& problem, Found found) {
 Found hop(const Problem& problem, Found best, int misses) {
   if (!best.solution.usable) return best;
   constexpr double kSteps[] = {0.5, 1.0, 2.0, 4.0, 10.0};
-  constexpr int kLooks = 40, kMostRounds = 12;  // values are far cheaper than derivatives
-  std::mt19937_64 generator(1);
-  std::normal_distribution<double> normal;
+  constexpr int kLooks = 40, kMostRounds = 12;
+  Looks looks(problem);
   Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
   for (int round = 0, missed = 0;
        round < kMostRounds && missed < misses && L.size() > 0 && !exhausted(problem, best);
        ++round) {
-    double least = std::numeric_limits<double>::infinity();
-    Eigen::VectorXd from;
-    for (int look = 0; look < kLooks; ++look) {
-      Eigen::VectorXd z(L.cols()), residuals;
-      for (double& entry : z) entry = normal(generator);
-      Eigen::VectorXd u = best.solution.u + kSteps[look % 5] * (L * z);
-      for (Eigen::Index k = 0; k < u.size(); ++k)
-        if (problem.free[k].held) u[k] = best.solution.u[k];
-      if (!evaluate(problem, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
-        continue;
-      least = residuals.squaredNorm();
-      from = u;
-    }
+    const Eigen::VectorXd from = looks.best(kLooks, best.solution.u, L, kSteps, best.solution.u);
     if (from.size() == 0) break;
     Found found = judged(problem, seek(problem, from, {.iterations = 20}), best.path);
     // A ripple of less than 1 in chi-square moves nothing by more than its error bar.

@@ -290,7 +290,8 @@ TEST(EdgeStretch, LevelsThatScatterWithTheirShadingAreKnownFromEachOther) {
     of_alone += mean_square_px2(profiles) /
                 (kNoise * kNoise * least_variance_alone_px2(profiles.front())) / kPictures;
   }
-  // With both levels known it would be 0.72.
+  // With both levels known it would be 0.72, with scatter taken for difference it is 0.86; ten
+  // thousand profiles tell it to 0.012.
   EXPECT_LT(of_alone, 0.84);
 }
 

@@ -9,7 +9,7 @@ namespace trochoid::tracking {
 /// What frames of a path showed when they were looked at in one of BodyFinder::other_readings.
 struct ReadingTally {
   double looked_at = 0.0, found = 0.0;  ///< frames
-  double gain = 0.0;    ///< sum over those found of how much more speaks for what was found
+  double gain = 0.0;    ///< sum over those found of the logarithm of how much more speaks for it
   double square = 0.0;  ///< sum over them of its squared distance, of the way to that reading
   void add(const ReadingTally& other);
   /// Probability that the whole path is to be read so, times the mean square of that distance. What
@@ -38,8 +38,9 @@ struct ReadingDoubt {
 void place_other_readings(const BodyFinder& finder, std::size_t settled,
                           std::vector<Glimpse>& glimpses);
 
-/// What the error of a frame holds for readings that the pictures of its whole path leave open: a
-/// wall that its shade hides may be there, whatever the edges say.
+/// What the error of a frame on the floor and of its angles (px2 is 0) holds for readings that the
+/// pictures of its whole path leave open: a wall that its shade hides may be there, whatever the
+/// edges say.
 [[nodiscard]] PoseSpread spread_over_readings(const ReadingTallies& of_path, const Sighting& seen);
 
 }  // namespace trochoid::tracking
