@@ -29,6 +29,7 @@ struct Node {
   double shows = 0.0;               ///< how much the edges in the picture speak for the first
   double speaks = 0.0;              ///< how much all of it does
   double could = 0.0;               ///< how much it could, told in full
+  double shadow = 0.0;              ///< how much its shadow speaks for the first
   std::optional<Sighting> again{};  ///< the first measured afresh, where more speaks for it then
   std::optional<Sighting> other{};  ///< the second
 
@@ -66,6 +67,7 @@ class Chain {
 
   [[nodiscard]] std::vector<AttitudeDoubt> decide() {
     if (nodes_.size() < 3) return undecided();
+    weigh_shadows();
     weigh(first_choice());
     compare_sizes();
     solve();
@@ -137,6 +139,18 @@ class Chain {
     });
   }
 
+  /// Which side of the body is raised shows in the shadow that it throws.
+  void weigh_shadows() {
+    constexpr double kPerShare = 5.0, kMost = 1.5;
+    on_both_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
+      Node& node = nodes_[i];
+      if (node.tilt_rad < kLeastTilt) return;
+      const Glimpse& g = glimpses_[node.at];
+      const double other = measure.shadow(*g.frame, *g.seen, node.poses[1]);
+      node.shadow = std::clamp(kPerShare * (g.seen->shadow - other), -kMost, kMost);
+    });
+  }
+
   [[nodiscard]] const Sighting& first_of(const Node& node) const {
     return node.again ? *node.again : *glimpses_[node.at].seen;
   }
@@ -150,7 +164,7 @@ class Chain {
     const double whole = least_whole();
     std::vector<double> larger_px;
     for (Node& node : nodes_) {
-      node.speaks = node.shows;
+      node.speaks = node.shows + node.shadow;
       node.could = node.wall();
       if (shows_size(node, whole))
         larger_px.insert(larger_px.end(),
@@ -214,17 +228,18 @@ class Chain {
   /// they speak for the chosen sequence by no more than that, it is not known, however many.
   void discount() {
     constexpr double kShared = 0.15, kSure = 0.38;
-    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9;
+    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9, shadow = 0.0, tilted = 1e-9;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (!nodes_[i].weighed) continue;
       const double chosen = std::copysign(1.0, margin_[i]);
+      if (nodes_[i].tilt_rad > kLeastTilt) shadow += chosen * nodes_[i].shadow, tilted += 1.0;
+      if (!nodes_[i].weighed) continue;
       shows += chosen * nodes_[i].shows;
       wall += nodes_[i].wall();
       speaks += chosen * nodes_[i].speaks;
       could += nodes_[i].could;
     }
-    // By the edges alone or together with the sizes, whichever is clearer.
-    const double share = std::max(shows / wall, speaks / could);
+    // By the edges alone or together with the sizes, or by the shadows, whichever is clearer.
+    const double share = std::max({shows / wall, speaks / could, shadow / tilted});
     const double trust = std::clamp((share - kShared) / (kSure - kShared), 0.0, 1.0);
     for (Node& node : nodes_) node.speaks *= trust;
   }

@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
+#include "cast_shadow.hpp"
 #include "rim_fit.hpp"
 
 namespace trochoid::tracking {
@@ -40,6 +42,14 @@ class Background {
   /// the estimate itself.
   void clear_of(const Ellipse& rim);
 
+  /// The same, lit by a lamp whose place is known.
+  [[nodiscard]] Background lit_by(const std::optional<Lamp>& lamp) const {
+    Background lit = *this;
+    lit.lamp_ = lamp;
+    return lit;
+  }
+  [[nodiscard]] const std::optional<Lamp>& lamp() const { return lamp_; }
+
   [[nodiscard]] bool empty() const { return plate_.luma.empty(); }
   /// At the brightness of one of the samples; noise at least 0.7 levels.
   [[nodiscard]] const Plate& plate() const { return plate_; }
@@ -63,6 +73,7 @@ class Background {
   Plate plate_;
   cv::Mat active_;
   double restless_ = 0.0;
+  std::optional<Lamp> lamp_;
 };
 
 }  // namespace trochoid::tracking

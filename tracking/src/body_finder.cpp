@@ -144,6 +144,10 @@ class CylinderFinder final : public BodyFinder {
     return {face_outlined_like(body_, camera_, motion_, pose, Side::same),
             outlined_like_face(body_, camera_, motion_, pose)};
   }
+  [[nodiscard]] std::optional<FloorDarkening> floor_around(
+      const Frame& frame, const Plate& background, const data::Pose<>& pose) const override {
+    return FloorDarkening(frame.luma, background.luma, body_, pose, camera_);
+  }
   [[nodiscard]] const BodyFinder* lying() const override { return lying_.get(); }
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
     try {

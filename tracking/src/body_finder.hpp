@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "background.hpp"
+#include "cast_shadow.hpp"
 #include "evidence.hpp"
 #include "rim_fit.hpp"
 #include "trochoid/tracking/frame_source.hpp"
@@ -24,6 +25,8 @@ struct Sighting {
   bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
   /// How far off each of BodyFinder::other_readings is; no covariance holds that.
   std::array<PoseSpread, 2> other_readings{};
+  /// Share of how dark the floor is around it that its shadow explains; 0 without a lamp.
+  double shadow = 0.0;
   Evidence evidence{};
   std::vector<EdgePoint> edges;
 };
@@ -59,6 +62,11 @@ class BodyFinder {
   using OtherReadings = std::array<std::optional<data::Pose<>>, 2>;
   [[nodiscard]] virtual OtherReadings other_readings(const data::Pose<>& /*pose*/) const {
     return {};
+  }
+  /// The floor around the body in some pose; nothing for a body of unknown shape.
+  [[nodiscard]] virtual std::optional<FloorDarkening> floor_around(
+      const Frame& /*frame*/, const Plate& /*background*/, const data::Pose<>& /*pose*/) const {
+    return std::nullopt;
   }
   /// For a body on the floor that is known to lie on its face; null where there is no difference.
   [[nodiscard]] virtual const BodyFinder* lying() const { return nullptr; }

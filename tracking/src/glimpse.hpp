@@ -20,6 +20,12 @@ struct Glimpse {
   [[nodiscard]] const data::Pose<>& pose() const { return seen->pose->pose; }
 };
 
+/// How much more speaks for one fit to a picture than for another, as a logarithm: its edges, and
+/// its shadow, where both cover about the same of the picture.
+[[nodiscard]] double speaks_more(const Sighting& one, const Sighting& other);
+/// The same of its shadow alone.
+[[nodiscard]] double shadow_speaks_more(const Sighting& one, const Sighting& other);
+
 /// Measures a body about a guess in one frame.
 class Measuring {
  public:
@@ -32,7 +38,17 @@ class Measuring {
                                                    const std::optional<data::Pose<>>& near,
                                                    const ShadingMemory* shading = nullptr);
 
+  /// The floor around the body in some pose, where it is seen about `seen`.
+  [[nodiscard]] std::optional<FloorDarkening> floor_around(const Frame& frame, const Sighting& seen,
+                                                           const data::Pose<>& pose);
+  /// Share of how dark that floor is that the shadow explains; 0 without a lamp.
+  [[nodiscard]] double shadow(const Frame& frame, const Sighting& seen, const data::Pose<>& pose);
+
  private:
+  /// Brings the background around a sighting to the brightness of the frame; false if that is out
+  /// of the picture.
+  bool prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii);
+
   const Background& background_;
   const BodyFinder& finder_;
   Plate plate_;

@@ -328,8 +328,9 @@ class Mending {
       if (worth(*seen) < kUsualShare * usual_worth_) return {};
       return {std::move(seen), now};
     }
-    const double gain = now / likelihood(*before, off, expected);
-    if (gain < kBetter || worth(*seen) < kAsGood * worth(*before)) return {};
+    const double of_shadow = std::exp(shadow_speaks_more(*seen, *before));
+    const double gain = of_shadow * now / likelihood(*before, off, expected);
+    if (gain < kBetter || of_shadow * worth(*seen) < kAsGood * worth(*before)) return {};
     seen->turned_rad = before->turned_rad;
     return {std::move(seen), gain};
   }
@@ -435,9 +436,7 @@ class Branch {
       return false;
     seen->turned_rad = glimpses_[i].seen->turned_rad;
     // Not how plainly: the rim of a face in the light is plainer than that of a wall in the shade.
-    constexpr double kLeast = 1e-9;
-    gain_ += std::log(std::max(kLeast, seen->pose->evidence) /
-                      std::max(kLeast, glimpses_[i].seen->pose->evidence));
+    gain_ += speaks_more(*seen, *glimpses_[i].seen);
     as_led_[i].seen = std::move(seen);
     led_.push_back(i);
     if (gain_ > best_) best_ = gain_, kept_ = led_.size();

@@ -110,12 +110,6 @@ class Readings {
       known.push_back(std::move(seen));
   }
 
-  /// How much more speaks for one of two fits to a picture.
-  static double gain(const Sighting& over, const Sighting& under) {
-    constexpr double kLeast = 1e-9;
-    return std::log(std::max(kLeast, over.pose->evidence) / std::max(kLeast, under.pose->evidence));
-  }
-
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t k,
                                                  const Pose& pose, const Pose& near) const {
     Sighting guess = nodes_[k].seen();
@@ -160,7 +154,7 @@ class Readings {
     if (!(share < kFarthest) ||
         (seen.centre_px - chosen.centre_px).norm() > kNear_radii * chosen.rim.semi_major_px())
       return std::nullopt;
-    return Otherwise{gain(seen, chosen), share};
+    return Otherwise{speaks_more(seen, chosen), share};
   }
 
   /// Other readings of every so many frames for which about as much speaks.
@@ -175,7 +169,7 @@ class Readings {
         const auto seen = read_otherwise(measure, k, others[which]);
         if (!seen) continue;
         as_tracked_[i][which] = compared(*others[which], *seen, k);
-        if (gain(*seen, nodes_[k].seen()) < kAsGood) continue;
+        if (speaks_more(*seen, nodes_[k].seen()) < kAsGood) continue;
         for (const int side : {1, -1})
           if (const auto off = one_frame_off(k, seen->pose->pose, side))
             found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
@@ -264,7 +258,7 @@ class Readings {
       const double ahead = (nodes_[k].t_s - last_s) / (last_s - from.before_s);
       auto seen = measured(measure, k, led(from.before, last, ahead), last);
       if (!seen || same(*seen, nodes_[k].seen())) break;
-      sum += gain(*seen, nodes_[k].seen());
+      sum += speaks_more(*seen, nodes_[k].seen());
       best = std::max(best, sum);
       if (sum < best - kGiveUp) break;
       found.emplace_back(k, *seen);
@@ -350,7 +344,7 @@ class Readings {
   /// What it costs that less speaks for a reading than for the frame as tracked.
   [[nodiscard]] double own_cost(std::size_t k, std::size_t c) const {
     constexpr double kPerGain = 12.0;  // fits as good as each other scatter by a tenth or so
-    return -kPerGain * gain(nodes_[k].readings[c], nodes_[k].readings[0]);
+    return -kPerGain * speaks_more(nodes_[k].readings[c], nodes_[k].readings[0]);
   }
 
   /// The best path; pairs of readings of successive frames are the states.

@@ -16,6 +16,7 @@
 #include "pose_motion.hpp"
 #include "readings.hpp"
 #include "recording.hpp"
+#include "shadows.hpp"
 #include "track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -328,14 +329,16 @@ class Tracking {
     }
     forget_what_the_path_jumps_to(glimpses);
     forget_what_is_faint_beside_gaps(glimpses);
-    const auto doubts = decide_attitudes(background_, *finder_, glimpses);
-    mend_from_neighbours(background_, *finder_, glimpses);
-    mend_from_one_side(background_, *finder_, glimpses);
-    const ReadingDoubt reading = choose_readings(background_, *finder_, glimpses);
-    if (reading.otherwise) mend_from_neighbours(background_, *finder_, glimpses);
-    if (options_.effort != Effort::quick) measure_again(background_, *finder_, settled, glimpses);
+    const Background lit = background_.lit_by(find_lamp(background_, *finder_, glimpses));
+    look_at_shadows(lit, *finder_, glimpses);
+    const auto doubts = decide_attitudes(lit, *finder_, glimpses);
+    mend_from_neighbours(lit, *finder_, glimpses);
+    mend_from_one_side(lit, *finder_, glimpses);
+    const ReadingDoubt reading = choose_readings(lit, *finder_, glimpses);
+    if (reading.otherwise) mend_from_neighbours(lit, *finder_, glimpses);
+    if (options_.effort != Effort::quick) measure_again(lit, *finder_, settled, glimpses);
     doubt_attitudes(doubts, glimpses);
-    measure_what_lies(background_, *finder_, glimpses);
+    measure_what_lies(lit, *finder_, glimpses);
     doubt_what_is_contradicted(*finder_, glimpses);
     doubt_what_leaves_the_path(glimpses);
     doubt_what_stands_alone(glimpses);

@@ -1,0 +1,45 @@
+#include "shadows.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace trochoid::tracking {
+
+std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& finder,
+                              const std::vector<Glimpse>& glimpses) {
+  constexpr std::size_t kLooks = 32;
+  constexpr double kLeast = 0.05;  // explained of what is dark around the body
+  std::vector<const Glimpse*> seen;
+  for (const Glimpse& g : glimpses)
+    if (g.posed()) seen.push_back(&g);
+  const std::size_t count = std::min(kLooks, seen.size());
+  const std::vector<Lamp>& lamps = lamps_all_round();
+  std::vector<std::vector<double>> explained(count, std::vector<double>(lamps.size(), 0.0));
+  on_both_cores(background, finder, count, [&](Measuring& measure, std::size_t i) {
+    const Glimpse& g = *seen[i * seen.size() / count];
+    std::vector<data::Pose<>> readings{g.pose()};
+    if (const auto image = finder.mirror_image(g.pose())) readings.push_back(*image);
+    for (const data::Pose<>& pose : readings)
+      if (const auto floor = measure.floor_around(*g.frame, *g.seen, pose))
+        for (std::size_t k = 0; k < lamps.size(); ++k)
+          explained[i][k] = std::max(explained[i][k], floor->explained(lamps[k]));
+  });
+  std::optional<Lamp> best;
+  double most = kLeast * static_cast<double>(count);
+  for (std::size_t k = 0; k < lamps.size(); ++k) {
+    double sum = 0.0;
+    for (const auto& of_frame : explained) sum += of_frame[k];
+    if (sum > most) most = sum, best = lamps[k];
+  }
+  return best;
+}
+
+void look_at_shadows(const Background& background, const BodyFinder& finder,
+                     std::vector<Glimpse>& glimpses) {
+  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+    Glimpse& g = glimpses[i];
+    if (g.posed()) g.seen->shadow = measure.shadow(*g.frame, *g.seen, g.pose());
+  });
+}
+
+}  // namespace trochoid::tracking
