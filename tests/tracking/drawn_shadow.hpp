@@ -54,11 +54,12 @@ inline std::vector<cv::Point> outline_on_floor(const data::Pose<>& pose, double 
 inline constexpr double kFloor = 150.0, kInShadow = 100.0, kFace = 60.0;
 
 /// A plain floor with the plate on it and the shadow it throws under a lamp.
-inline cv::Mat drawn_with_shadow(const data::Pose<>& pose, const Lamp& lamp, double bore_m = 0.0) {
+inline cv::Mat drawn_with_shadow(const data::Pose<>& pose, const Eigen::Vector2d& lamp_aside,
+                                 double bore_m = 0.0) {
   const cv::Size size(240, 240);
   cv::Mat shadow = cv::Mat::zeros(size, CV_8U);
-  cv::fillPoly(shadow, {outline_on_floor(pose, drawn_body().radius_m, -lamp)}, 255);
-  if (bore_m > 0.0) cv::fillPoly(shadow, {outline_on_floor(pose, bore_m, -lamp)}, 0);
+  cv::fillPoly(shadow, {outline_on_floor(pose, drawn_body().radius_m, -lamp_aside)}, 255);
+  if (bore_m > 0.0) cv::fillPoly(shadow, {outline_on_floor(pose, bore_m, -lamp_aside)}, 0);
   cv::Mat picture(size, CV_8U, cv::Scalar(kFloor));
   picture.setTo(kInShadow, shadow);
   cv::fillPoly(picture, {outline_on_floor(pose, drawn_body().radius_m, {0.0, 0.0})}, kFace);

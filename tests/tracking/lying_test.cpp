@@ -58,6 +58,17 @@ TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLooksSo) {
   EXPECT_EQ(count_lying(glimpses), kFrames);
 }
 
+// Raised on one side it would darken the floor there.
+TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLacksTheShadowOfATilt) {
+  const Floor floor(0.8 * kEvidence);
+  for (const double agrees : {0.0, -1.0}) {
+    auto glimpses = seen_by(floor, false);
+    for (Glimpse& g : glimpses) g.seen->shadow = agrees;
+    measure_what_lies(background_, floor, glimpses);
+    EXPECT_EQ(count_lying(glimpses), agrees < 0.0 ? kFrames : 0) << agrees;
+  }
+}
+
 TEST_F(Lying, ABodyThatPrecessesDoesNotLieWhateverItLooksLike) {
   const Floor floor(1.5 * kEvidence);
   auto glimpses = seen_by(floor, true);

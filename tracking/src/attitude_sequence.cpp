@@ -141,13 +141,13 @@ class Chain {
 
   /// Which side of the body is raised shows in the shadow that it throws.
   void weigh_shadows() {
-    constexpr double kPerShare = 5.0, kMost = 1.5;
+    constexpr double kOfShadow = 2.5, kMost = 1.5;
     on_both_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       const Glimpse& g = glimpses_[node.at];
       const double other = measure.shadow(*g.frame, *g.seen, node.poses[1]);
-      node.shadow = std::clamp(kPerShare * (g.seen->shadow - other), -kMost, kMost);
+      node.shadow = std::clamp(kOfShadow * (g.seen->shadow - other), -kMost, kMost);
     });
   }
 

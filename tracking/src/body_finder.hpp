@@ -25,7 +25,7 @@ struct Sighting {
   bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
   /// How far off each of BodyFinder::other_readings is; no covariance holds that.
   std::array<PoseSpread, 2> other_readings{};
-  /// Share of how dark the floor is around it that its shadow explains; 0 without a lamp.
+  /// How well its shadow agrees with how dark the floor is around it; 0 without a lamp.
   double shadow = 0.0;
   Evidence evidence{};
   std::vector<EdgePoint> edges;

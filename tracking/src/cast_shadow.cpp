@@ -11,10 +11,10 @@
 
 namespace trochoid::tracking {
 
-const std::vector<Lamp>& lamps_all_round() {
-  static const std::vector<Lamp> all = [] {
+const std::vector<Eigen::Vector2d>& all_round() {
+  static const std::vector<Eigen::Vector2d> all = [] {
     constexpr int kDirections = 24;
-    std::vector<Lamp> lamps;
+    std::vector<Eigen::Vector2d> lamps;
     for (const double aside : {0.3, 0.5, 0.8, 1.2, 1.8, 2.6})
       for (int i = 0; i < kDirections; ++i) {
         const double angle_rad = 2.0 * std::numbers::pi * i / kDirections;
@@ -93,15 +93,32 @@ bool FloorDarkening::meets(const Eigen::Vector3d& from_m, const Eigen::Vector3d&
   });
 }
 
-double FloorDarkening::explained(const Lamp& lamp) const {
-  constexpr double kFewest = 4.0;  // points in the shadow, and out of it
-  const Eigen::Vector3d towards(lamp.x(), lamp.y(), 1.0);
-  double count = 0.0, sum = 0.0;
+bool FloorDarkening::Sums::tell() const {
+  constexpr double kFewest = 4.0;
+  return within >= kFewest && without >= kFewest;
+}
+
+FloorDarkening::Sums FloorDarkening::sums_under(const Eigen::Vector2d& lamp_aside) const {
+  const Eigen::Vector3d towards(lamp_aside.x(), lamp_aside.y(), 1.0);
+  Sums sums;
   for (std::size_t i = 0; i < at_m_.size(); ++i)
-    if (meets(at_m_[i], towards, bore_m_, radius_m_)) count += 1.0, sum += darker_[i];
-  const double rest = static_cast<double>(at_m_.size()) - count;
-  if (count < kFewest || rest < kFewest || !(square_ > 0.0) || sum <= 0.0) return 0.0;
-  return sum * sum * (count + rest) / (count * rest * square_);
+    if (meets(at_m_[i], towards, bore_m_, radius_m_)) sums.within += 1.0, sums.darker += darker_[i];
+  sums.without = static_cast<double>(at_m_.size()) - sums.within;
+  return sums;
+}
+
+FloorDarkening::Shadow FloorDarkening::shadow_of(const Eigen::Vector2d& lamp_aside) const {
+  const Sums sums = sums_under(lamp_aside);
+  if (!sums.tell() || sums.darker <= 0.0) return {};
+  const double part = sums.darker / sums.square();
+  return {part, part * sums.darker / square_};
+}
+
+double FloorDarkening::agrees(const Lamp& lamp) const {
+  const Sums sums = sums_under(lamp.aside);
+  if (!sums.tell()) return 0.0;
+  const double expected = lamp.part * lamp.part * sums.square();
+  return 2.0 * (2.0 * lamp.part * sums.darker - expected) / (square_ + expected);
 }
 
 }  // namespace trochoid::tracking

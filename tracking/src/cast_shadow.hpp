@@ -10,11 +10,14 @@
 
 namespace trochoid::tracking {
 
-/// Where a lamp stands: how far to the side of a place on the table, over how far above it.
-using Lamp = Eigen::Vector2d;
+/// What lights a place on the table.
+struct Lamp {
+  Eigen::Vector2d aside;  ///< how far to the side it stands, over how far above
+  double part = 0.0;      ///< of the light there that it gives
+};
 
-/// All round, high and low: where a lamp is sought.
-[[nodiscard]] const std::vector<Lamp>& lamps_all_round();
+/// All round, high and low: where a lamp may stand aside.
+[[nodiscard]] const std::vector<Eigen::Vector2d>& all_round();
 
 /// How much darker a floor is around a body than without it. Attitudes that look alike throw
 /// different shadows: which side of a body is raised shows there.
@@ -23,10 +26,27 @@ class FloorDarkening {
   /// @param luma, plate CV_8UC1: the picture, and the scene without the body at its brightness.
   FloorDarkening(const cv::Mat& luma, const cv::Mat& plate, const data::Body& body,
                  const data::Pose<>& pose, const data::Camera& camera);
-  /// Share of it, 0..1, that the shadow of the body under a lamp explains.
-  [[nodiscard]] double explained(const Lamp& lamp) const;
+  /// How well the shadow of the body under a lamp agrees with it: 1 if that is all there is, 0 if
+  /// the body hides it or there are other shadows as large, down to -2 if it should be seen but is
+  /// not.
+  [[nodiscard]] double agrees(const Lamp& lamp) const;
+  /// The part of the light that is missing in the shadow, and the share of the darkening that it
+  /// explains, 0..1.
+  struct Shadow {
+    double part = 0.0, explained = 0.0;
+  };
+  [[nodiscard]] Shadow shadow_of(const Eigen::Vector2d& lamp_aside) const;
 
  private:
+  /// Points in a shadow and out of it, and the sum of what is darker in it.
+  struct Sums {
+    double within = 0.0, without = 0.0, darker = 0.0;
+    /// Whether enough are in either to compare.
+    [[nodiscard]] bool tell() const;
+    /// Sum of squares of being in it, beyond the mean.
+    [[nodiscard]] double square() const { return within * without / (within + without); }
+  };
+  [[nodiscard]] Sums sums_under(const Eigen::Vector2d& lamp_aside) const;
   void look_around(const cv::Mat& luma, const cv::Mat& plate, const data::Camera& camera);
 
   /// The body stands in the way of a ray that meets its faces or the middle between them.

@@ -41,13 +41,12 @@ double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool ali
 }
 
 double shadow_speaks_more(const Sighting& one, const Sighting& other) {
-  // Two readings of a picture differ by about a third in what their shadows explain, and by a tenth
-  // in their edges.
-  constexpr double kPerShare = 1.0;
+  // Shadows of two readings of a picture differ by about a half, their edges by a tenth.
+  constexpr double kOfShadow = 0.5;
   // Beside a dark body that it does not cover, a fit would take that for its shadow.
   constexpr double kSamePlace = 0.12;
   const double apart_px = (one.centre_px - other.centre_px).norm();
-  return apart_px < kSamePlace * other.rim.semi_major_px() ? kPerShare * (one.shadow - other.shadow)
+  return apart_px < kSamePlace * other.rim.semi_major_px() ? kOfShadow * (one.shadow - other.shadow)
                                                            : 0.0;
 }
 
@@ -77,7 +76,7 @@ std::optional<FloorDarkening> Measuring::floor_around(const Frame& frame, const 
 double Measuring::shadow(const Frame& frame, const Sighting& seen, const data::Pose<>& pose) {
   if (!background_.lamp()) return 0.0;
   const auto floor = floor_around(frame, seen, pose);
-  return floor ? floor->explained(*background_.lamp()) : 0.0;
+  return floor ? floor->agrees(*background_.lamp()) : 0.0;
 }
 
 std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,

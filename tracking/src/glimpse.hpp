@@ -41,7 +41,7 @@ class Measuring {
   /// The floor around the body in some pose, where it is seen about `seen`.
   [[nodiscard]] std::optional<FloorDarkening> floor_around(const Frame& frame, const Sighting& seen,
                                                            const data::Pose<>& pose);
-  /// Share of how dark that floor is that the shadow explains; 0 without a lamp.
+  /// How well its shadow agrees with that; 0 without a lamp.
   [[nodiscard]] double shadow(const Frame& frame, const Sighting& seen, const data::Pose<>& pose);
 
  private:

@@ -85,8 +85,12 @@ void measure_what_lies(const Background& background, const BodyFinder& finder,
     if (!found[i]) continue;
     double lies = 0.0, tilts = 0.0;
     const Window window(was, i);
-    for (std::size_t k = window.from; k < window.to; ++k)
-      if (found[k]) lies += found[k]->pose->evidence, tilts += was[k].seen->pose->evidence;
+    for (std::size_t k = window.from; k < window.to; ++k) {
+      if (!found[k]) continue;
+      const Sighting& seen = *was[k].seen;
+      lies += found[k]->pose->evidence * std::exp(shadow_speaks_more(*found[k], seen));
+      tilts += seen.pose->evidence;
+    }
     if (lies < kAsGood * tilts) continue;
     found[i]->turned_rad = was[i].seen->turned_rad;
     found[i]->pose->sigma_theta_rad = kFlatness_rad;

@@ -13,23 +13,29 @@ std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& fi
   for (const Glimpse& g : glimpses)
     if (g.posed()) seen.push_back(&g);
   const std::size_t count = std::min(kLooks, seen.size());
-  const std::vector<Lamp>& lamps = lamps_all_round();
-  std::vector<std::vector<double>> explained(count, std::vector<double>(lamps.size(), 0.0));
+  const std::vector<Eigen::Vector2d>& places = all_round();
+  using Shadow = FloorDarkening::Shadow;
+  std::vector<std::vector<Shadow>> shadows(count, std::vector<Shadow>(places.size()));
   on_both_cores(background, finder, count, [&](Measuring& measure, std::size_t i) {
     const Glimpse& g = *seen[i * seen.size() / count];
     std::vector<data::Pose<>> readings{g.pose()};
     if (const auto image = finder.mirror_image(g.pose())) readings.push_back(*image);
     for (const data::Pose<>& pose : readings)
       if (const auto floor = measure.floor_around(*g.frame, *g.seen, pose))
-        for (std::size_t k = 0; k < lamps.size(); ++k)
-          explained[i][k] = std::max(explained[i][k], floor->explained(lamps[k]));
+        for (std::size_t k = 0; k < places.size(); ++k)
+          if (const Shadow shadow = floor->shadow_of(places[k]);
+              shadow.explained > shadows[i][k].explained)
+            shadows[i][k] = shadow;
   });
   std::optional<Lamp> best;
   double most = kLeast * static_cast<double>(count);
-  for (std::size_t k = 0; k < lamps.size(); ++k) {
-    double sum = 0.0;
-    for (const auto& of_frame : explained) sum += of_frame[k];
-    if (sum > most) most = sum, best = lamps[k];
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    double explained = 0.0, part = 0.0;
+    for (const auto& of_frame : shadows) {
+      explained += of_frame[k].explained;
+      part += of_frame[k].explained * of_frame[k].part;
+    }
+    if (explained > most) most = explained, best = Lamp{places[k], part / explained};
   }
   return best;
 }

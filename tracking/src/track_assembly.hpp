@@ -22,7 +22,8 @@ struct BodyPath {
   using Frames = std::map<std::int64_t, At>;
   Frames frames;
   std::shared_ptr<const SpinProfile> marks;
-  ReadingTallies readings{};  ///< of all its frames
+  std::optional<Lamp> lamp{};  ///< as its shadows last showed it
+  ReadingTallies readings{};   ///< of all its frames
 };
 
 /// How pixels become metres in a track measured by rims alone.

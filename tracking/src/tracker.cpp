@@ -329,7 +329,8 @@ class Tracking {
     }
     forget_what_the_path_jumps_to(glimpses);
     forget_what_is_faint_beside_gaps(glimpses);
-    const Background lit = background_.lit_by(find_lamp(background_, *finder_, glimpses));
+    if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
+    const Background lit = background_.lit_by(path.lamp);
     look_at_shadows(lit, *finder_, glimpses);
     const auto doubts = decide_attitudes(lit, *finder_, glimpses);
     mend_from_neighbours(lit, *finder_, glimpses);
