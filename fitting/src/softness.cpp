@@ -12,6 +12,8 @@
 namespace trochoid::fitting {
 namespace {
 
+constexpr const char* kCoulomb = "Coulomb's law, ";
+
 std::optional<data::Fit> fit_named(std::span<const data::Track> tracks, const data::Scene& scene,
                                    FitOptions options, const std::string& law) {
   if (options.progress)
@@ -57,7 +59,7 @@ std::optional<data::Fit> fit_sharply(std::span<const data::Track> tracks, const 
                                      const data::Scene& scene, const data::Fit& gentle) {
   FitOptions own = going_on_from(gentle, options);
   own.start.erase(kSlipScale);
-  return fit_named(tracks, scene, std::move(own), "Coulomb's law, ");
+  return fit_named(tracks, scene, std::move(own), kCoulomb);
 }
 
 // Whether so many standard deviations of eps are beyond what a parabola may hide of Coulomb's law.
@@ -77,20 +79,29 @@ bool softness_is_open(const Rung& rung) {
 }
 
 void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  FitOptions exact = options;
+  exact.start.erase(kSlipScale);
   data::Scene soft = rung.scene;
   auto gentle = fit_gently(tracks, options, soft);
-  if (!gentle) {
-    FitOptions own = options;
-    own.start.erase(kSlipScale);
-    rung.fit = fit_one_of_several(tracks, rung.scene, own);
+  std::optional<data::Fit> sharp;
+  if (gentle && gentle->converged) {
+    if (!shows_without_asking(*gentle)) sharp = fit_sharply(tracks, options, rung.scene, *gentle);
+  } else if (options.strategy == "auto") {
+    // The gentle law is dear to follow; the exact one may get where the search for it ran out.
+    sharp = fit_named(tracks, rung.scene, exact, kCoulomb);
+    if (sharp && sharp->converged) {
+      soft = rung.scene;
+      gentle = fit_gently(tracks, going_on_from(*sharp, exact), soft);
+    }
+  }
+  if (sharp && (!gentle || sharp->bic < gentle->bic + kStrong)) {
+    rung.fit = std::move(*sharp);
     return;
   }
-  if (gentle->converged && !shows_without_asking(*gentle))
-    if (auto sharp = fit_sharply(tracks, options, rung.scene, *gentle);
-        sharp && sharp->bic < gentle->bic + kStrong) {
-      rung.fit = std::move(*sharp);
-      return;
-    }
+  if (!gentle) {
+    rung.fit = fit_one_of_several(tracks, rung.scene, exact);
+    return;
+  }
   rung.fit = std::move(*gentle);
   rung.scene = std::move(soft);
 }

@@ -12,7 +12,8 @@ namespace trochoid::fitting {
 /// speed, mu u/sqrt(u^2 + eps^2). The gentle law is fitted first, with eps a parameter like any
 /// other, which the rung's scene then names as free: where friction does rise, Coulomb's law alone
 /// finds no way. Coulomb's law, fitted from there, is kept where eps does not show by strong
-/// evidence.
+/// evidence. Where the gentle law's search leads nowhere Coulomb's law is searched, and the gentle
+/// one gone on to from there.
 /// @param options  start and strategy of the search; a given eps is gone on from.
 void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 

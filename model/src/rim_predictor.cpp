@@ -303,6 +303,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   // below what the tolerance resolves would cost ten times the steps.
   constexpr double kFinest = 1e-7;
   call.options.stick_factor = std::max(1.0, request.tolerance / kFinest);
+  call.options.skips_onset = true;
 
   Prediction out = unknown_prediction(request);
   if (request.want_end_state) out.end_state_jacobian.resize(initial_count(), out.jacobian.cols());

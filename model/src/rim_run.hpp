@@ -22,6 +22,9 @@ struct RimRunOptions {
   unsigned components = ~0u;   ///< state components the sink reads
   int max_steps = 2000000;
   double stick_factor = 1.0;  ///< scales the threshold of sticking, to see its influence
+  /// A slip begins with what it comes to a little later, by a series (S21): a fraction of the
+  /// steps, and a force a per cent beyond friction's in between.
+  bool skips_onset = false;
 };
 
 /// How a run went; `y` is the state at `end_s`, of `regime` (rolling: the last two are 0). Where
@@ -178,11 +181,11 @@ class RimRun {
   }
 
   template <class Stepper, class Sink>
-  auto phase(Stepper& stepper, Sink& sink, const EventRule* rules) {
+  auto phase(Stepper& stepper, Sink& sink, const EventRule* rules, double until_s) {
     const int offset = next_;
     const auto rest = t_s_.subspan(static_cast<std::size_t>(offset));
     auto result = integrate(
-        stepper, options_.end_s, rest.data(), static_cast<int>(rest.size()),
+        stepper, until_s, rest.data(), static_cast<int>(rest.size()),
         [&](auto& s, int first, int last) {
           sink(s, offset + first, offset + last);
           next_ = offset + last;
@@ -219,12 +222,22 @@ class RimRun {
     if (!starts_inside(roll_, y)) return;
     DormandPrince<Roll> stepper(roll_, control<8>(roll_.body));
     stepper.start(end_.end_s, y);
-    const auto result = phase(stepper, sink, kRules);
+    const auto result = phase(stepper, sink, kRules, options_.end_s);
     end_.y = with_slip(result.y, S(0.0), S(0.0));
     if (result.end != RunEnd::event) return stopped(result);
+    const S delay = delay_of(result);
+    if (result.event != Roll::slip) return end_rolling(result, delay);
+    note("slip");
+    if constexpr (kCoulomb) start_slip(result.y, delay, sink);
+  }
+  template <class Result>
+  [[nodiscard]] S delay_of(const Result& result) const {
     State<S, Roll::kEvents> g;
     roll_.events(result.t_s, result.y, g);
-    const S delay = event_delay(g[result.event], result.event_rate);
+    return event_delay(g[result.event], result.event_rate);
+  }
+  template <class Result>
+  void end_rolling(const Result& result, const S& delay) {
     switch (result.event) {
       case Roll::flat:
         note("flat");
@@ -235,9 +248,6 @@ class RimRun {
         return finish(Outcome::lift_off);
       case Roll::rim:
         return rolling_rim_switch(result.y, delay);
-      case Roll::slip:
-        note("slip");
-        if constexpr (kCoulomb) start_slip(result.y, delay);
     }
   }
 
@@ -251,7 +261,7 @@ class RimRun {
     limits.control_derivatives = exact();
     DormandPrince<Slide> stepper(slide_, limits);
     stepper.start(end_.end_s, end_.y);
-    const auto result = phase(stepper, sink, kRules);
+    const auto result = phase(stepper, sink, kRules, options_.end_s);
     end_.y = result.y;
     if (result.end != RunEnd::event) return stopped(result);
     State<S, Slide::kEvents> g;
@@ -290,12 +300,150 @@ class RimRun {
   }
 
   /// Slip begins against the friction that rolling would need, so the force does not jump (S14).
-  void start_slip(const State<S, 8>& y, const S& delay) {
+  template <class Sink>
+  void start_slip(const State<S, 8>& y, const S& delay, Sink& sink) {
     if (chattering(end_.end_s)) return finish(Outcome::tolerance_not_reachable);
+    if (options_.skips_onset) {
+      const Onset onset = onset_of(moved_to_event(roll_, end_.end_s, y, delay));
+      if (onset.lasts_s > 0.0) return skip_onset(y, onset, delay, sink);
+    }
     end_.y = across_event(roll_, slide_, end_.end_s, y, delay,
                           [&](const State<S, 8>& at) { return slipping(at); });
     end_.regime = Regime::sliding;
   }
+
+  /// How a slip sets in: the rates of a body that slips differ from those of one that rolls on by
+  /// by_time t + by_angle (angle of the friction), and that angle is turning t (S21).
+  struct Onset {
+    Horizontal<S> force;  ///< direction of the friction where it begins
+    State<S, 10> by_time, by_angle;
+    S turning, slip;  ///< [rad/s]; second derivative of the slip's size [m/s^3]
+    S aside;          ///< of by_angle, across the force
+    double lasts_s =
+        0.0;  ///< how long the series holds to the threshold of sticking; 0: not at all
+  };
+
+  /// Rates of a body that slips less those of one that rolls on.
+  [[nodiscard]] State<S, 10> set_free(const State<S, 8>& y, const State<S, 10>& slipping) const {
+    State<S, 8> rolls;
+    State<S, 10> slides;
+    roll_.derivative(end_.end_s, y, rolls);
+    slide_.derivative(end_.end_s, slipping, slides);
+    for (int i = 0; i < 8; ++i) slides[i] -= rolls[i];
+    return slides;
+  }
+  /// The same of one whose friction along `force` has only just begun not to hold it.
+  [[nodiscard]] State<S, 10> set_free(const State<S, 8>& y, const Horizontal<S>& force) const {
+    const double size = -slide_.stick_speed_m_s;  // only its direction counts
+    return set_free(y, with_slip<S>(y, force.along_n * size, force.along_mh * size));
+  }
+
+  template <int N>
+  [[nodiscard]] static State<S, N> moved(State<S, N> y, const State<S, N>& slope, const S& by) {
+    for (int i = 0; i < N; ++i) y[i] += slope[i] * by;
+    return y;
+  }
+  [[nodiscard]] static State<S, 10> slope_between(const State<S, 10>& a, const State<S, 10>& b,
+                                                  double apart) {
+    State<S, 10> slope;
+    for (int i = 0; i < 10; ++i) slope[i] = (b[i] - a[i]) * (1.0 / apart);
+    return slope;
+  }
+  [[nodiscard]] static Horizontal<S> turned_by(const Horizontal<S>& a, const S& angle) {
+    const S c = cos(angle), s = sin(angle);
+    return {a.along_n * c - a.along_mh * s, a.along_n * s + a.along_mh * c};
+  }
+  /// Of a slip's rates, that across the force.
+  [[nodiscard]] static S across(const Horizontal<S>& force, const State<S, 10>& rates) {
+    return force.along_n * rates[Rim::ut] - force.along_mh * rates[Rim::un];
+  }
+
+  /// @param y  where rolling ends.
+  [[nodiscard]] Onset onset_of(const State<S, 8>& y) const {
+    const double short_s = 1e-3 * std::sqrt(roll_.body.R / roll_.body.g);
+    constexpr double kSmall_rad = 1e-3;
+    const auto q = roll_.motion(y);
+    const auto needed = roll_.contact_force(q, roll_.acceleration(q));
+    const S size = sqrt(needed.along_n * needed.along_n + needed.along_mh * needed.along_mh);
+    Onset onset;
+    onset.force = {needed.along_n / size, needed.along_mh / size};
+    State<S, 8> slope;
+    roll_.derivative(end_.end_s, y, slope);
+    onset.by_time =
+        slope_between(set_free(moved<8>(y, slope, S(-short_s)), onset.force),
+                      set_free(moved<8>(y, slope, S(short_s)), onset.force), 2.0 * short_s);
+    onset.by_angle =
+        slope_between(set_free(y, turned_by(onset.force, S(-kSmall_rad))),
+                      set_free(y, turned_by(onset.force, S(kSmall_rad))), 2.0 * kSmall_rad);
+    // The slip grows against the friction, so that nothing is left across it.
+    onset.aside = across(onset.force, onset.by_angle);
+    onset.turning = -across(onset.force, onset.by_time) / onset.aside;
+    const auto along = [&](const State<S, 10>& rates) {
+      return onset.force.along_n * rates[Rim::un] + onset.force.along_mh * rates[Rim::ut];
+    };
+    onset.slip = -along(onset.by_time) - onset.turning * along(onset.by_angle);
+    onset.lasts_s = lasting_s(onset, y, slope);
+    return onset;
+  }
+
+  /// As long as the series, which errs by the square of its share of a turn, does so by no more
+  /// than the threshold of sticking, and its second order remains a correction: short slips soon
+  /// end.
+  [[nodiscard]] double lasting_s(const Onset& onset, const State<S, 8>& y,
+                                 const State<S, 8>& slope) const {
+    const double slip = value_of(onset.slip), stick = slide_.stick_speed_m_s;
+    if (!(slip > 0.0)) return 0.0;
+    const double turning = std::sqrt(roll_.body.g / roll_.body.R) +
+                           std::abs(value_of(onset.turning)) + std::abs(value_of(slope[Rim::phi])) +
+                           std::abs(value_of(y[Rim::w1])) + std::abs(value_of(y[Rim::w3]));
+    constexpr double kAbove = 4.0, kCorrection = 0.2;
+    for (double lasts_s = std::pow(0.5 * stick / (slip * turning * turning), 0.25);
+         0.5 * slip * lasts_s * lasts_s > kAbove * stick; lasts_s *= 0.5) {
+      if (end_.end_s + lasts_s >= options_.end_s) continue;
+      State<S, 8> halfway;
+      roll_.derivative(end_.end_s, moved<8>(y, slope, S(0.5 * lasts_s)), halfway);
+      const double grown =
+          slip_of(slipping_since(moved<8>(y, halfway, S(lasts_s)), onset, S(lasts_s)));
+      if (std::abs(grown / (0.5 * slip * lasts_s * lasts_s) - 1.0) < kCorrection) return lasts_s;
+    }
+    return 0.0;
+  }
+
+  /// Rolls on, whatever that asks of the floor, while the slip sets in, and adds what that has
+  /// made. The instant at which it began has derivatives, that at which it is there has none.
+  template <class Sink>
+  void skip_onset(const State<S, 8>& y, const Onset& onset, const S& delay, Sink& sink) {
+    static constexpr EventRule kRules[] = {{-1}, {-1}, {-1}, {-1}};
+    Roll held = roll_;
+    held.friction = S(0.0);
+    DormandPrince<Roll> stepper(held, control<8>(roll_.body));
+    stepper.start(end_.end_s, y);
+    const auto result = phase(stepper, sink, kRules, end_.end_s + onset.lasts_s);
+    end_.y = with_slip(result.y, S(0.0), S(0.0));
+    if (result.end == RunEnd::event) return end_rolling(result, delay_of(result));
+    if (result.end != RunEnd::reached_end) return stopped(result);
+    end_.y = slipping_since(result.y, onset, onset.lasts_s - delay);
+    end_.regime = Regime::sliding;
+  }
+
+  /// State of a body that began to slip so long ago, from that of one that has rolled on.
+  [[nodiscard]] State<S, 10> slipping_since(const State<S, 8>& y, const Onset& onset,
+                                            const S& since) const {
+    const State<S, 10> first = moved<10>(onset.by_time, onset.by_angle, onset.turning);
+    const S half_square = 0.5 * since * since, slip = onset.slip * half_square;
+    const Horizontal<S> force = turned_by(onset.force, onset.turning * since);
+    State<S, 10> guess = moved<10>(with_slip(y, S(0.0), S(0.0)), first, half_square);
+    guess[Rim::un] = -slip * force.along_n;
+    guess[Rim::ut] = -slip * force.along_mh;
+    // At the next order the friction's angle is what lets the slip turn as fast as it does.
+    State<S, 10> now = set_free(y, guess);
+    const S aside = -across(force, now) - slip * onset.turning;
+    now = moved<10>(now, onset.by_angle, aside / onset.aside);
+    State<S, 10> grown = with_slip(y, S(0.0), S(0.0));
+    grown = moved<10>(grown, first, half_square * (1.0 / 3.0));
+    return moved<10>(grown, now, since * (1.0 / 3.0));
+  }
+
   [[nodiscard]] State<S, 10> slipping(const State<S, 8>& y) const {
     const auto q = roll_.motion(y);
     const auto force = roll_.contact_force(q, roll_.acceleration(q));

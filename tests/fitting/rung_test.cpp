@@ -338,5 +338,21 @@ TEST_F(Promised, IsUntoldWhereTheTrackIsTooShortForIt) {
   EXPECT_FALSE(promised(few, known, {}, rung_with({"air", "pivoting"}), {}));
 }
 
+// A disc of tests/independent that spins in place while it slides. The friction that sets in gently
+// is dear to follow: the search for it had run out before it came near the path.
+TEST(SlidingRung, FindsABodyThatSpinsInPlaceWhileItSlides) {
+  const std::string folder = TROCHOID_SOURCE_DIR "/tests/independent/cases/spins_while_it_slides";
+  const auto tracks = data::read_track(folder + "/track.csv").tracks;
+  constexpr double kOrder_N_m_s = 2e-6, kOrder_m = 7e-5;  // seconds to a minute to a standstill
+  Rung rung;
+  rung.scene = data::read_scene(folder + "/scene.toml");
+  rung.scene.model.name = "sliding";
+  rung.scene.model.friction = 0.3;
+  rung.scene.model.air_linear_N_m_s = Eigen::Vector3d::Constant(kOrder_N_m_s);
+  rung.scene.model.rolling_friction_m = rung.scene.model.pivoting_friction_m = kOrder_m;
+  fit_rung(tracks, nullptr, nullptr, {}, rung);
+  EXPECT_TRUE(rung.fit.converged) << rung.fit.reason;
+}
+
 }  // namespace
 }  // namespace trochoid::fitting
