@@ -94,7 +94,9 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
       gentle = fit_gently(tracks, going_on_from(*sharp, exact), soft);
     }
   }
-  if (sharp && (!gentle || sharp->bic < gentle->bic + kStrong)) {
+  if (sharp &&
+      (!gentle || (sharp->converged == gentle->converged ? sharp->bic < gentle->bic + kStrong
+                                                         : sharp->converged))) {
     rung.fit = std::move(*sharp);
     return;
   }

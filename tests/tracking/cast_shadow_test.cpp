@@ -4,6 +4,7 @@
 
 #include "drawn_shadow.hpp"
 #include "transfer_curve.hpp"
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -82,6 +83,47 @@ TEST(CastShadow, AShadowThatIsThereAgreesAndOneThatIsNotDoesNot) {
   };
   EXPECT_GT(agrees(drawn_with_shadow(pose, kAside)), 0.9);
   EXPECT_LT(agrees(drawn_floor()), -1.9);
+}
+
+// What the body itself covers is no floor, at whatever tilt and however thick it is.
+TEST(CastShadow, ADarkBodyIsNotTakenForAShadow) {
+  for (const double theta : {0.3, 1.0, 1.3, 1.57})
+    for (const double thickness_m : {0.002, 0.01, 0.02}) {
+      data::Body body = drawn_body();
+      body.thickness_m = thickness_m;
+      const data::Pose<> pose = standing(theta, 0.8);
+      const cv::Mat picture = drawn_cylinder(pose, thickness_m);
+      const FloorDarkening floor(picture, drawn_floor(), body, pose, drawn_camera());
+      for (const Eigen::Vector2d& aside : lamp_places())
+        EXPECT_EQ(floor.shadow_of(aside).explained, 0.0) << theta << " " << thickness_m;
+    }
+}
+
+TEST(CastShadow, AFloorThatIsEvenlyDarkerShowsNoShadow) {
+  const data::Pose<> pose = standing(kTilt, 0.8);
+  cv::Mat picture = drawn_floor();
+  picture -= 7.0;
+  EXPECT_EQ(explained(picture, pose, kAside), 0.0);
+}
+
+// A lens model that turns back on itself far from its middle has no rays there.
+TEST(CastShadow, WhatNoRayLeadsToIsLeftOut) {
+  data::Camera camera = data::Camera::overhead(240, 240, 1000.0, 0.5);
+  camera.distortion[0] = -6.0;
+  ASSERT_THROW((void)camera.ray_from_image({2.0, 2.0}), NumericalError);
+  const data::Pose<> pose = standing(kTilt, 0.8);
+  data::Body large = drawn_body();
+  large.radius_m = 0.05;
+  EXPECT_NO_THROW(FloorDarkening(drawn_floor(), drawn_floor(), large, pose, camera));
+}
+
+TEST(CastShadow, LevelsOfALinearCameraAreLight) {
+  const data::Pose<> pose = standing(kTilt, 0.8);
+  data::Camera camera = drawn_camera();
+  camera.transfer = data::Transfer::linear;
+  const FloorDarkening floor(drawn_with_shadow(pose, kAside), drawn_floor(), drawn_body(), pose,
+                             camera);
+  EXPECT_NEAR(floor.shadow_of(kAside).part, 1.0 - kInShadow / kFloor, 0.03);
 }
 
 // Lying flat, it hides its own.

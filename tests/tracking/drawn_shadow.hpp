@@ -71,4 +71,20 @@ inline cv::Mat drawn_floor() {
   return {cv::Size(240, 240), CV_8U, cv::Scalar(kFloor)};
 }
 
+/// A plain floor with a body of that thickness on it, seen from straight above, that throws no
+/// shadow.
+inline cv::Mat drawn_cylinder(const data::Pose<>& pose, double thickness_m) {
+  std::vector<cv::Point> rims, hull;
+  for (const double off_m : {-0.5 * thickness_m, 0.5 * thickness_m}) {
+    data::Pose<> face = pose;
+    face.centre_m += off_m * axis_of(pose);
+    for (const cv::Point& p : outline_on_floor(face, drawn_body().radius_m, {0.0, 0.0}))
+      rims.push_back(p);
+  }
+  cv::convexHull(rims, hull);
+  cv::Mat picture = drawn_floor();
+  cv::fillConvexPoly(picture, hull, kFace);
+  return picture;
+}
+
 }  // namespace trochoid::tracking

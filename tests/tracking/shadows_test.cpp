@@ -10,7 +10,7 @@
 namespace trochoid::tracking {
 namespace {
 
-const Eigen::Vector2d kAside = all_round()[30];
+const Eigen::Vector2d kAside = lamp_places()[30];
 
 /// Edges that do not tell, over a floor that may.
 class OverAFloor final : public Oracle {

@@ -25,7 +25,7 @@ struct Sighting {
   bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
   /// How far off each of BodyFinder::other_readings is; no covariance holds that.
   std::array<PoseSpread, 2> other_readings{};
-  /// How well its shadow agrees with how dark the floor is around it; 0 without a lamp.
+  /// FloorDarkening::agrees of its shadow: 0 where that is hidden or no lamp is known.
   double shadow = 0.0;
   Evidence evidence{};
   std::vector<EdgePoint> edges;

@@ -1,17 +1,21 @@
 #include "cast_shadow.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "transfer_curve.hpp"
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {
 
-const std::vector<Eigen::Vector2d>& all_round() {
+const std::vector<Eigen::Vector2d>& lamp_places() {
   static const std::vector<Eigen::Vector2d> all = [] {
     constexpr int kDirections = 24;
     std::vector<Eigen::Vector2d> lamps;
@@ -29,48 +33,96 @@ FloorDarkening::FloorDarkening(const cv::Mat& luma, const cv::Mat& plate, const 
                                const data::Pose<>& pose, const data::Camera& camera)
     : radius_m_(body.radius_m),
       bore_m_(body.inner_radius_m),
-      axis_(data::symmetry_axis(pose.theta_rad, pose.phi_rad)),
-      middles_m_{pose.centre_m, pose.centre_m + body.half_thickness_m() * axis_,
-                 pose.centre_m - body.half_thickness_m() * axis_} {
+      half_thickness_m_(body.half_thickness_m()),
+      centre_m_(pose.centre_m),
+      axis_(data::symmetry_axis(pose.theta_rad, pose.phi_rad)) {
   look_around(luma, plate, camera);
+}
+
+namespace {
+
+const std::array<double, 256>& light_of_levels() {
+  static const std::array<double, 256> table = [] {
+    std::array<double, 256> light{};
+    for (std::size_t i = 0; i < light.size(); ++i) light[i] = light_of(static_cast<double>(i));
+    return light;
+  }();
+  return table;
+}
+
+// Mean level of a pixel and its eight neighbours.
+std::size_t level_at(const cv::Mat& levels, int x, int y) {
+  int sum = 4;  // rounds
+  for (int k = y - 1; k <= y + 1; ++k) {
+    const unsigned char* row = levels.ptr(k) + x;
+    sum += row[-1] + row[0] + row[1];
+  }
+  return static_cast<std::size_t>(sum / 9);
+}
+
+// The floor that a pixel shows; nothing where it shows none, or no ray leads to it.
+std::optional<Eigen::Vector3d> floor_at(const data::Camera& camera, int x, int y) {
+  try {
+    return camera.table_from_image(Eigen::Vector2d(x, y));
+  } catch (const NumericalError&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+// Pixels of a box that the body covers, or nearly: blur, and light that codecs spread. The outline
+// of a cylinder is the convex hull of its rims.
+cv::Mat FloorDarkening::covered(const data::Camera& camera, const cv::Rect& box) const {
+  constexpr int kRimPoints = 48, kBlur_px = 4;
+  const Eigen::Vector3d level = axis_.unitOrthogonal(), steep = axis_.cross(level);
+  std::vector<cv::Point> rims, hull;
+  for (int i = 0; i < kRimPoints; ++i) {
+    const double angle_rad = 2.0 * std::numbers::pi * i / kRimPoints;
+    const Eigen::Vector3d at_m =
+        centre_m_ + radius_m_ * (std::cos(angle_rad) * level + std::sin(angle_rad) * steep);
+    for (const double along_m : {-half_thickness_m_, half_thickness_m_}) {
+      const Eigen::Vector2d px = camera.image_from_table<double>(at_m + along_m * axis_);
+      rims.emplace_back(static_cast<int>(std::lround(px.x())) - box.x,
+                        static_cast<int>(std::lround(px.y())) - box.y);
+    }
+  }
+  cv::convexHull(rims, hull);
+  cv::Mat mask = cv::Mat::zeros(box.size(), CV_8U);
+  cv::fillConvexPoly(mask, hull, 255);
+  cv::polylines(mask, hull, true, 255, 2 * kBlur_px + 1);
+  return mask;
 }
 
 void FloorDarkening::look_around(const cv::Mat& luma, const cv::Mat& plate,
                                  const data::Camera& camera) {
   constexpr double kReach_radii = 2.2, kSteps = 10.0;
-  constexpr double kBlur_px = 4.0;     // of the outline, and light that codecs spread
   constexpr double kBrightest = -0.5;  // a reflection on the floor is none of it
   constexpr double kLeastLight = 0.5;  // of 255: a black floor shows no shadow
-  const Eigen::Vector2d centre_px = camera.image_from_table<double>(middles_m_[0]);
-  const Eigen::Matrix2d J = camera.jacobian_px_per_m(middles_m_[0]).leftCols<2>();
-  const double px_per_m = std::sqrt(std::abs(J.determinant()));
-  const double radius_px = px_per_m * radius_m_;
-  const int step_px = std::max(2, static_cast<int>(radius_px / kSteps));
+  const Eigen::Vector2d centre_px = camera.image_from_table<double>(centre_m_);
+  const Eigen::Matrix2d J = camera.jacobian_px_per_m(centre_m_).leftCols<2>();
+  const double radius_px = radius_m_ * std::sqrt(std::abs(J.determinant()));
+  const int step_px = std::max(2, static_cast<int>(std::lround(radius_px / kSteps)));
   const int reach_px = static_cast<int>(kReach_radii * radius_px);
-  const cv::Rect box =
-      cv::Rect(static_cast<int>(centre_px.x()) - reach_px,
-               static_cast<int>(centre_px.y()) - reach_px, 2 * reach_px + 1, 2 * reach_px + 1) &
-      cv::Rect({}, luma.size());
+  const cv::Rect inside(1, 1, luma.cols - 2, luma.rows - 2);
+  const cv::Rect box = inside & cv::Rect(static_cast<int>(centre_px.x()) - reach_px,
+                                         static_cast<int>(centre_px.y()) - reach_px,
+                                         2 * reach_px + 1, 2 * reach_px + 1);
   if (box.empty()) return;
-  cv::Mat here, without;
-  cv::blur(luma(box), here, {3, 3});
-  cv::blur(plate(box), without, {3, 3});
+  const cv::Mat body = covered(camera, box);
   const bool linear = camera.transfer == data::Transfer::linear;
   const auto light = [&](const cv::Mat& levels, int x, int y) {
-    const double level = levels.ptr(y)[x];
-    return linear ? level : light_of(level);
+    const std::size_t level = level_at(levels, x, y);
+    return linear ? static_cast<double>(level) : light_of_levels()[level];
   };
-  for (int y = 0; y < box.height; y += step_px)
-    for (int x = 0; x < box.width; x += step_px) {
-      const double floor = light(without, x, y);
-      if (floor < kLeastLight) continue;
-      const data::Ray ray = camera.ray_from_image({box.x + x, box.y + y});
-      if (!(ray.direction.z() < 0.0)) continue;
-      const Eigen::Vector3d at_m =
-          ray.origin_m - ray.origin_m.z() / ray.direction.z() * ray.direction;
-      if (meets(at_m, -ray.direction, 0.0, radius_m_ + kBlur_px / px_per_m)) continue;
-      at_m_.push_back(at_m);
-      darker_.push_back(std::max(kBrightest, 1.0 - light(here, x, y) / floor));
+  for (int y = box.y; y < box.y + box.height; y += step_px)
+    for (int x = box.x; x < box.x + box.width; x += step_px) {
+      const double floor = light(plate, x, y);
+      if (floor < kLeastLight || body.at<unsigned char>(y - box.y, x - box.x) != 0) continue;
+      const auto at_m = floor_at(camera, x, y);
+      if (!at_m) continue;
+      at_m_.push_back(*at_m);
+      darker_.push_back(std::max(kBrightest, 1.0 - light(luma, x, y) / floor));
     }
   if (darker_.empty()) return;
   const double mean =
@@ -81,16 +133,17 @@ void FloorDarkening::look_around(const cv::Mat& luma, const cv::Mat& plate,
   }
 }
 
-bool FloorDarkening::meets(const Eigen::Vector3d& from_m, const Eigen::Vector3d& towards,
-                           double inner_m, double outer_m) const {
-  const double across = axis_.dot(towards);
-  return std::any_of(middles_m_.begin(), middles_m_.end(), [&](const Eigen::Vector3d& middle_m) {
-    const Eigen::Vector3d to_middle = middle_m - from_m;
-    const double along = axis_.dot(to_middle) / across;
-    if (!(along > 0.0)) return false;
-    const double off2 = (along * towards - to_middle).squaredNorm();
-    return off2 >= inner_m * inner_m && off2 <= outer_m * outer_m;
-  });
+bool FloorDarkening::stands_between(const Eigen::Vector3d& from_m,
+                                    const Eigen::Vector3d& towards) const {
+  const Eigen::Vector3d to_centre = centre_m_ - from_m;
+  const double height = axis_.dot(to_centre), per_height = 1.0 / axis_.dot(towards);
+  for (const double off_m : {0.0, half_thickness_m_, -half_thickness_m_}) {
+    const double along = (height + off_m) * per_height;
+    if (!(along > 0.0)) continue;
+    const double off2 = (along * towards - to_centre - off_m * axis_).squaredNorm();
+    if (off2 >= bore_m_ * bore_m_ && off2 <= radius_m_ * radius_m_) return true;
+  }
+  return false;
 }
 
 bool FloorDarkening::Sums::tell() const {
@@ -102,7 +155,7 @@ FloorDarkening::Sums FloorDarkening::sums_under(const Eigen::Vector2d& lamp_asid
   const Eigen::Vector3d towards(lamp_aside.x(), lamp_aside.y(), 1.0);
   Sums sums;
   for (std::size_t i = 0; i < at_m_.size(); ++i)
-    if (meets(at_m_[i], towards, bore_m_, radius_m_)) sums.within += 1.0, sums.darker += darker_[i];
+    if (stands_between(at_m_[i], towards)) sums.within += 1.0, sums.darker += darker_[i];
   sums.without = static_cast<double>(at_m_.size()) - sums.within;
   return sums;
 }
@@ -110,8 +163,9 @@ FloorDarkening::Sums FloorDarkening::sums_under(const Eigen::Vector2d& lamp_asid
 FloorDarkening::Shadow FloorDarkening::shadow_of(const Eigen::Vector2d& lamp_aside) const {
   const Sums sums = sums_under(lamp_aside);
   if (!sums.tell() || sums.darker <= 0.0) return {};
+  constexpr double kLeastPart = 0.02;  // less is no shadow but how the picture was coded
   const double part = sums.darker / sums.square();
-  return {part, part * sums.darker / square_};
+  return part > kLeastPart ? Shadow{part, part * sums.darker / square_} : Shadow{};
 }
 
 double FloorDarkening::agrees(const Lamp& lamp) const {

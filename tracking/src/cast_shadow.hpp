@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -10,19 +9,20 @@
 
 namespace trochoid::tracking {
 
-/// What lights a place on the table.
+/// What lights a place on the table, from the direction (aside, 1).
 struct Lamp {
-  Eigen::Vector2d aside;  ///< how far to the side it stands, over how far above
-  double part = 0.0;      ///< of the light there that it gives
+  Eigen::Vector2d aside;  ///< how far to the side it stands, over how far above, along x and y
+  double part = 0.0;      ///< of the light there that it gives, 0..1
 };
 
-/// All round, high and low: where a lamp may stand aside.
-[[nodiscard]] const std::vector<Eigen::Vector2d>& all_round();
+/// Lamp::aside of all places at which a lamp is sought: all round, high and low.
+[[nodiscard]] const std::vector<Eigen::Vector2d>& lamp_places();
 
 /// How much darker a floor is around a body than without it. Attitudes that look alike throw
 /// different shadows: which side of a body is raised shows there.
 class FloorDarkening {
  public:
+  /// Some thousand points of the floor, as far as they are in the picture and beside the body.
   /// @param luma, plate CV_8UC1: the picture, and the scene without the body at its brightness.
   FloorDarkening(const cv::Mat& luma, const cv::Mat& plate, const data::Body& body,
                  const data::Pose<>& pose, const data::Camera& camera);
@@ -48,13 +48,13 @@ class FloorDarkening {
   };
   [[nodiscard]] Sums sums_under(const Eigen::Vector2d& lamp_aside) const;
   void look_around(const cv::Mat& luma, const cv::Mat& plate, const data::Camera& camera);
+  [[nodiscard]] cv::Mat covered(const data::Camera& camera, const cv::Rect& box) const;
+  /// Whether a face of the body or the middle between them stands in the way of a ray.
+  [[nodiscard]] bool stands_between(const Eigen::Vector3d& from_m,
+                                    const Eigen::Vector3d& towards) const;
 
-  /// The body stands in the way of a ray that meets its faces or the middle between them.
-  [[nodiscard]] bool meets(const Eigen::Vector3d& from_m, const Eigen::Vector3d& towards,
-                           double inner_m, double outer_m) const;
-  double radius_m_, bore_m_;
-  Eigen::Vector3d axis_;
-  std::array<Eigen::Vector3d, 3> middles_m_;
+  double radius_m_, bore_m_, half_thickness_m_;
+  Eigen::Vector3d centre_m_, axis_;
   std::vector<Eigen::Vector3d> at_m_;  ///< points of the floor
   std::vector<double> darker_;         ///< there, as a share of the light, beyond its mean
   double square_ = 0.0;                ///< sum of squares of these

@@ -56,6 +56,8 @@ double speaks_more(const Sighting& one, const Sighting& other) {
          shadow_speaks_more(one, other);
 }
 
+constexpr double kAround_radii = 2.5;  // as far as shadows are looked for, and more
+
 bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii) {
   const double half_px = reach_radii * seen.rim.semi_major_px() + 24.0;
   const cv::Rect box = cv::Rect(static_cast<int>(seen.centre_px.x() - half_px),
@@ -69,7 +71,7 @@ bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double r
 
 std::optional<FloorDarkening> Measuring::floor_around(const Frame& frame, const Sighting& seen,
                                                       const data::Pose<>& pose) {
-  if (!prepare_plate(frame, seen, 2.5)) return std::nullopt;
+  if (!prepare_plate(frame, seen, kAround_radii)) return std::nullopt;
   return finder_.floor_around(frame, plate_, pose);
 }
 
@@ -83,7 +85,7 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
                                               const std::optional<data::Pose<>>& near,
                                               const ShadingMemory* shading) {
   finder_.place(guess);
-  if (!prepare_plate(frame, guess, 1.6)) return std::nullopt;
+  if (!prepare_plate(frame, guess, background_.lamp() ? kAround_radii : 1.6)) return std::nullopt;
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.shading = shading;
@@ -95,7 +97,10 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
     look.motion_px = guess.centre_px - last.centre_px;
   }
   auto seen = finder_.find(look);
-  if (seen && seen->pose) seen->shadow = shadow(frame, *seen, seen->pose->pose);
+  if (!seen || !seen->pose) return seen;
+  const auto floor =
+      background_.lamp() ? finder_.floor_around(frame, plate_, seen->pose->pose) : std::nullopt;
+  seen->shadow = floor ? floor->agrees(*background_.lamp()) : 0.0;
   return seen;
 }
 

@@ -11,16 +11,14 @@ std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& fi
   constexpr double kLeast = 0.05;  // explained of what is dark around the body
   std::vector<const Glimpse*> seen;
   for (const Glimpse& g : glimpses)
-    if (g.posed()) seen.push_back(&g);
+    if (g.posed() && finder.mirror_image(g.pose())) seen.push_back(&g);
   const std::size_t count = std::min(kLooks, seen.size());
-  const std::vector<Eigen::Vector2d>& places = all_round();
+  const std::vector<Eigen::Vector2d>& places = lamp_places();
   using Shadow = FloorDarkening::Shadow;
   std::vector<std::vector<Shadow>> shadows(count, std::vector<Shadow>(places.size()));
   on_both_cores(background, finder, count, [&](Measuring& measure, std::size_t i) {
     const Glimpse& g = *seen[i * seen.size() / count];
-    std::vector<data::Pose<>> readings{g.pose()};
-    if (const auto image = finder.mirror_image(g.pose())) readings.push_back(*image);
-    for (const data::Pose<>& pose : readings)
+    for (const data::Pose<>& pose : {g.pose(), *finder.mirror_image(g.pose())})
       if (const auto floor = measure.floor_around(*g.frame, *g.seen, pose))
         for (std::size_t k = 0; k < places.size(); ++k)
           if (const Shadow shadow = floor->shadow_of(places[k]);
@@ -42,6 +40,7 @@ std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& fi
 
 void look_at_shadows(const Background& background, const BodyFinder& finder,
                      std::vector<Glimpse>& glimpses) {
+  if (!background.lamp()) return;
   on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
     Glimpse& g = glimpses[i];
     if (g.posed()) g.seen->shadow = measure.shadow(*g.frame, *g.seen, g.pose());

@@ -329,7 +329,9 @@ class Tracking {
     }
     forget_what_the_path_jumps_to(glimpses);
     forget_what_is_faint_beside_gaps(glimpses);
-    if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
+    // Where there are other bodies, what is dark beside one need not be its shadow.
+    if (objects_ == 1)
+      if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
     const Background lit = background_.lit_by(path.lamp);
     look_at_shadows(lit, *finder_, glimpses);
     const auto doubts = decide_attitudes(lit, *finder_, glimpses);
