@@ -14,6 +14,7 @@
 #include "describe.hpp"
 #include "find.hpp"
 #include "first_guess.hpp"
+#include "leaning.hpp"
 #include "observed.hpp"
 #include "prepare.hpp"
 #include "profile.hpp"
@@ -219,6 +220,29 @@ void heed_far_side(const Problem& problem, const Solution& solution, const FitOp
         problem.name(far->index), times));
 }
 
+// What one sample alone tells, which may be wrong by more than its error says, is known no better
+// than as far as it goes without that sample.
+void heed_single_samples(const Problem& problem, const Solution& solution, Uncertainty& error,
+                         data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  if (!explains(problem, solution)) return;
+  const Eigen::VectorXd before = error.covariance.diagonal().cwiseSqrt();
+  for (const Leaning& leaning : leanings(problem, solution, before)) {
+    error.covariance += leaning.shift * leaning.shift.transpose();
+    std::vector<std::string> names;
+    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+      const double sigma = std::sqrt(error.covariance(i, i));
+      if (sigma > kWorthWords * before[i]) names.push_back(problem.name(i));
+      error.identifiable[i] = error.identifiable[i] && sigma < natural_size(problem, i, solution.u);
+    }
+    if (!names.empty())
+      fit.warnings.push_back(
+          fmt::format("{} hang on the sample at t = {:.4g} s alone: their error bars hold "
+                      "what comes out without it",
+                      fmt::join(names, ", "), leaning.t_s));
+  }
+}
+
 // A puck's path is the same for either sense of its spin: unless a prior tells, the spin that fits
 // is as likely the other way round.
 void heed_either_sense(const Problem& problem, Uncertainty& error, data::Fit& fit) {
@@ -346,6 +370,7 @@ data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& 
     return refuse(problem, failure.what(), fit);
   }
   if (bars == Bars::full) heed_far_side(problem, solution, options, error, fit);
+  if (bars == Bars::full) heed_single_samples(problem, solution, error, fit);
   heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
   heed_pivot(problem, scene, fit);
   describe(problem, solution, error, scene, fit);
