@@ -30,14 +30,14 @@ Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
   return svd.matrixU().leftCols(seen);
 }
 
-// The share a sample has in the direction of the parameters it says most of: 1 where it alone does.
-double leverage_of(const ArcData& arc, int sample, const Eigen::MatrixXd& rows) {
+// The share a sample with these readings has in the direction of the parameters it says most of: 1
+// where it alone does.
+double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows) {
   Eigen::MatrixXd own(0, rows.cols());
-  for (const Reading& reading : arc.readings) {
-    if (reading.sample != sample) continue;
-    const int width = width_of(reading);
+  for (const Reading* reading : readings) {
+    const int width = width_of(*reading);
     own.conservativeResize(own.rows() + width, Eigen::NoChange);
-    own.bottomRows(width) = rows.middleRows(reading.row, width);
+    own.bottomRows(width) = rows.middleRows(reading->row, width);
   }
   if (own.rows() == 0) return 0.0;
   const double largest = Eigen::JacobiSVD<Eigen::MatrixXd>(own).singularValues()[0];
@@ -54,8 +54,10 @@ std::vector<Sample> carrying_most(const Problem& problem, const Eigen::VectorXd&
     const ArcData& data = problem.arcs[arc];
     const Eigen::MatrixXd rows = basis.middleRows(row, data.rows);
     row += data.rows;
+    std::vector<std::vector<const Reading*>> of_sample(data.t_s.size());
+    for (const Reading& reading : data.readings) of_sample[reading.sample].push_back(&reading);
     for (int i = 0; i < static_cast<int>(data.t_s.size()); ++i)
-      if (const double share = leverage_of(data, i, rows); share > kMostOfIt)
+      if (const double share = leverage_of(of_sample[i], rows); share > kMostOfIt)
         samples.push_back({arc, i, share});
   }
   std::stable_sort(samples.begin(), samples.end(),
