@@ -228,18 +228,17 @@ class Chain {
   /// they speak for the chosen sequence by no more than that, it is not known, however many.
   void discount() {
     constexpr double kShared = 0.15, kSure = 0.38;
-    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9, shadow = 0.0, tilted = 1e-9;
+    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      const double chosen = std::copysign(1.0, margin_[i]);
-      if (nodes_[i].tilt_rad > kLeastTilt) shadow += chosen * nodes_[i].shadow, tilted += 1.0;
       if (!nodes_[i].weighed) continue;
+      const double chosen = std::copysign(1.0, margin_[i]);
       shows += chosen * nodes_[i].shows;
       wall += nodes_[i].wall();
       speaks += chosen * nodes_[i].speaks;
       could += nodes_[i].could;
     }
-    // By the edges alone or together with the sizes, or by the shadows, whichever is clearer.
-    const double share = std::max({shows / wall, speaks / could, shadow / tilted});
+    // By the edges alone or together with sizes and shadows, whichever is clearer.
+    const double share = std::max(shows / wall, speaks / could);
     const double trust = std::clamp((share - kShared) / (kSure - kShared), 0.0, 1.0);
     for (Node& node : nodes_) node.speaks *= trust;
   }
