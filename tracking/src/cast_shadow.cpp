@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -40,15 +39,6 @@ FloorDarkening::FloorDarkening(const cv::Mat& luma, const cv::Mat& plate, const 
 }
 
 namespace {
-
-const std::array<double, 256>& light_of_levels() {
-  static const std::array<double, 256> table = [] {
-    std::array<double, 256> light{};
-    for (std::size_t i = 0; i < light.size(); ++i) light[i] = light_of(static_cast<double>(i));
-    return light;
-  }();
-  return table;
-}
 
 // Mean level of a pixel and its eight neighbours.
 std::size_t level_at(const cv::Mat& levels, int x, int y) {

@@ -13,15 +13,6 @@ constexpr size_t at(int i) {
   return static_cast<size_t>(i);
 }
 
-const std::array<float, 256>& light_of_luma() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (int i = 0; i < 256; ++i) t[at(i)] = static_cast<float>(light_of(i));
-    return t;
-  }();
-  return table;
-}
-
 }  // namespace
 
 LightWindow::LightWindow(const cv::Mat& luma, const cv::Rect& window, data::Transfer transfer)
@@ -34,12 +25,12 @@ LightWindow::LightWindow(const cv::Mat& luma, const cv::Rect& window, data::Tran
     luma(window_).convertTo(light_, CV_32FC1);
     return;
   }
-  const auto& table = light_of_luma();
+  const auto& table = light_of_levels();
   light_.create(window_.height, window_.width, CV_32FC1);
   for (int y = 0; y < window_.height; ++y) {
     const auto* from = luma.ptr<unsigned char>(window_.y + y) + window_.x;
     auto* to = light_.ptr<float>(y);
-    for (int x = 0; x < window_.width; ++x) to[x] = table[from[x]];
+    for (int x = 0; x < window_.width; ++x) to[x] = static_cast<float>(table[from[x]]);
   }
 }
 

@@ -56,7 +56,8 @@ double speaks_more(const Sighting& one, const Sighting& other) {
          shadow_speaks_more(one, other);
 }
 
-constexpr double kAround_radii = 2.5;  // as far as shadows are looked for, and more
+// From the middle of a body: what its outline needs, and its shadow.
+constexpr double kBeside_radii = 1.6, kAround_radii = 2.5;
 
 bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii) {
   const double half_px = reach_radii * seen.rim.semi_major_px() + 24.0;
@@ -76,8 +77,10 @@ std::optional<FloorDarkening> Measuring::floor_around(const Frame& frame, const 
 }
 
 double Measuring::shadow(const Frame& frame, const Sighting& seen, const data::Pose<>& pose) {
-  if (!background_.lamp()) return 0.0;
-  const auto floor = floor_around(frame, seen, pose);
+  return background_.lamp() ? agreement(floor_around(frame, seen, pose)) : 0.0;
+}
+
+double Measuring::agreement(const std::optional<FloorDarkening>& floor) const {
   return floor ? floor->agrees(*background_.lamp()) : 0.0;
 }
 
@@ -85,7 +88,8 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
                                               const std::optional<data::Pose<>>& near,
                                               const ShadingMemory* shading) {
   finder_.place(guess);
-  if (!prepare_plate(frame, guess, background_.lamp() ? kAround_radii : 1.6)) return std::nullopt;
+  if (!prepare_plate(frame, guess, background_.lamp() ? kAround_radii : kBeside_radii))
+    return std::nullopt;
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.shading = shading;
@@ -98,9 +102,8 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
   }
   auto seen = finder_.find(look);
   if (!seen || !seen->pose) return seen;
-  const auto floor =
-      background_.lamp() ? finder_.floor_around(frame, plate_, seen->pose->pose) : std::nullopt;
-  seen->shadow = floor ? floor->agrees(*background_.lamp()) : 0.0;
+  seen->shadow =
+      background_.lamp() ? agreement(finder_.floor_around(frame, plate_, seen->pose->pose)) : 0.0;
   return seen;
 }
 

@@ -48,6 +48,8 @@ class Measuring {
   /// Brings the background around a sighting to the brightness of the frame; false if that is out
   /// of the picture.
   bool prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii);
+  /// Under the lamp, which is known.
+  [[nodiscard]] double agreement(const std::optional<FloorDarkening>& floor) const;
 
   const Background& background_;
   const BodyFinder& finder_;

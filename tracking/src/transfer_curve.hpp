@@ -1,6 +1,8 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 namespace trochoid::tracking {
 
@@ -11,6 +13,16 @@ namespace trochoid::tracking {
 inline double light_of(double level) {
   const double v = std::clamp(level / 255.0, 0.0, 1.0);
   return 255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+/// The same of the levels 0..255 of a picture.
+inline const std::array<double, 256>& light_of_levels() {
+  static const std::array<double, 256> table = [] {
+    std::array<double, 256> light{};
+    for (std::size_t i = 0; i < light.size(); ++i) light[i] = light_of(static_cast<double>(i));
+    return light;
+  }();
+  return table;
 }
 
 /// The level of light; without light 0.
