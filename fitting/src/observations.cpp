@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "consensus.hpp"
+#include "direction.hpp"
 #include "smoothing.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -290,6 +291,18 @@ double excess_scatter(const ArcData& arc, Channel channel) {
   return std::max(1.0, noise / median(std::move(sigmas)));
 }
 
+bool shows_direction(const ArcData& arc, std::size_t i) {
+  return arc.readings[i].channel == Channel::theta && i + 1 < arc.readings.size() &&
+         arc.readings[i + 1].channel == Channel::phi &&
+         arc.readings[i + 1].sample == arc.readings[i].sample;
+}
+
+Eigen::Vector2d weights_of_direction(const Reading& tilt, const Reading& precession) {
+  const double sine =
+      std::max(std::sin(tilt.value.x()), std::sin(std::min(1.0, 1.0 / tilt.whitener(0, 0))));
+  return {tilt.whitener(0, 0), precession.whitener(0, 0) / sine};
+}
+
 void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,
             Eigen::VectorXd& out, Eigen::MatrixXd* out_jacobian) {
   const int width = static_cast<int>(arc.observables.size());
@@ -298,8 +311,11 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
     column[c] = arc.observable_index(observable_of(static_cast<Channel>(c)));
   out.resize(arc.rows);
   if (out_jacobian != nullptr) out_jacobian->resize(arc.rows, jacobian.cols());
-  for (const Reading& reading : arc.readings) {
-    const int source = reading.sample * width + column[static_cast<int>(reading.channel)];
+  bool other_face = false;  // of the sample at hand
+  for (std::size_t i = 0; i < arc.readings.size(); ++i) {
+    const Reading& reading = arc.readings[i];
+    const int first = reading.sample * width;
+    const int source = first + column[static_cast<int>(reading.channel)];
     if (reading.channel == Channel::position) {
       const Eigen::Matrix2d wt = reading.whitener.transpose();
       out.segment<2>(reading.row) = wt * (values.segment<2>(source) - reading.value);
@@ -307,28 +323,40 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
         out_jacobian->middleRows<2>(reading.row).noalias() = wt * jacobian.middleRows<2>(source);
       continue;
     }
-    double predicted = values[source];
-    double weight = reading.whitener(0, 0);
-    double sign = 1.0;
-    if (arc.folded && column[static_cast<int>(Channel::theta)] >= 0) {
-      // Equal faces: (theta, phi, psi) and (pi - theta, phi + pi, pi - psi) are the same
-      // picture.
-      const double theta =
-          values[reading.sample * width + column[static_cast<int>(Channel::theta)]];
-      const bool other_face = theta > 0.5 * std::numbers::pi;
-      if (other_face && reading.channel == Channel::theta) {
-        predicted = std::numbers::pi - predicted;
-        sign = -1.0;
-      }
-      if (other_face && reading.channel == Channel::phi) predicted += std::numbers::pi;
-      if (other_face && reading.channel == Channel::psi) {  // marks alike on both faces
-        predicted = std::numbers::pi - predicted;
-        sign = -1.0;
-      }
+    if (i == 0 || arc.readings[i - 1].sample != reading.sample ||
+        arc.readings[i - 1].channel == Channel::position) {
+      const int theta = column[static_cast<int>(Channel::theta)];
+      other_face = arc.folded && theta >= 0 && values[first + theta] > 0.5 * std::numbers::pi;
     }
-    out[reading.row] = weight * wrapped(predicted - reading.value.x());
-    if (out_jacobian != nullptr)
-      out_jacobian->row(reading.row) = sign * weight * jacobian.row(source);
+    if (shows_direction(arc, i)) {
+      const Reading& turned = arc.readings[++i];
+      const int phi = first + column[static_cast<int>(Channel::phi)];
+      const Departure off = departure({reading.value.x(), turned.value.x()},
+                                      {values[source], values[phi]}, arc.folded);
+      other_face = off.other_face;
+      const Eigen::Vector2d weight = weights_of_direction(reading, turned);
+      out[reading.row] = weight[0] * off.way[0];
+      out[turned.row] = weight[1] * off.way[1];
+      if (out_jacobian != nullptr) {
+        const Eigen::Matrix2d slope = weight.asDiagonal() * off.slope;
+        for (int k = 0; k < 2; ++k)
+          out_jacobian->row(k == 0 ? reading.row : turned.row) =
+              slope(k, 0) * jacobian.row(source) + slope(k, 1) * jacobian.row(phi);
+      }
+      continue;
+    }
+    double predicted = values[source];
+    double sign = 1.0;
+    // Equal faces: (theta, phi, psi) and (pi - theta, phi + pi, pi - psi) are the same picture,
+    // with marks alike on both.
+    if (other_face) {
+      const bool turns = reading.channel == Channel::phi;
+      predicted = turns ? predicted + std::numbers::pi : std::numbers::pi - predicted;
+      sign = turns ? 1.0 : -1.0;
+    }
+    const double weight = sign * reading.whitener(0, 0);
+    out[reading.row] = reading.whitener(0, 0) * wrapped(predicted - reading.value.x());
+    if (out_jacobian != nullptr) out_jacobian->row(reading.row) = weight * jacobian.row(source);
   }
 }
 

@@ -68,7 +68,17 @@ struct ChannelChoice {
 /// own sigmas say.
 [[nodiscard]] double excess_scatter(const ArcData& arc, Channel channel);
 
-/// Whitened differences prediction - measurement and their derivatives.
+/// Whether a reading and the next one are the tilt and the precession of one sample: together they
+/// are a direction of the axis.
+[[nodiscard]] bool shows_direction(const ArcData& arc, std::size_t reading);
+
+/// One over the errors of such a direction along its meridian and its parallel [1/rad]. Where the
+/// tilt may be nothing the parallel is taken to be no shorter than that of the tilt's error.
+[[nodiscard]] Eigen::Vector2d weights_of_direction(const Reading& tilt, const Reading& precession);
+
+/// Whitened differences prediction - measurement and their derivatives. Tilt and precession of one
+/// sample are compared as the direction they are (direction.hpp): the flatter a body lies, the less
+/// its precession means, and at rest on its face it has none.
 /// @param values as Prediction::values for arc.t_s and arc.observables.
 /// @param jacobian as Prediction::jacobian, or empty; whitened rows are written to `out_jacobian`.
 void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::MatrixXd& jacobian,

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "direction.hpp"
 #include "smoothing.hpp"
 
 namespace trochoid::fitting {
@@ -144,6 +145,24 @@ void apply(const Start& start, Problem& problem) {
         base[parameter.index] = problem.base[0][parameter.index];
 }
 
+namespace {
+
+// Mean over all predicted precessions of what a direction differs by from one with that tilt.
+double null_chi2(const Reading& tilt, const Reading& precession, double typical_rad, bool folded) {
+  constexpr int kAround = 8;
+  const Eigen::Vector2d weights = weights_of_direction(tilt, precession);
+  double chi2 = 0.0;
+  for (int i = 0; i < kAround; ++i) {
+    const double phi = precession.value.x() + 2.0 * std::numbers::pi * i / kAround;
+    const Departure off =
+        departure({tilt.value.x(), precession.value.x()}, {typical_rad, phi}, folded);
+    chi2 += weights.cwiseProduct(off.way).squaredNorm() / kAround;
+  }
+  return chi2;
+}
+
+}  // namespace
+
 double null_chi2(const ArcData& arc) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   double chi2 = 0.0;
@@ -153,9 +172,12 @@ double null_chi2(const ArcData& arc) {
   if (arc.observable_index(model::Observable::x_m) >= 0) mean = arc.positions_m().colwise().mean();
   for (const Reading& reading : arc.readings)
     if (reading.channel == Channel::theta) tilt += reading.value.x(), ++tilts;
-  for (const Reading& reading : arc.readings) {
+  for (std::size_t i = 0; i < arc.readings.size(); ++i) {
+    const Reading& reading = arc.readings[i];
     const double weight = reading.whitener(0, 0) * reading.whitener(0, 0);
-    if (reading.channel == Channel::position)
+    if (shows_direction(arc, i))
+      chi2 += null_chi2(reading, arc.readings[++i], tilt / tilts, arc.folded);
+    else if (reading.channel == Channel::position)
       chi2 += (reading.whitener.transpose() * (reading.value - mean.transpose())).squaredNorm();
     else if (reading.channel == Channel::theta)
       chi2 += weight * std::pow(reading.value.x() - tilt / tilts, 2);
