@@ -248,6 +248,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
   constexpr double kLost = 4.0;  // of chi-square per row: a turn was lost on the way
   constexpr int kMostRetreats = 4, kLeastStep = 4;
   constexpr double kFarFromExplained = 30.0;  // times the gate
+  constexpr double kTellsNothing = 0.3;       // of the variance
   const bool gated = growth.most_over_gate > 0.0;
   double rate = growth.rate;
   int before = 0, retreats = 0;  // the window explained last
@@ -285,7 +286,15 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
     }
     if (problem.partial && window > problem.partial->samples && reduced < gate)
       *problem.partial = {window, part.base[0]};
-    if (window == all) break;
+    if (window == all) {
+      // To the end of a valley whose floor is that high it is far, and leads nowhere.
+      if (!problem.rough && solution.chi2 > kTellsNothing * null_chi2(part.arcs[0])) {
+        Found found = judged(current, solution, start.path);
+        found.strays_s = std::move(strays_s);
+        return found;
+      }
+      break;
+    }
     explained = std::max(reduced, gate);
     before = window;
     window = std::min(static_cast<int>(rate * window) + 8, all);
