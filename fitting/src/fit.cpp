@@ -28,10 +28,14 @@ namespace trochoid::fitting {
 namespace {
 
 // The search leaves aside what stands out; the polish weighs every sample by its residual. Writes
-// the values found into problem.base.
+// the values found into problem.base. Half a turn off, a direction lies across the pole, where no
+// step leads back: where the path has to be looked for, angles are compared each by itself.
 Found search_without_outliers(Problem& problem, const Quest& quest) {
   Problem search = problem;
-  for (ArcData& arc : search.arcs) arc = arc.keep(consistent_samples(arc));
+  for (ArcData& arc : search.arcs) {
+    arc = arc.keep(consistent_samples(arc));
+    arc.angles_apart = quest.options->strategy != "single";
+  }
   Found found = find(search, quest);
   problem.base = search.base;
   return found;

@@ -292,8 +292,8 @@ double excess_scatter(const ArcData& arc, Channel channel) {
 }
 
 bool shows_direction(const ArcData& arc, std::size_t i) {
-  return arc.readings[i].channel == Channel::theta && i + 1 < arc.readings.size() &&
-         arc.readings[i + 1].channel == Channel::phi &&
+  return !arc.angles_apart && arc.readings[i].channel == Channel::theta &&
+         i + 1 < arc.readings.size() && arc.readings[i + 1].channel == Channel::phi &&
          arc.readings[i + 1].sample == arc.readings[i].sample;
 }
 

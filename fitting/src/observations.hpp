@@ -33,6 +33,8 @@ struct ArcData {
   std::vector<Reading> readings;
   int rows = 0;
   bool folded = false;  ///< faces look alike: theta measured as min(theta, pi - theta)
+  /// Tilt and precession are compared each by itself: from afar every turn leads downhill.
+  bool angles_apart = false;
   bool filmed = false;  ///< has pixel positions: measured in images, with their common errors
   bool held = false;    ///< samples before these were left out: the body was held or pushed
   bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
@@ -68,8 +70,8 @@ struct ChannelChoice {
 /// own sigmas say.
 [[nodiscard]] double excess_scatter(const ArcData& arc, Channel channel);
 
-/// Whether a reading and the next one are the tilt and the precession of one sample: together they
-/// are a direction of the axis.
+/// Whether a reading and the next one are the tilt and the precession of one sample, to be compared
+/// as the direction of the axis that they are.
 [[nodiscard]] bool shows_direction(const ArcData& arc, std::size_t reading);
 
 /// One over the errors of such a direction along its meridian and its parallel [1/rad]. Where the
