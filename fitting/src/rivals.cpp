@@ -150,9 +150,9 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
   if (moving == nullptr) return;
   const data::FitParameter* there = moving->fit.find(moved->name);
   fit.warnings.push_back(fmt::format(
-      "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}, {:.2g} of its "
-      "error bars from here",
-      moving->name, moved->name, there->value, there->sigma, most));
+      "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}; the {:.4g} +- "
+      "{:.2g} given here is away from that by {:.2g} times its own error bar",
+      moving->name, moved->name, there->value, there->sigma, moved->value, moved->sigma, most));
 }
 
 }  // namespace
