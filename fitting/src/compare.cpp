@@ -105,14 +105,11 @@ std::optional<int> smooth_term(const Ladder& ladder) {
 // For one of several rungs that are fitted side by side; what is said of it names it.
 FitOptions options_for(const Rung& rung, const FitOptions& options) {
   FitOptions own = options;
-  if (options.progress)
-    own.progress = [&rung, &options](const std::string& stage) {
-      options.progress(fmt::format("{}: {}", rung.name, stage));
-    };
-  if (options.log)
-    own.log = [&rung, &options](const std::string& line) {
-      options.log(fmt::format("{}: {}", rung.name, line));
-    };
+  const auto named = [name = rung.name](const auto& say) {
+    return [name, say](const std::string& words) { say(fmt::format("{}: {}", name, words)); };
+  };
+  if (options.progress) own.progress = named(options.progress);
+  if (options.log) own.log = named(options.log);
   return own;
 }
 
@@ -223,15 +220,14 @@ std::vector<std::set<int>> with_one_more(const Ladder& ladder, const std::set<in
   return sets;
 }
 
-// Whether a fitted rung's losses that a smaller one lacks may be zero, by their error bars.
-bool may_do_without(const Rung& rung, const Rung& smaller) {
+// Whether a rung's losses that a smaller one lacks may be zero, by the full error bars of its fit.
+bool may_do_without(const Rung& rung, const data::Fit& fit, const Rung& smaller) {
   constexpr double kSurely = 4.0;  // sigmas, which curvature may misjudge
-  if (!rung.fitted || !rung.fit.converged) return false;
   std::set<std::string> lost = parameters_of(rung.scene);
   for (const std::string& name : parameters_of(smaller.scene)) lost.erase(name);
   lost.erase(kSlipScale);  // the smaller one's is fitted anew
   return std::all_of(lost.begin(), lost.end(), [&](const std::string& name) {
-    const data::FitParameter* loss = rung.fit.find(name);
+    const data::FitParameter* loss = fit.find(name);
     return loss != nullptr && std::abs(loss->value) < kSurely * loss->sigma;
   });
 }
@@ -245,8 +241,10 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
     const std::size_t first = rungs.size();
     const std::set<int> terms = rungs[current].terms;
     std::vector<std::set<int>> smaller = with_one_less(ladder, terms);
+    if (smaller.empty()) return;
+    const data::Fit full = with_full_bars(rungs[current]);
     std::erase_if(smaller, [&](const std::set<int>& fewer) {
-      return !may_do_without(rungs[current], rung_with(ladder, fewer));
+      return !may_do_without(rungs[current], full, rung_with(ladder, fewer));
     });
     add_neighbours(ladder, tracks, options, smaller, current, rungs);
     std::size_t best = current;
@@ -362,7 +360,8 @@ void let_go_of_friction(const Ladder& ladder, std::span<const data::Track> track
   const std::optional<int> smooth = smooth_term(ladder);
   const Rung* best = simplest_sufficient(ladder, rungs);
   if (!smooth || best == nullptr || !best->fit.converged || best->fit.model != "sliding") return;
-  const data::FitParameter* friction = best->fit.find("friction");
+  const data::Fit full = with_full_bars(*best);
+  const data::FitParameter* friction = full.find("friction");
   if (friction == nullptr || friction->value > kSurely * friction->sigma + kNoFriction) return;
   std::set<int> terms = best->terms;
   std::erase_if(
@@ -557,6 +556,20 @@ std::vector<data::ModelScore> table_of(const std::vector<Rung>& rungs, const Run
   return table;
 }
 
+// Of the others the comparison does not need to know.
+void predict_held_back_by_near_ones(std::span<const data::Track> tracks, const FitOptions& options,
+                                    std::vector<Rung>& rungs, const Rung& chosen) {
+  std::vector<Rung*> near;
+  for (Rung& rung : rungs)
+    if (rung.bic < chosen.bic + kVeryStrong) near.push_back(&rung);
+  FitOptions one = options;
+  one.threads = 1;
+  in_parallel(static_cast<int>(near.size()), options.threads, [&](int i) {
+    Rung& rung = *near[static_cast<std::size_t>(i)];
+    predict_held_back(tracks, options_for(rung, one), rung);
+  });
+}
+
 }  // namespace
 
 Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
@@ -592,7 +605,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     none.fit.comparison = table_of(rungs, nullptr);
     return none;
   }
-  Comparison result{chosen->fit, chosen->scene};
+  predict_held_back_by_near_ones(tracks, plain, rungs, *chosen);
+  Comparison result{with_full_bars(*chosen), chosen->scene};
   if (options.profile || options.bootstrap > 0) {
     FitOptions again = options;
     again.model.clear();

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <map>
 #include <set>
 #include <span>
@@ -26,12 +27,22 @@ enum class Bars { full, by_curvature };
 
 /// fit() for one of several models that share a first guess: of what is not this model's the guess
 /// is silently ignored.
-/// @param first_part  null, or receives the values that explain the longest first part of a single
-///                    arc that the search came across, if more than a fifth.
 [[nodiscard]] data::Fit fit_one_of_several(std::span<const data::Track> tracks,
                                            const data::Scene& scene, const FitOptions& options,
-                                           Bars bars = Bars::full,
-                                           std::map<std::string, double>* first_part = nullptr);
+                                           Bars bars = Bars::full);
+
+/// A fit with its error bars by curvature, as far as models are compared by it.
+struct Draft {
+  data::Fit fit;
+  std::function<data::Fit()> full;  ///< the same with full error bars, while the tracks live
+};
+
+/// fit_one_of_several() that leaves full error bars for later.
+/// @param first_part  null, or receives the values that explain the longest first part of a single
+///                    arc that the search came across, if more than a fifth.
+[[nodiscard]] Draft draft_one_of_several(std::span<const data::Track> tracks,
+                                         const data::Scene& scene, const FitOptions& options,
+                                         std::map<std::string, double>* first_part = nullptr);
 
 /// Strategy of a sliding model whose given start is that of a body that rolls at first.
 inline constexpr const char* kRollsFirst = "rolls_first";

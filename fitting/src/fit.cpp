@@ -331,64 +331,95 @@ using FirstPart = std::map<std::string, double>;
 /// has its own doubts.
 enum class Word { last, one_of_several };
 
-data::Fit fit_with(std::span<const data::Track> tracks, const model::Predictor& plain,
-                   const std::vector<Relative>& relatives, const data::Scene& given_scene,
-                   const FitOptions& options, Word word, Bars bars = Bars::full,
-                   FirstPart* first_part = nullptr) {
-  if (tracks.empty()) throw TrackError("no track to fit");
-  data::Scene scene = given_scene;
-  scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
-  const auto wrapped = observed(plain, scene, frame_time_s(tracks));
-  const model::Predictor& predictor = wrapped ? *wrapped : plain;
-  Problem problem = prepare(tracks, predictor, scene, options);
-  data::Fit fit;
-  fit.model = predictor.model_name();
-  fit.seed = options.seed;
+// A fit of one model: its path is found at once; what is said of it, in particular its error bars,
+// may wait until it is known which of several models is meant.
+class OneFit {
+ public:
+  OneFit(std::span<const data::Track> tracks, const model::Predictor& plain,
+         const data::Scene& given_scene, const FitOptions& options, Word word)
+      : tracks_(tracks), scene_(given_scene), options_(options), stages_(options_), word_(word) {
+    if (tracks.empty()) throw TrackError("no track to fit");
+    scene_.fit.free_pivot = scene_.fit.free_pivot || options.free_pivot;
+    wrapped_ = observed(plain, scene_, frame_time_s(tracks));
+    problem_ = prepare(tracks, wrapped_ ? *wrapped_ : plain, scene_, options);
+    if (stages_.wanted()) problem_.log = [this](const std::string& words) { stages_.line(words); };
+    fit_.model = problem_.predictor->model_name();
+    fit_.seed = options.seed;
+  }
+  OneFit(const OneFit&) = delete;
+  OneFit& operator=(const OneFit&) = delete;
 
-  Stages stages(options);
-  if (stages.wanted()) problem.log = [&](const std::string& words) { stages.line(words); };
-  stages.enter("looking for the path");
-  if (first_part != nullptr && problem.arcs.size() == 1)
-    problem.partial = std::make_shared<Partial>();
-  const bool start_given = !options.start.empty() || scene.start.theta_rad.has_value();
+  void find(const std::vector<Relative>& relatives, FirstPart* first_part);
+  /// @pre find()
+  [[nodiscard]] data::Fit described(Bars bars);
+
+ private:
+  std::span<const data::Track> tracks_;
+  data::Scene scene_;
+  FitOptions options_;
+  Stages stages_;
+  Word word_;
+  std::unique_ptr<model::Predictor> wrapped_;
+  Problem problem_;
+  Solution solution_;
+  Uncertainty by_curvature_;
+  data::Fit fit_;
+  bool refused_ = false, cut_short_ = false;
+};
+
+void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part) {
+  const auto refuse_with = [&](const std::string& reason) {
+    refused_ = true;
+    refuse(problem_, reason, fit_);
+  };
+  stages_.enter("looking for the path");
+  if (first_part != nullptr && problem_.arcs.size() == 1)
+    problem_.partial = std::make_shared<Partial>();
+  const bool start_given = !options_.start.empty() || scene_.start.theta_rad.has_value();
   const Found found = search_without_outliers(
-      problem, {starter_for(predictor, scene), &options, start_given, relatives});
-  fit.start_path = found.path;
+      problem_, {starter_for(*problem_.predictor, scene_), &options_, start_given, relatives});
+  fit_.start_path = found.path;
+  cut_short_ = found.cut_short;
   // Any start explains a few samples.
   constexpr double kWorthwhile = 0.2;
-  if (problem.partial &&
-      problem.partial->samples > kWorthwhile * static_cast<double>(problem.arcs[0].t_s.size()))
-    for (std::size_t i = 0; i < predictor.parameters().size(); ++i)
-      (*first_part)[predictor.parameters()[i].name] =
-          problem.partial->values[static_cast<Eigen::Index>(i)];
-  if (!found.solution.usable) return refuse(problem, problem.shortfalls->words(), fit);
+  const auto& parameters = problem_.predictor->parameters();
+  if (problem_.partial &&
+      problem_.partial->samples > kWorthwhile * static_cast<double>(problem_.arcs[0].t_s.size()))
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+      (*first_part)[parameters[i].name] = problem_.partial->values[static_cast<Eigen::Index>(i)];
+  if (!found.solution.usable) return refuse_with(problem_.shortfalls->words());
 
-  stages.enter("weighing the samples");
-  const Solution solution = polish(problem, found.solution, options, fit);
-  stages.enter("error bars");
-  Uncertainty error;
+  stages_.enter("weighing the samples");
+  solution_ = polish(problem_, found.solution, options_, fit_);
+  stages_.enter("error bars");
   try {
-    error = uncertainty(problem, solution.u);
+    by_curvature_ = uncertainty(problem_, solution_.u);
   } catch (const NumericalError& failure) {
     // A finer tolerance can run into the step limit where a coarse one did not.
-    return refuse(problem, failure.what(), fit);
+    refuse_with(failure.what());
   }
-  if (bars == Bars::full) heed_far_side(problem, solution, options, error, fit);
-  if (bars == Bars::full) heed_single_samples(problem, solution, error, fit);
-  heed_doubts(problem, solution, scene, frame_time_s(tracks), error, fit);
-  heed_pivot(problem, scene, fit);
-  describe(problem, solution, error, scene, fit);
-  judge(problem, solution, error, found.cut_short, fit);
-  if (word == Word::last) doubt_if_drifting(problem, error, fit);
-  if (fit.model == "pivot" && leaves_pivot(tracks, scene)) {
+}
+
+data::Fit OneFit::described(Bars bars) {
+  data::Fit fit = fit_;
+  if (refused_) return fit;
+  Uncertainty error = by_curvature_;
+  if (bars == Bars::full) heed_far_side(problem_, solution_, options_, error, fit);
+  if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
+  heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
+  heed_pivot(problem_, scene_, fit);
+  describe(problem_, solution_, error, scene_, fit);
+  judge(problem_, solution_, error, cut_short_, fit);
+  if (word_ == Word::last) doubt_if_drifting(problem_, error, fit);
+  if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;
     fit.outcome = fit.verdict = "unexplained";
     fit.reason = fit.verdict_words = fmt::format(
         "the body's centre strays by {:.2g} m rms: a disc that only turns on its pivot stays where "
         "it is; is it a top?",
-        straying_m(tracks));
+        straying_m(tracks_));
   }
-  add_what_was_asked_for(problem, solution, error, options, fit);
+  add_what_was_asked_for(problem_, solution_, error, options_, fit);
   return fit;
 }
 
@@ -407,19 +438,35 @@ void check_given_start(const FitOptions& options, const model::Predictor& predic
                     names_in(predictor, scene));
 }
 
-data::Fit fit_completed(std::span<const data::Track> tracks, const model::Predictor& predictor,
-                        const data::Scene& scene, const FitOptions& options, Word word,
-                        Bars bars = Bars::full, FirstPart* first_part = nullptr) {
-  const auto relatives = relatives_of(scene);
-  std::vector<Relative> plain;
-  for (const OwnedRelative& owned : relatives) {
-    plain.push_back({owned.model.get(), {}});
-    for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
+// With its model and its relatives.
+class CompletedFit {
+ public:
+  CompletedFit(std::span<const data::Track> tracks, const data::Scene& scene,
+               const FitOptions& options, Word word)
+      : scene_(scene),
+        predictor_(model::make_predictor(scene_)),
+        one_(tracks, *predictor_, scene_, options, word) {}
+
+  void find(FirstPart* first_part = nullptr) {
+    const auto relatives = relatives_of(scene_);
+    std::vector<Relative> plain;
+    for (const OwnedRelative& owned : relatives) {
+      plain.push_back({owned.model.get(), {}});
+      for (const auto& bridge : owned.bridges) plain.back().bridges.push_back(bridge.get());
+    }
+    one_.find(plain, first_part);
   }
-  data::Fit fit = fit_with(tracks, predictor, plain, scene, options, word, bars, first_part);
-  tell_idle_terms(scene, fit);
-  return fit;
-}
+  [[nodiscard]] data::Fit described(Bars bars) {
+    data::Fit fit = one_.described(bars);
+    tell_idle_terms(scene_, fit);
+    return fit;
+  }
+
+ private:
+  data::Scene scene_;
+  std::unique_ptr<model::Predictor> predictor_;
+  OneFit one_;
+};
 
 }  // namespace
 
@@ -447,22 +494,33 @@ void check_first_guess(const std::map<std::string, double>& guess, const std::st
 data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
               const data::Scene& scene, const FitOptions& options) {
   check_given_start(options, predictor, scene);
-  return fit_with(tracks, predictor, {}, scene, options, Word::last);
+  OneFit one(tracks, predictor, scene, options, Word::last);
+  one.find({}, nullptr);
+  return one.described(Bars::full);
 }
 
 data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
               const FitOptions& options) {
   const data::Scene scene = completed(given, options);
-  const auto predictor = model::make_predictor(scene);
-  check_given_start(options, *predictor, scene);
-  return fit_completed(tracks, *predictor, scene, options, Word::last);
+  check_given_start(options, *model::make_predictor(scene), scene);
+  CompletedFit one(tracks, scene, options, Word::last);
+  one.find();
+  return one.described(Bars::full);
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
-                             const FitOptions& options, Bars bars, FirstPart* first_part) {
-  const data::Scene scene = completed(given, options);
-  return fit_completed(tracks, *model::make_predictor(scene), scene, options, Word::one_of_several,
-                       bars, first_part);
+                             const FitOptions& options, Bars bars) {
+  CompletedFit one(tracks, completed(given, options), options, Word::one_of_several);
+  one.find();
+  return one.described(bars);
+}
+
+Draft draft_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
+                           const FitOptions& options, FirstPart* first_part) {
+  const auto one = std::make_shared<CompletedFit>(tracks, completed(given, options), options,
+                                                  Word::one_of_several);
+  one->find(first_part);
+  return {one->described(Bars::by_curvature), [one] { return one->described(Bars::full); }};
 }
 
 }  // namespace trochoid::fitting

@@ -52,15 +52,16 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
 }
 
 // Variance of a parameter in a rung with further terms beyond that in the chosen one, which does
-// not allow for those terms.
-double further_variance(const Rival& rival, const data::FitParameter& here) {
-  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(here.name) : nullptr;
-  if (there == nullptr || !std::isfinite(there->sigma)) return 0.0;
-  return std::max(0.0, there->sigma * there->sigma - here.sigma * here.sigma);
+// not allow for those terms; of both by curvature.
+double further_variance(const Rival& rival, const data::Fit& chosen, const std::string& name) {
+  const data::FitParameter* here = chosen.find(name);
+  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(name) : nullptr;
+  if (here == nullptr || there == nullptr || !std::isfinite(there->sigma)) return 0.0;
+  return std::max(0.0, there->sigma * there->sigma - here->sigma * here->sigma);
 }
 
 // What rivals add to the covariance of all parameters.
-Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals,
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, const data::Fit& chosen,
                           const std::vector<data::FitParameter>& parameters) {
   const auto count = static_cast<Eigen::Index>(parameters.size());
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
@@ -70,7 +71,7 @@ Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals,
       const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
       if (here.status == data::ParameterStatus::fixed) continue;
       shift[i] = shift_of(here, rival.rung->fit);
-      further[i] = further_variance(rival, here);
+      further[i] = further_variance(rival, chosen, here.name);
     }
     spread += rival.weight * shift * shift.transpose();
     spread.diagonal() += rival.weight * further;
@@ -161,9 +162,9 @@ void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::
   const std::vector<data::FitParameter> before = fit.parameters;
   std::vector<Rival> rivals = rivals_of(rungs, chosen, false);
   const std::vector<Rival> too_large = rivals_of(rungs, chosen, true);
-  Eigen::MatrixXd further = spread_of(too_large, before);
+  Eigen::MatrixXd further = spread_of(too_large, chosen.fit, before);
   keep_within_bounds(before, further);
-  widen(spread_of(rivals, before) + further, fit);
+  widen(spread_of(rivals, chosen.fit, before) + further, fit);
   rivals.insert(rivals.end(), too_large.begin(), too_large.end());
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);

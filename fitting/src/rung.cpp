@@ -34,6 +34,15 @@ bool explains(const Rung& rung) {
          (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
 }
 
+data::Fit with_full_bars(const Rung& rung) {
+  return rung.full ? rung.full() : rung.fit;
+}
+
+void take(Draft draft, Rung& rung) {
+  rung.fit = std::move(draft.fit);
+  rung.full = std::move(draft.full);
+}
+
 namespace {
 
 // Those of one of several arcs alone under their names there ("x_m@1").
@@ -170,16 +179,6 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   return sigma_known ? rms : rms / std::sqrt(std::max(seen.sum / seen.rows, 1e-300));
 }
 
-// A model that has no answer to part of the track does not predict the rest.
-double held_back_or_infinite(std::span<const data::Track> tracks, const Rung& rung,
-                             const FitOptions& options) {
-  try {
-    return held_back(tracks, rung, options);
-  } catch (const Error&) {
-    return kInfinity;
-  }
-}
-
 // Of the typical size of a parameter: near the solution without it; and what no residual sees.
 constexpr double kLittle = 0.02, kNext = 1e-6;
 
@@ -242,8 +241,9 @@ Values extended_start(const Rung& known, const Rung& rung) {
   return start;
 }
 
-void keep_better(data::Fit fit, Rung& rung) {
-  if (!usable(rung.fit) || (usable(fit) && fit.chi2 < rung.fit.chi2)) rung.fit = std::move(fit);
+void keep_better(Draft draft, Rung& rung) {
+  if (!usable(rung.fit) || (usable(draft.fit) && draft.fit.chi2 < rung.fit.chi2))
+    take(std::move(draft), rung);
 }
 
 // Scores and reason, once the fit is made.
@@ -276,6 +276,16 @@ void try_rung(Rung& rung, const std::function<void()>& fit) {
 
 }  // namespace
 
+void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  if (!rung.fitted || !rung.fit.converged) return;
+  try {
+    rung.held_back_rms_sigma = held_back(tracks, rung, options);
+  } catch (const Error&) {
+    // A model that has no answer to part of the track does not predict the rest.
+    rung.held_back_rms_sigma = kInfinity;
+  }
+}
+
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung, Reach reach) {
   FitOptions own = options;
@@ -284,7 +294,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     if (extends) {
       own.start = extended_start(*below, rung);
       own.strategy = "single";
-      rung.fit = fit_one_of_several(tracks, rung.scene, own);
+      take(draft_one_of_several(tracks, rung.scene, own), rung);
     }
     // Near a solution that explains nothing there is nothing to be found.
     const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
@@ -300,12 +310,9 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
       else
-        keep_better(fit_one_of_several(tracks, rung.scene, own, Bars::full, &rung.first_part),
-                    rung);
+        keep_better(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
     }
     rung.fitted = usable(rung.fit);
-    if (rung.fitted && rung.fit.converged)
-      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   });
 }
 
@@ -357,7 +364,7 @@ void fit_from_first_part(std::span<const data::Track> tracks,
   own.start = first_part;
   own.strategy = rung.scene.model.name == "sliding" ? kRollsFirst : "growing";
   try_rung(rung, [&] {
-    rung.fit = fit_one_of_several(tracks, rung.scene, own);
+    take(draft_one_of_several(tracks, rung.scene, own), rung);
     if (usable(rung.fit) && rung.fit.converged && rung.fit.whiteness_p < kWhite &&
         softness_is_open(rung)) {
       own.start = values_of(rung.fit);
@@ -365,8 +372,6 @@ void fit_from_first_part(std::span<const data::Track> tracks,
       fit_softly(tracks, own, rung);
     }
     rung.fitted = usable(rung.fit);
-    if (rung.fitted && rung.fit.converged)
-      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   });
 }
 
@@ -381,11 +386,8 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     if (softness_is_open(rung) && !softness_is_open(known))
       fit_softly(tracks, own, rung);
     else
-      rung.fit = fit_one_of_several(tracks, rung.scene, own);
+      take(draft_one_of_several(tracks, rung.scene, own), rung);
     rung.fitted = usable(rung.fit);
-    const bool in_question = rung.fit.bic < known.fit.bic + kVeryStrong;
-    if (rung.fitted && rung.fit.converged && in_question)
-      rung.held_back_rms_sigma = held_back_or_infinite(tracks, rung, options);
   });
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "first_guess.hpp"
 #include "ladder.hpp"
 #include "promise.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -25,7 +27,8 @@ struct Rung {
   std::set<int> terms;  ///< indices into Ladder::terms
   std::string name;
   data::Scene scene;
-  data::Fit fit;
+  data::Fit fit;                    ///< error bars by curvature
+  std::function<data::Fit()> full;  ///< `fit` with full error bars, which cost as much as a fit
   bool fitted = false;
   std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
@@ -41,6 +44,11 @@ struct Rung {
 
 /// Whether a fit came to an end, good or bad.
 [[nodiscard]] bool usable(const data::Fit& fit);
+
+/// A rung's fit with full error bars; as it is where there are no others.
+[[nodiscard]] data::Fit with_full_bars(const Rung& rung);
+
+void take(Draft draft, Rung& rung);
 
 /// Free and fixed values by name; empty where there are several arcs.
 [[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
@@ -61,11 +69,13 @@ void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::
 /// How a rung is looked for: searched for where the solution below does not lead to it, or not.
 enum class Reach { search, from_below };
 
-/// Fits a rung's scene, first from the solution of the rung below, and predicts the held-back
-/// third.
+/// Fits a rung's scene, first from the solution of the rung below.
 /// @param below  the fitted rung this one extends by one term; null for the plainest.
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung, Reach reach = Reach::search);
+
+/// Predicts the last third of the tracks from a fit of the others.
+void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 
 /// What a known rung's tangent plane says of a larger one.
 /// @param others  parameters of each of the known rung's terms that may be left out.
@@ -93,8 +103,7 @@ void fit_from_first_part(std::span<const data::Track> tracks,
                          const std::map<std::string, double>& first_part, const FitOptions& options,
                          Rung& rung);
 
-/// Fits a rung that has a term more or less than `known`, from the solution of that alone. Predicts
-/// the held-back third where BIC does not rule it out beside that one.
+/// Fits a rung that has a term more or less than `known`, from the solution of that alone.
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
                    const FitOptions& options, Rung& rung);
 

@@ -74,6 +74,7 @@ TEST(Rung, ThatLacksATermGoesOnFromTheSolutionOfTheOneAbove) {
   EXPECT_LT(below.bic, above.bic);
   fit_rung(std::span(&track, 1), nullptr, nullptr, {}, alone);
   EXPECT_NEAR(below.fit.chi2, alone.fit.chi2, 0.01) << "the minimum is the same one";
+  predict_held_back(std::span(&track, 1), {}, below);
   EXPECT_LT(below.held_back_rms_sigma, 2.0);
 }
 
@@ -228,6 +229,24 @@ TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold)
       fit.warnings[1],
       "with a gap layer is neither needed nor ruled out: with it, rolling_friction_m would be 0 "
       "+- 0.5; the 1 +- 0.25 given here is away from that by 4 times its own error bar");
+}
+
+// Full error bars are had for the chosen one alone: like is compared with like.
+TEST(Rivals, AddAsMuchToAnErrorBarThatIsWiderForOtherReasons) {
+  std::vector<Rung> rungs{
+      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("rolling_friction_m", 1.1, 0.2), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
+              101.0, 104.0)};
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit by_curvature = rungs[0].fit, full = rungs[0].fit;
+  constexpr double kWider = 0.3;
+  full.parameters[0].sigma = kWider;
+  full.covariance(0, 0) = kWider * kWider;
+  allow_for_rivals(rungs, rungs[0], by_curvature);
+  allow_for_rivals(rungs, rungs[0], full);
+  EXPECT_GT(by_curvature.covariance(0, 0), 0.1 * 0.1);
+  EXPECT_NEAR(full.covariance(0, 0) - kWider * kWider, by_curvature.covariance(0, 0) - 0.1 * 0.1,
+              1e-12);
 }
 
 // Which may be another one than the likeliest.
