@@ -490,7 +490,10 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
     if (rungs[smooth].fitted && rungs[smooth].bic < rungs[current].bic)
       smooth = step_up_while_worth(ladder, tracks, options, Reach::search, smooth, rungs);
-    if (rungs[smooth].fit.converged && explains(rungs[smooth])) return rungs;
+    if (rungs[smooth].fit.converged && explains(rungs[smooth])) {
+      step_down(ladder, tracks, options, smooth, rungs);
+      return rungs;
+    }
   }
   // Where nothing leads anywhere, the last resort alone does not either.
   if (rungs[current].fit.converged) {
