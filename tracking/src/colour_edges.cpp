@@ -18,8 +18,8 @@ namespace {
 
 using Edge = data::OutlinePoint::Edge;
 
-// Levels inside and outside by the direction of the outline's normal, and by how much the wall
-// differs from the face.
+// Levels inside and outside by the direction of the outline's normal, the latter where it is as
+// bright as all around, and by how much the wall differs from the face.
 constexpr int kHarmonics = 5, kLevels = 2 * kHarmonics + 1, kWall = kLevels - 1;
 using Harmonics = Eigen::Matrix<double, kHarmonics, 1>;
 using Levels = Eigen::Matrix<double, kLevels, 1>;
@@ -49,9 +49,12 @@ struct Cover {
 // outside of a border, half a pixel off the middle.
 constexpr std::array<double, 2> kHalvesPx{-0.5, 0.5};
 
+using Halves = std::array<Cover, kHalvesPx.size()>;
+
 // A pixel of the colour planes near one border.
 struct Pixel {
-  double value = 0.0;
+  double value = 0.0, luma = 0.0;  // beyond what has no colour
+  Halves halves{};
   double covered = 0.0, density = 0.0;  // as a share of the body's colour
   PoseMotion::Step change{};
   std::size_t stretch = 0;
@@ -70,6 +73,7 @@ struct Stretch {
   std::size_t sample;
   Harmonics harmonics;
   std::vector<std::size_t> pixels;
+  double shade = 1.0;               // luma of the surroundings here over that of all around
   std::array<double, 2> uneven2{};  // variance of its levels about those of the whole outline
 };
 
@@ -89,11 +93,16 @@ class ColourFit {
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
   [[nodiscard]] Pixel pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
   void cover(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
-             std::array<Cover, kHalvesPx.size()>& halves) const;
+             Halves& halves) const;
+  void find_shades(double ground_luma);
   [[nodiscard]] double longest_sweep_px() const;
   [[nodiscard]] double parts() const {
     return std::max<double>(1.0, static_cast<double>(moments_.size()));
   }
+
+  template <class Use>
+  void over_neighbours(std::size_t reach, const Use& use);
+  static void mix(const ColourMixing& mixing, Pixel& pixel);
 
   [[nodiscard]] Levels row_of(const Pixel& pixel) const;
   [[nodiscard]] double off_level(const Pixel& pixel) const {
@@ -107,7 +116,6 @@ class ColourFit {
   const PoseMotion::Step& smear_;
   Silhouette middle_;
   std::vector<Silhouette> moments_;
-  ColourMixing mixing_;
   double body_;  // colour of the body, about
   double blur2_px2_;
   std::vector<Stretch> stretches_;
@@ -120,11 +128,12 @@ ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, 
     : outline_(outline.middle),
       smear_(outline.smear),
       middle_(outline.middle),
-      mixing_(colour.mixing),
       body_(colour.body),
       blur2_px2_(blur_px * blur_px) {
   for (const auto& moment : outline.moments) moments_.emplace_back(moment);
   collect(colour, blur_px);
+  find_shades(colour.ground_luma);
+  for (Pixel& pixel : pixels_) mix(colour.mixing_in(stretches_[pixel.stretch].shade), pixel);
 }
 
 double ColourFit::longest_sweep_px() const {
@@ -142,16 +151,18 @@ void ColourFit::collect(const ColourWindow& colour, double blur_px) {
   const double level_px = 2.5 + 5.0 * blur_px + kPerSweep * sweep_px;
   for (const Contour& border : middle_.borders)
     for (std::size_t k = 0; k < border.size(); ++k)
-      stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px), {}, {}});
+      stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px), {}});
   for (int y = 0; y < colour.planes.rows; ++y)
     for (int x = 0; x < colour.planes.cols; ++x) {
       const Eigen::Vector2d at_px = colour.place_of(x, y);
       const auto at = nearest(at_px, level_px + 0.5 * sweep_px);
       if (!at) continue;
       Pixel pixel = pixel_at(at_px, *at);
-      constexpr double kNoEdge = 0.005;
-      if (std::abs(at->place.off_px) > level_px && pixel.density < kNoEdge) continue;
-      pixel.value = static_cast<double>(colour.planes.at<float>(y, x));
+      constexpr double kNoEdge = 0.01;
+      const double density = pixel.halves.front().density + pixel.halves.back().density;
+      if (std::abs(at->place.off_px) > level_px && density < kNoEdge) continue;
+      pixel.value = static_cast<double>(colour.planes.at<float>(y, x)) - colour.neutral;
+      pixel.luma = static_cast<double>(colour.luma.at<float>(y, x));
       stretches_[pixel.stretch].pixels.push_back(pixels_.size());
       pixels_.push_back(std::move(pixel));
     }
@@ -178,23 +189,15 @@ Pixel ColourFit::pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) 
   pixel.stretch = (nearest.border == 0 ? 0 : middle_.borders[0].size()) + nearest.place.at;
   const bool of_far_face = sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore;
   pixel.wall = of_far_face && -nearest.place.off_px < sample.inside_px;
-  std::array<Cover, kHalvesPx.size()> halves;
-  halves.fill({0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
-  if (moments_.empty()) cover(middle_, at_px, nearest, halves);
-  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, halves);
-  pixel.change = PoseMotion::Step::Zero(sample.motion.size());
-  for (const Cover& half : halves) {
-    const double slope = mixing_.slope(half.covered) / kHalvesPx.size();
-    pixel.covered += mixing_.shown(half.covered) / kHalvesPx.size();
-    pixel.density += slope * half.density;
-    pixel.change += slope * half.change;
-  }
+  pixel.halves.fill({0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
+  if (moments_.empty()) cover(middle_, at_px, nearest, pixel.halves);
+  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, pixel.halves);
   return pixel;
 }
 
 // Adds what one part of the exposure says.
 void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
-                      const Nearest& nearest, std::array<Cover, kHalvesPx.size()>& halves) const {
+                      const Nearest& nearest, Halves& halves) const {
   const NormalTable& table = NormalTable::instance();
   const double part = 1.0 / parts();
   const Contour& own = moment.borders[nearest.border];
@@ -218,11 +221,58 @@ void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
   }
 }
 
+// From what the surroundings of a stretch and its neighbours look like.
+void ColourFit::find_shades(double ground_luma) {
+  constexpr double kUncovered = 0.02, kDarkest = 0.2, kBrightest = 2.0;
+  constexpr std::size_t kReach = 2;
+  std::vector<double> sums(stretches_.size(), 0.0), counts(stretches_.size(), 0.0);
+  for (const Pixel& pixel : pixels_) {
+    if (pixel.halves.front().covered + pixel.halves.back().covered > kUncovered) continue;
+    sums[pixel.stretch] += pixel.luma;
+    counts[pixel.stretch] += 1.0;
+  }
+  over_neighbours(kReach, [&](std::size_t k, const std::vector<std::size_t>& near) {
+    double sum = 0.0, count = 0.0;
+    for (const std::size_t j : near) sum += sums[j], count += counts[j];
+    if (count > 0.0)
+      stretches_[k].shade =
+          std::clamp(sum / (count * std::max(1.0, ground_luma)), kDarkest, kBrightest);
+  });
+}
+
+// Calls `use` with each stretch and those within reach of it along its border.
+template <class Use>
+void ColourFit::over_neighbours(std::size_t reach, const Use& use) {
+  std::vector<std::size_t> near;
+  std::size_t first = 0;
+  for (const Contour& border : middle_.borders) {
+    const std::size_t n = border.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      near.clear();
+      for (std::size_t j = 0; j < std::min(n, 2 * reach + 1); ++j)
+        near.push_back(first + (k + n + j - std::min(n, reach)) % n);
+      use(first + k, near);
+    }
+    first += n;
+  }
+}
+
+// From what is covered to what is shown.
+void ColourFit::mix(const ColourMixing& mixing, Pixel& pixel) {
+  pixel.change = PoseMotion::Step::Zero(pixel.halves.front().change.size());
+  for (const Cover& half : pixel.halves) {
+    const double slope = mixing.slope(half.covered) / kHalvesPx.size();
+    pixel.covered += mixing.shown(half.covered) / kHalvesPx.size();
+    pixel.density += slope * half.density;
+    pixel.change += slope * half.change;
+  }
+}
+
 Levels ColourFit::row_of(const Pixel& pixel) const {
-  const Harmonics& harmonics = stretches_[pixel.stretch].harmonics;
+  const Stretch& stretch = stretches_[pixel.stretch];
   Levels row;
-  row << pixel.covered * harmonics, (1.0 - pixel.covered) * harmonics,
-      pixel.wall ? pixel.covered : 0.0;
+  row << pixel.covered * stretch.harmonics,
+      (1.0 - pixel.covered) * stretch.shade * stretch.harmonics, pixel.wall ? pixel.covered : 0.0;
   return row;
 }
 
@@ -274,16 +324,11 @@ void ColourFit::find_unevenness() {
       beyond2[k] = std::pow(sum / count, 2) - std::pow(noise_[side], 2) / count;
       counted[k] = 1.0;
     }
-    for (std::size_t first = 0, border = 0; border < middle_.borders.size(); ++border) {
-      const std::size_t n = middle_.borders[border].size();
-      for (std::size_t k = 0; k < n; ++k) {
-        double sum = 0.0, count = 0.0;
-        for (std::size_t j = n + k - std::min(n, kReach); j <= n + k + kReach; ++j)
-          sum += beyond2[first + j % n], count += counted[first + j % n];
-        stretches_[first + k].uneven2[side] = std::max(0.0, sum) / std::max(1.0, count);
-      }
-      first += n;
-    }
+    over_neighbours(kReach, [&](std::size_t k, const std::vector<std::size_t>& near) {
+      double sum = 0.0, count = 0.0;
+      for (const std::size_t j : near) sum += beyond2[j], count += counted[j];
+      stretches_[k].uneven2[side] = std::max(0.0, sum) / std::max(1.0, count);
+    });
   }
 }
 
@@ -292,7 +337,8 @@ void ColourFit::find_unevenness() {
 std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   const OutlineSample& sample = outline_[stretch.sample];
   const double inner = stretch.harmonics.dot(levels_.head<kHarmonics>());
-  const double outer = stretch.harmonics.dot(levels_.segment<kHarmonics>(kHarmonics));
+  const double outer =
+      stretch.shade * stretch.harmonics.dot(levels_.segment<kHarmonics>(kHarmonics));
   // Of the offset and of the levels inside and outside.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();

@@ -92,6 +92,10 @@ Coded coded(double luma, const Eigen::Vector2d& chroma) {
   return {luma, chroma.x() - kNeutral, chroma.y() - kNeutral};
 }
 
+Coded in_shade(const Coded& colour, double shade) {
+  return {shade * colour.luma, shade * colour.cb, shade * colour.cr};
+}
+
 Coded in_light(const Tint& tint, double luma) {
   return {luma, tint.cb * luma, tint.cr * luma};
 }
@@ -147,6 +151,13 @@ double ColourMixing::shown(double covered) const {
 double ColourMixing::slope(double covered) const {
   const auto k = static_cast<size_t>(part_of(covered));
   return kParts * (shown_[k + 1] - shown_[k]);
+}
+
+const ColourMixing& ColourWindow::mixing_in(double shade) const {
+  const auto* nearest = std::min_element(kShades.begin(), kShades.end(), [&](double a, double b) {
+    return std::abs(a - shade) < std::abs(b - shade);
+  });
+  return mixings[static_cast<size_t>(nearest - kShades.begin())];
 }
 
 std::optional<Tints> tints_of(const cv::Mat& luma, const cv::Mat& chroma, const data::Body& body,
@@ -208,20 +219,29 @@ ColourWindow colour_window(const cv::Mat& luma, const cv::Mat& chroma, const cv:
       out[x] = to.x() * (static_cast<float>(in[x][0]) - from.x()) +
                to.y() * (static_cast<float>(in[x][1]) - from.y());
   }
+  ColourWindow out;
   cv::Mat full;
   cv::resize(values, full, {}, 2.0, 2.0, cv::INTER_LINEAR);
-  ColourMixing mixing;
-  double inner = 0.0, outer = 0.0;
-  if (camera.transfer != data::Transfer::linear &&
-      luma_on_circles(luma, body, camera, pose, within, inner) &&
-      luma_on_circles(luma, body, camera, pose, around, outer))
-    mixing = mixing_between(coded(inner, inside.middle), coded(outer, outside.middle));
-  return {LightWindow(full, cv::Point(2 * half.x, 2 * half.y)),
-          values,
-          half.tl(),
-          mixing,
-          size,
-          size > kPlainRatio * (scatter + kRounding)};
+  out.levels = LightWindow(full, cv::Point(2 * half.x, 2 * half.y));
+  out.planes = values;
+  const cv::Rect whole =
+      cv::Rect(2 * half.x, 2 * half.y, 2 * half.width, 2 * half.height) & cv::Rect({}, luma.size());
+  cv::resize(luma(whole), out.luma, half.size(), 0.0, 0.0, cv::INTER_AREA);
+  out.luma.convertTo(out.luma, CV_32F);
+  out.corner = half.tl();
+  out.neutral = apart.dot(Eigen::Vector2d(kNeutral, kNeutral) - outside.middle) / size;
+  out.body = size;
+  out.plain = size > kPlainRatio * (scatter + kRounding);
+  double inner = 0.0;
+  if (!luma_on_circles(luma, body, camera, pose, within, inner) ||
+      !luma_on_circles(luma, body, camera, pose, around, out.ground_luma) ||
+      camera.transfer == data::Transfer::linear)
+    return out;
+  const Coded ground = coded(out.ground_luma, outside.middle);
+  for (size_t k = 0; k < out.mixings.size(); ++k)
+    out.mixings[k] =
+        mixing_between(coded(inner, inside.middle), in_shade(ground, ColourWindow::kShades[k]));
+  return out;
 }
 
 }  // namespace trochoid::tracking

@@ -37,21 +37,30 @@ class ColourMixing {
 /// A picture of the colour difference in which a body stands out of its surroundings most, about 0
 /// on these and about `body` on it; empty where there is none.
 struct ColourWindow {
-  LightWindow levels;  ///< of full size
-  cv::Mat planes;      ///< as they are, CV_32FC1
-  cv::Point corner{};  ///< their first pixel, in pixels of the planes
-  ColourMixing mixing{};
+  LightWindow levels;        ///< of full size
+  cv::Mat planes;            ///< as they are, CV_32FC1
+  cv::Mat luma;              ///< as large as these, CV_32FC1
+  cv::Point corner{};        ///< their first pixel, in pixels of the planes
+  double neutral = 0.0;      ///< level of what has no colour
+  double ground_luma = 1.0;  ///< of the surroundings
+  /// Where the surroundings are as bright as usual and where they lie in the shade, darker by these
+  /// factors.
+  static constexpr std::array<double, 5> kShades{1.25, 1.0, 0.75, 0.5, 0.3};
+  std::array<ColourMixing, kShades.size()> mixings{};
   double body = 0.0;
   bool plain = false;  ///< so much apart that a few pixels tell the body from its surroundings
 
   [[nodiscard]] bool empty() const { return levels.empty(); }
+  [[nodiscard]] const ColourMixing& mixing_in(double shade) const;
   /// Where a pixel of the planes is in the picture: amid the four it belongs to.
   [[nodiscard]] Eigen::Vector2d place_of(int x, int y) const {
     return {2.0 * (corner.x + x) + 0.5, 2.0 * (corner.y + y) + 0.5};
   }
   /// The same blurred by a Gaussian.
   [[nodiscard]] ColourWindow blurred(double sigma_px) const {
-    return {levels.blurred(sigma_px), planes, corner, mixing, body, plain};
+    ColourWindow out = *this;
+    out.levels = levels.blurred(sigma_px);
+    return out;
   }
 };
 

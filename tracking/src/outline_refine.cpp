@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "colour_edges.hpp"
 #include "colour_window.hpp"
@@ -319,6 +320,13 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool last, 
   return fit.wider_px;
 }
 
+// What coding leaves of colours is off by half a level or so, alike for a few neighbours.
+double coded_px(const ColourEdge& found) {
+  constexpr double kOffLevels = 0.5, kMostPx = 1.0;
+  const double step_px = std::sqrt(2.0 * std::numbers::pi) * found.blur_px;
+  return std::min(kMostPx, kOffLevels * step_px / std::max(1.0, std::abs(found.edge.contrast)));
+}
+
 // Those of the silhouette in the colour planes.
 void collect_colours(const Scenery& scenery, const data::Pose<>& pose, const Search& search,
                      Round& round, Refined& out) {
@@ -335,7 +343,7 @@ void collect_colours(const Scenery& scenery, const data::Pose<>& pose, const Sea
     const OutlineSample& sample = round.smooth[found.sample];
     EdgeEquation equation = equation_of(sample, found.edge, true);
     equation.motion = found.motion;
-    equation.model_px = model_sd_px(found.edge, false, {}, true);
+    equation.model_px = std::hypot(model_sd_px(found.edge, false, {}, true), coded_px(found));
     keep(sample, found.edge, equation, out);
     out.shading.emplace_back();
     out.blurs_px.push_back(found.blur_px);
