@@ -18,11 +18,9 @@ namespace {
 
 using Edge = data::OutlinePoint::Edge;
 
-// Levels inside and outside by the direction of the outline's normal, the latter where it is as
-// bright as all around, and by how much the wall differs from the face.
-constexpr int kHarmonics = 5, kLevels = 2 * kHarmonics + 1, kWall = kLevels - 1;
+// A level by the direction of the outline's normal.
+constexpr int kHarmonics = 5;
 using Harmonics = Eigen::Matrix<double, kHarmonics, 1>;
-using Levels = Eigen::Matrix<double, kLevels, 1>;
 
 Harmonics harmonics_of(const Eigen::Vector2d& normal) {
   const double c = normal.x(), s = normal.y();
@@ -62,7 +60,7 @@ struct Pixel {
 
   // So far from the border that it shows a level.
   [[nodiscard]] bool is_clear() const {
-    constexpr double kShare = 0.1;
+    constexpr double kShare = 0.02;
     return covered < kShare || covered > 1.0 - kShare;
   }
   [[nodiscard]] Side side() const { return covered > 0.5 ? kInside : kOutside; }
@@ -74,7 +72,8 @@ struct Stretch {
   Harmonics harmonics;
   std::vector<std::size_t> pixels;
   double shade = 1.0;               // luma of the surroundings here over that of all around
-  std::array<double, 2> uneven2{};  // variance of its levels about those of the whole outline
+  std::array<double, 2> levels{};   // by those of the whole outline
+  std::array<double, 2> uneven2{};  // variance about these
 };
 
 class ColourFit {
@@ -104,10 +103,9 @@ class ColourFit {
   void over_neighbours(std::size_t reach, const Use& use);
   static void mix(const ColourMixing& mixing, Pixel& pixel);
 
-  [[nodiscard]] Levels row_of(const Pixel& pixel) const;
-  [[nodiscard]] double off_level(const Pixel& pixel) const {
-    return pixel.value - row_of(pixel).dot(levels_);
-  }
+  [[nodiscard]] double off_level(const Pixel& pixel) const;
+  void fit_levels(Side side);
+  bool find_noise(Side side);
   bool find_levels();
   void find_unevenness();
   [[nodiscard]] std::optional<ColourEdge> edge_of(const Stretch& stretch) const;
@@ -120,7 +118,7 @@ class ColourFit {
   double blur2_px2_;
   std::vector<Stretch> stretches_;
   std::vector<Pixel> pixels_;
-  Levels levels_ = Levels::Zero();
+  double wall_ = 0.0;              // by how much the wall differs from the face
   std::array<double, 2> noise_{};  // sd of a pixel
 };
 
@@ -268,45 +266,73 @@ void ColourFit::mix(const ColourMixing& mixing, Pixel& pixel) {
   }
 }
 
-Levels ColourFit::row_of(const Pixel& pixel) const {
+double ColourFit::off_level(const Pixel& pixel) const {
   const Stretch& stretch = stretches_[pixel.stretch];
-  Levels row;
-  row << pixel.covered * stretch.harmonics,
-      (1.0 - pixel.covered) * stretch.shade * stretch.harmonics, pixel.wall ? pixel.covered : 0.0;
-  return row;
+  const double inner = stretch.levels[kInside] + (pixel.wall ? wall_ : 0.0);
+  return pixel.value - pixel.covered * inner - (1.0 - pixel.covered) * stretch.levels[kOutside];
 }
 
 // Robustly and beside the border only: on it, where that lies is asked.
-bool ColourFit::find_levels() {
-  constexpr int kRounds = 4, kFewest = 2 * kHarmonics;
-  constexpr double kTukey = 4.685, kLeastNoise = 0.3, kNotYetKnown = 1e3;
+void ColourFit::fit_levels(Side side) {
+  constexpr double kTukey = 4.685;
   constexpr double kWallShare = 0.1;  // of the colour, by which the wall may differ
-  noise_.fill(kNotYetKnown);
-  for (int round = 0; round < kRounds; ++round) {
-    Eigen::Matrix<double, kLevels, kLevels> normal =
-        1e-6 * Eigen::Matrix<double, kLevels, kLevels>::Identity();
-    normal(kWall, kWall) = 1.0 / std::pow(kWallShare * body_, 2);
-    Levels right = Levels::Zero();
-    for (const Pixel& pixel : pixels_) {
-      if (!pixel.is_clear()) continue;
-      const Levels row = row_of(pixel);
-      const double noise = noise_[pixel.side()];
-      const double t = (pixel.value - row.dot(levels_)) / (kTukey * noise);
+  constexpr int kWall = kHarmonics, kUnknowns = kHarmonics + 1;
+  using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+  Eigen::Matrix<double, kUnknowns, kUnknowns> normal =
+      1e-6 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
+  normal(kWall, kWall) = 1.0 / std::pow(kWallShare * body_, 2);
+  Unknowns right = Unknowns::Zero();
+  const auto add = [&](const Stretch& stretch, bool wall, double weight, double weighted) {
+    if (weight == 0.0) return;
+    Unknowns row;
+    row << (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics, wall ? 1.0 : 0.0;
+    normal.noalias() += weight * row * row.transpose();
+    right += weighted * row;
+  };
+  for (const Stretch& stretch : stretches_) {
+    std::array<double, 2> weights{}, weighted{};  // of the face or the floor, and of the wall
+    for (const std::size_t i : stretch.pixels) {
+      const Pixel& pixel = pixels_[i];
+      if (!pixel.is_clear() || pixel.side() != side) continue;
+      const double t = off_level(pixel) / (kTukey * noise_[side]);
       if (std::abs(t) >= 1.0) continue;
-      const double weight = std::pow((1.0 - t * t) / noise, 2);
-      normal.noalias() += weight * row * row.transpose();
-      right += weight * pixel.value * row;
+      const double weight = std::pow((1.0 - t * t) / noise_[side], 2);
+      const std::size_t wall = side == kInside && pixel.wall ? 1 : 0;
+      weights[wall] += weight;
+      weighted[wall] += weight * pixel.value;
     }
-    levels_ = normal.ldlt().solve(right);
-    std::array<std::vector<double>, 2> off;
-    for (const Pixel& pixel : pixels_)
-      if (pixel.is_clear()) off[pixel.side()].push_back(std::abs(off_level(pixel)));
-    for (const Side side : {kInside, kOutside}) {
-      if (off[side].size() < kFewest) return false;
-      noise_[side] = std::max(kLeastNoise, 1.4826 * data::upper_median(std::move(off[side])));
-    }
+    add(stretch, false, weights[0], weighted[0]);
+    add(stretch, true, weights[1], weighted[1]);
   }
-  return levels_.allFinite();
+  const Unknowns found = normal.ldlt().solve(right);
+  for (Stretch& stretch : stretches_)
+    stretch.levels[side] =
+        (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics.dot(found.head<kHarmonics>());
+  if (side == kInside) wall_ = found[kWall];
+}
+
+// False if hardly any pixel shows the level.
+bool ColourFit::find_noise(Side side) {
+  constexpr std::size_t kFewest = 2 * kHarmonics;
+  constexpr double kLeastNoise = 0.3;
+  std::vector<double> off;
+  for (const Pixel& pixel : pixels_)
+    if (pixel.is_clear() && pixel.side() == side) off.push_back(std::abs(off_level(pixel)));
+  if (off.size() < kFewest) return false;
+  noise_[side] = std::max(kLeastNoise, 1.4826 * data::upper_median(std::move(off)));
+  return std::isfinite(noise_[side]);
+}
+
+bool ColourFit::find_levels() {
+  constexpr int kRounds = 4;
+  constexpr double kNotYetKnown = 1e3;
+  noise_.fill(kNotYetKnown);
+  for (int round = 0; round < kRounds; ++round)
+    for (const Side side : {kInside, kOutside}) {
+      fit_levels(side);
+      if (!find_noise(side)) return false;
+    }
+  return true;
 }
 
 // By how much the levels of stretches differ from those of the whole outline beyond the noise of
@@ -336,9 +362,7 @@ void ColourFit::find_unevenness() {
 // whole outline as its neighbours' do; none if nothing there depends on it.
 std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   const OutlineSample& sample = outline_[stretch.sample];
-  const double inner = stretch.harmonics.dot(levels_.head<kHarmonics>());
-  const double outer =
-      stretch.shade * stretch.harmonics.dot(levels_.segment<kHarmonics>(kHarmonics));
+  const double inner = stretch.levels[kInside], outer = stretch.levels[kOutside];
   // Of the offset and of the levels inside and outside.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -346,7 +370,7 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   PoseMotion::Step motion = PoseMotion::Step::Zero(sample.motion.size());
   for (const std::size_t i : stretch.pixels) {
     const Pixel& p = pixels_[i];
-    const double contrast = inner + (p.wall ? levels_[kWall] : 0.0) - outer;
+    const double contrast = inner + (p.wall ? wall_ : 0.0) - outer;
     const double slope = contrast * p.density, off = off_level(p);
     const double usual2 = p.covered * std::pow(noise_[kInside], 2) +
                           (1.0 - p.covered) * std::pow(noise_[kOutside], 2);
@@ -392,7 +416,7 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
 }
 
 std::vector<ColourEdge> ColourFit::edges(double reach_px) {
-  constexpr std::size_t kFewest = 4 * kLevels;
+  constexpr std::size_t kFewest = 8 * kHarmonics;
   std::vector<ColourEdge> found;
   if (pixels_.size() < kFewest || !find_levels()) return found;
   find_unevenness();
