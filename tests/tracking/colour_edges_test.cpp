@@ -139,7 +139,7 @@ Eigen::Vector2d centre_by_colour(const ThinDisc& disc, const Photograph& picture
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   constexpr double kBlurPx = 0.6, kReachPx = 3.0;
   for (const ColourEdge& found :
-       find_colour_edges(colour, {outline, {}, PoseMotion::Step()}, kBlurPx, kReachPx)) {
+       find_colour_edges(colour, {outline, Moments(), PoseMotion::Step()}, kBlurPx, kReachPx)) {
     const Eigen::Vector2d n = outline[found.sample].normal_px;
     const Eigen::Vector3d row(n.x(), n.y(), 1.0);  // and of the size
     const double weight = 1.0 / (found.edge.noise_variance_px2 + found.edge.shading_variance_px2);

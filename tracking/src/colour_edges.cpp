@@ -78,7 +78,7 @@ struct Stretch {
 
 class ColourFit {
  public:
-  ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px);
+  ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px, int every);
   [[nodiscard]] std::vector<ColourEdge> edges(double reach_px);
 
  private:
@@ -88,7 +88,7 @@ class ColourFit {
     Contour::Place place;
   };
 
-  void collect(const ColourWindow& colour, double blur_px);
+  void collect(const ColourWindow& colour, double blur_px, int every);
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
   [[nodiscard]] Pixel pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
   void cover(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
@@ -122,14 +122,15 @@ class ColourFit {
   std::array<double, 2> noise_{};  // sd of a pixel
 };
 
-ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px)
+ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px,
+                     int every)
     : outline_(outline.middle),
       smear_(outline.smear),
       middle_(outline.middle),
       body_(colour.body),
       blur2_px2_(blur_px * blur_px) {
   for (const auto& moment : outline.moments) moments_.emplace_back(moment);
-  collect(colour, blur_px);
+  collect(colour, blur_px, every);
   find_shades(colour.ground_luma);
   for (Pixel& pixel : pixels_) mix(colour.mixing_in(stretches_[pixel.stretch].shade), pixel);
 }
@@ -142,7 +143,7 @@ double ColourFit::longest_sweep_px() const {
   return longest;
 }
 
-void ColourFit::collect(const ColourWindow& colour, double blur_px) {
+void ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
   // What turns fast shows no level near its ends: farther in and out it does.
   constexpr double kPerSweep = 0.3;
   const double sweep_px = longest_sweep_px();
@@ -150,7 +151,7 @@ void ColourFit::collect(const ColourWindow& colour, double blur_px) {
   for (const Contour& border : middle_.borders)
     for (std::size_t k = 0; k < border.size(); ++k)
       stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px), {}});
-  for (int y = 0; y < colour.planes.rows; ++y)
+  for (int y = 0; y < colour.planes.rows; y += every)
     for (int x = 0; x < colour.planes.cols; ++x) {
       const Eigen::Vector2d at_px = colour.place_of(x, y);
       const auto at = nearest(at_px, level_px + 0.5 * sweep_px);
@@ -201,7 +202,8 @@ void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
   const Contour& own = moment.borders[nearest.border];
   const Contour& other = moment.borders[1 - nearest.border];
   if (own.empty()) return;
-  const Contour::Place place = own.nearest_from(nearest.place.at, at_px);
+  const Contour::Place place =
+      &moment == &middle_ ? nearest.place : own.nearest_from(nearest.place.at, at_px);
   const OutlineSample& sample = own[place.at];
   const double swept_px = smear_.size() > 0 ? sample.motion.dot(smear_) * part : 0.0;
   const double inverse = 1.0 / std::sqrt(blur2_px2_ + swept_px * swept_px / 12.0);
@@ -429,8 +431,8 @@ std::vector<ColourEdge> ColourFit::edges(double reach_px) {
 }  // namespace
 
 std::vector<ColourEdge> find_colour_edges(const ColourWindow& colour, const ExposedOutline& outline,
-                                          double blur_px, double reach_px) {
-  return ColourFit(colour, outline, blur_px).edges(reach_px);
+                                          double blur_px, double reach_px, int every) {
+  return ColourFit(colour, outline, blur_px, every).edges(reach_px);
 }
 
 }  // namespace trochoid::tracking

@@ -4,6 +4,7 @@
 
 #include "colour_window.hpp"
 #include "edge_fit.hpp"
+#include "exposure.hpp"
 #include "outline_samples.hpp"
 
 namespace trochoid::tracking {
@@ -19,8 +20,7 @@ struct ColourEdge {
 /// An outline in the middle of the exposure, every few pixels, and what it does meanwhile.
 struct ExposedOutline {
   const std::vector<OutlineSample>& middle;
-  /// At the middles of equal parts of the exposure; empty: it moves by less than its blur.
-  std::vector<std::vector<OutlineSample>> moments;
+  const Moments& moments;         ///< empty: it hardly moves
   const PoseMotion::Step& smear;  ///< the body's motion from end to end; empty: not known
 };
 
@@ -32,10 +32,12 @@ struct ExposedOutline {
 /// is seen like the rest.
 /// @param blur_px of an edge of the luma picture.
 /// @param reach_px largest offset believed.
+/// @param every one row of so many is looked at.
 /// @returns stretches with an edge, one after the other along the rim, then along the bore; none if
 ///          too little is seen to tell two colours.
 [[nodiscard]] std::vector<ColourEdge> find_colour_edges(const ColourWindow& colour,
                                                         const ExposedOutline& outline,
-                                                        double blur_px, double reach_px);
+                                                        double blur_px, double reach_px,
+                                                        int every = 1);
 
 }  // namespace trochoid::tracking

@@ -13,17 +13,17 @@ bool is_bore(data::OutlinePoint::Edge edge) {
 Contour::Contour(const std::vector<OutlineSample>& outline, Of which) : outline_(&outline) {
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (!outline[i].silhouette || is_bore(outline[i].edge) != (which == Of::bore)) continue;
-    points_.push_back({i});
+    points_.push_back({i, outline[i].image_px});
     middle_ += outline[i].image_px;
   }
   if (empty()) return;
   middle_ /= static_cast<double>(points_.size());
-  nearest_px_ = farthest_px_ = (outline[points_.front().sample].image_px - middle_).norm();
+  nearest_px_ = farthest_px_ = (points_.front().image_px - middle_).norm();
   for (Point& point : points_) {
-    const Eigen::Vector2d& p = outline[point.sample].image_px;
-    point.angle_rad = angle_of(p);
-    nearest_px_ = std::min(nearest_px_, (p - middle_).norm());
-    farthest_px_ = std::max(farthest_px_, (p - middle_).norm());
+    const double radius_px = (point.image_px - middle_).norm();
+    point.angle_rad = angle_of(point.image_px);
+    nearest_px_ = std::min(nearest_px_, radius_px);
+    farthest_px_ = std::max(farthest_px_, radius_px);
   }
   std::sort(points_.begin(), points_.end(),
             [](const Point& a, const Point& b) { return a.angle_rad < b.angle_rad; });
@@ -43,12 +43,13 @@ Contour::Place Contour::nearest(const Eigen::Vector2d& p) const {
 }
 
 Contour::Place Contour::nearest_from(std::size_t at, const Eigen::Vector2d& p) const {
-  const auto square_to = [&](std::size_t k) { return ((*this)[k].image_px - p).squaredNorm(); };
+  const auto square_to = [&](std::size_t k) { return (points_[k].image_px - p).squaredNorm(); };
+  const std::size_t last = size() - 1;
   at %= size();
   double least = square_to(at);
-  for (const std::size_t step : {std::size_t{1}, size() - 1})
+  for (const bool ahead : {true, false})
     while (true) {
-      const std::size_t next = (at + step) % size();
+      const std::size_t next = ahead ? (at == last ? 0 : at + 1) : (at == 0 ? last : at - 1);
       const double there = square_to(next);
       if (there >= least) break;
       at = next, least = there;

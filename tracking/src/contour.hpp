@@ -41,6 +41,7 @@ class Contour {
   static constexpr std::size_t kFewest = 8;
   struct Point {
     std::size_t sample;
+    Eigen::Vector2d image_px;
     double angle_rad = 0.0;         // about the middle
     double curvature_per_px = 0.0;  // > 0 where the body is convex
   };

@@ -262,7 +262,7 @@ struct Round {
   std::vector<OutlineSample> smooth;   // exact: what the outline interpolates
   std::vector<Crossings> crossings;    // exact: of the outline
   std::vector<Sweep> sweeps;           // during the exposure; empty: hardly any
-  int parts = 0;                       // of the exposure, in these
+  Moments moments;                     // of the exposure, of these
   std::vector<bool> elsewhere;         // of the outline: the rim, by its colours
   std::vector<StretchProfile> looks;   // exact: luma
   std::vector<size_t> places;          // of the looks along the outline
@@ -320,6 +320,11 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool last, 
   return fit.wider_px;
 }
 
+// One row of pixels of so many is looked at.
+int rows_of_step(double step_px) {
+  return std::max(1, static_cast<int>(std::lround(step_px)));
+}
+
 // What coding leaves of colours is off by half a level or so, alike for a few neighbours.
 double coded_px(const ColourEdge& found) {
   constexpr double kOffLevels = 0.5, kMostPx = 1.0;
@@ -328,18 +333,13 @@ double coded_px(const ColourEdge& found) {
 }
 
 // Those of the silhouette in the colour planes.
-void collect_colours(const Scenery& scenery, const data::Pose<>& pose, const Search& search,
-                     Round& round, Refined& out) {
-  ExposedOutline outline{round.smooth, {}, scenery.smear};
-  for (int k = 0; k < round.parts; ++k) {
-    const data::Pose<> moment = scenery.exposure->at(pose, (k + 0.5) / round.parts - 0.5);
-    outline.moments.push_back(outline_samples(scenery.body, scenery.motion.settled(moment),
-                                              scenery.camera, scenery.motion, kSmoothPx));
-  }
+void collect_colours(const Scenery& scenery, const Search& search, double step_px, Round& round,
+                     Refined& out) {
+  const ExposedOutline outline{round.smooth, round.moments, scenery.smear};
   const double reach_px = search.reach_px + std::sqrt(kHalfSizeBlur2Px2);
   round.seen_in_colour.assign(round.smooth.size(), 0.0);
-  for (const ColourEdge& found :
-       find_colour_edges(scenery.colour, outline, search.blur_px, reach_px)) {
+  for (const ColourEdge& found : find_colour_edges(scenery.colour, outline, search.blur_px,
+                                                   reach_px, rows_of_step(step_px))) {
     const OutlineSample& sample = round.smooth[found.sample];
     EdgeEquation equation = equation_of(sample, found.edge, true);
     equation.motion = found.motion;
@@ -355,20 +355,21 @@ void collect_colours(const Scenery& scenery, const data::Pose<>& pose, const Sea
 void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round) {
   constexpr double kLeastPx = 1.5, kPartPx = 1.2;
   round.sweeps.clear();
-  round.parts = 0;
+  round.moments.clear();
   if (!scenery.exposure) return;
   double longest = 0.0;
   for (const OutlineSample& sample : round.outline)
     longest = std::max(longest, std::abs(sample.motion.dot(scenery.smear)));
   if (longest < kLeastPx) return;
-  round.parts = std::min(Sweep::kMost, static_cast<int>(std::ceil(longest / kPartPx)));
-  round.sweeps = sweeps_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose,
-                           round.outline, round.parts);
+  const int parts = std::min(Sweep::kMost, static_cast<int>(std::ceil(longest / kPartPx)));
+  round.moments =
+      moments_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose, parts);
+  round.sweeps = sweeps_of(round.moments, round.outline);
 }
 
 // From the sparse outline to where it crosses rows and columns of pixels.
 void cross_outline(double step_px, Round& round) {
-  const int every = std::max(1, static_cast<int>(std::lround(step_px)));
+  const int every = rows_of_step(step_px);
   round.outline = cross_pixels(round.outline, every, round.crossings);
   if (round.sweeps.empty()) return;
   std::vector<Sweep> sweeps;
@@ -465,7 +466,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
       continue;
     }
     if (colour)
-      collect_colours(scenery, pose, search, round, out);
+      collect_colours(scenery, search, step_px, round, out);
     else
       out.wider_px = collect_exactly(scenery, search, last, round, out);
   }
