@@ -31,7 +31,8 @@ TEST(Exposure, ASlidingDiscSweepsByItsWayAlongTheNormal) {
   const ExposureMotion exposure(before, middle, 0.5);
   const auto outline = outline_samples(body, middle, camera, motion, 2.0);
   constexpr int kParts = 6;
-  const auto sweeps = sweeps_of(body, camera, motion, exposure, middle, outline, kParts);
+  const auto sweeps =
+      sweeps_of(moments_of(body, camera, motion, exposure, middle, kParts), outline);
   int known = 0;
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (sweeps[i].count == 0) continue;

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 
 #include "edge_profile.hpp"
@@ -11,27 +12,64 @@ namespace trochoid::tracking {
 /// Blur that half-size colour planes, brought back to full size, have beyond that of the luma
 /// [px^2]: pixels twice as wide, and the triangle between them.
 inline constexpr double kColourBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0 + 4.0 / 6.0;
+/// The same of the half-size planes as they are.
+inline constexpr double kHalfSizeBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0;
+
+/// How much of the way from the colour of the surroundings to that of the body a pixel shows that
+/// the body covers in part: light mixes linearly, levels of colour do not, least of all beside
+/// something much darker.
+class ColourMixing {
+ public:
+  /// As light.
+  ColourMixing();
+  /// @param shown at shares 0, 1 / kParts .. 1 of the body; 0 at the first and 1 at the last.
+  static constexpr int kParts = 32;
+  explicit ColourMixing(const std::array<double, kParts + 1>& shown) : shown_(shown) {}
+  [[nodiscard]] double shown(double covered) const;
+  /// Derivative of that.
+  [[nodiscard]] double slope(double covered) const;
+
+ private:
+  [[nodiscard]] static int part_of(double covered);
+  std::array<double, kParts + 1> shown_;
+};
 
 /// A picture of the colour difference in which a body stands out of its surroundings most, about 0
 /// on these and about `body` on it; empty where there is none.
 struct ColourWindow {
-  LightWindow levels;
+  LightWindow levels;        ///< of full size
+  cv::Mat planes;            ///< as they are, CV_32FC1
+  cv::Mat luma;              ///< as large as these, CV_32FC1
+  cv::Point corner{};        ///< their first pixel, in pixels of the planes
+  double neutral = 0.0;      ///< level of what has no colour
+  double ground_luma = 1.0;  ///< of the surroundings
+  /// Where the surroundings are as bright as usual and where they lie in the shade, darker by these
+  /// factors.
+  static constexpr std::array<double, 5> kShades{1.25, 1.0, 0.75, 0.5, 0.3};
+  std::array<ColourMixing, kShades.size()> mixings{};
   double body = 0.0;
   bool plain = false;  ///< so much apart that a few pixels tell the body from its surroundings
 
   [[nodiscard]] bool empty() const { return levels.empty(); }
+  [[nodiscard]] const ColourMixing& mixing_in(double shade) const;
+  /// Where a pixel of the planes is in the picture: amid the four it belongs to.
+  [[nodiscard]] Eigen::Vector2d place_of(int x, int y) const {
+    return {2.0 * (corner.x + x) + 0.5, 2.0 * (corner.y + y) + 0.5};
+  }
   /// The same blurred by a Gaussian.
   [[nodiscard]] ColourWindow blurred(double sigma_px) const {
-    return {levels.blurred(sigma_px), body, plain};
+    ColourWindow out = *this;
+    out.levels = levels.blurred(sigma_px);
+    return out;
   }
 };
 
 /// That of the body at `pose`, of full size. Shadows hardly change it, so it shows rims that the
 /// luma loses. Empty where the colours are too much alike, or without chroma. Taken to lie in the
 /// middle of the four pixels it belongs to; other codings shift it by half a pixel.
-[[nodiscard]] ColourWindow colour_window(const cv::Mat& chroma, const cv::Rect& window,
-                                         const data::Body& body, const data::Camera& camera,
-                                         const data::Pose<>& pose);
+[[nodiscard]] ColourWindow colour_window(const cv::Mat& luma, const cv::Mat& chroma,
+                                         const cv::Rect& window, const data::Body& body,
+                                         const data::Camera& camera, const data::Pose<>& pose);
 
 /// Colour of a surface in any light: by how much cb and cr differ from neutral, over the luma.
 struct Tint {

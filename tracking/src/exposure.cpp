@@ -27,13 +27,12 @@ int family_of(Edge edge, bool silhouette) {
 struct Moved {
   static constexpr double kStepPx = 1.5;
   static constexpr double kApartPx = 2.0 * kStepPx;  // farther from each other than neighbours are
-  std::vector<data::OutlinePoint> points;
+  const std::vector<OutlineSample>& points;
   std::vector<int> families;
   std::vector<size_t> ends;  // of the arc of one family each point is on
 
-  Moved(const data::Body& body, const data::Camera& camera, const Pose& pose)
-      : points(data::visible_outline(body, pose, camera, kStepPx)), ends(points.size()) {
-    for (const data::OutlinePoint& point : points)
+  explicit Moved(const std::vector<OutlineSample>& outline) : points(outline), ends(points.size()) {
+    for (const OutlineSample& point : points)
       families.push_back(family_of(point.edge, point.silhouette));
     for (size_t i = points.size(); i-- > 0;) {
       const bool goes_on = i + 1 < points.size() && families[i + 1] == families[i] &&
@@ -47,8 +46,7 @@ constexpr double kLeastCosine = 0.5;  // between the normals of an outline and o
 
 // The point of an outline nearest to the normal of a sample, from one nearby along its arc; nothing
 // if that leads to an end of the arc or not so near as between two points.
-const data::OutlinePoint* nearest_from(size_t near, const Moved& outline,
-                                       const OutlineSample& sample) {
+const OutlineSample* nearest_from(size_t near, const Moved& outline, const OutlineSample& sample) {
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   const int family = family_of(sample.edge, sample.silhouette);
   if (near >= outline.points.size() || outline.families[near] != family) return nullptr;
@@ -66,24 +64,24 @@ const data::OutlinePoint* nearest_from(size_t near, const Moved& outline,
       if (there >= least) break;
       i = next, least = there;
     }
-  const data::OutlinePoint& point = outline.points[i];
+  const OutlineSample& point = outline.points[i];
   const bool crosses = point.normal_px.dot(sample.normal_px) >= kLeastCosine;
   return crosses && least < Moved::kStepPx ? &point : nullptr;
 }
 
 // The same from anywhere.
-const data::OutlinePoint* nearest_of_all(const Moved& outline, const OutlineSample& sample) {
+const OutlineSample* nearest_of_all(const Moved& outline, const OutlineSample& sample) {
   constexpr double kFarthestPx = 3.0;
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   const int family = family_of(sample.edge, sample.silhouette);
-  const data::OutlinePoint* nearest = nullptr;
+  const OutlineSample* nearest = nullptr;
   double least = kFarthestPx;
   for (size_t i = 0; i < outline.points.size();) {
     if (outline.families[i] != family) {
       i = outline.ends[i];
       continue;
     }
-    const data::OutlinePoint& point = outline.points[i];
+    const OutlineSample& point = outline.points[i];
     const double aside = std::abs(along.dot(point.image_px - sample.image_px));
     if (aside >= least) {
       // Along its arc no sooner than that many points on can it be nearer.
@@ -103,7 +101,7 @@ const data::OutlinePoint* nearest_of_all(const Moved& outline, const OutlineSamp
 // tangent there. Nothing if it does not cross it on this side or does so at a grazing angle.
 // @param near where the sample before crossed it; then where this one does.
 std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sample, size_t& near) {
-  const data::OutlinePoint* nearest = nearest_from(near, outline, sample);
+  const OutlineSample* nearest = nearest_from(near, outline, sample);
   if (nearest == nullptr) nearest = nearest_of_all(outline, sample);
   if (nearest == nullptr) return std::nullopt;
   near = static_cast<size_t>(nearest - outline.points.data());
@@ -165,25 +163,32 @@ Sweep between(const Sweep& from, const Sweep& to, double part) {
   return sweep;
 }
 
-std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
-                             const PoseMotion& motion, const ExposureMotion& exposure,
-                             const Pose& middle, const std::vector<OutlineSample>& outline,
-                             int parts) {
-  parts = std::clamp(parts, 1, Sweep::kMost);
-  std::vector<Sweep> sweeps(outline.size());
-  std::vector<bool> lost(outline.size(), false);
+Moments moments_of(const data::Body& body, const data::Camera& camera, const PoseMotion& motion,
+                   const ExposureMotion& exposure, const Pose& middle, int parts) {
+  Moments moments;
   for (int k = 0; k < parts; ++k) {
     const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));
-    const Moved moved(body, camera, pose);
+    moments.push_back(outline_samples(body, pose, camera, motion, Moved::kStepPx));
+  }
+  return moments;
+}
+
+std::vector<Sweep> sweeps_of(const Moments& moments, const std::vector<OutlineSample>& outline) {
+  const size_t parts = std::min<size_t>(moments.size(), Sweep::kMost);
+  std::vector<Sweep> sweeps(outline.size());
+  std::vector<bool> lost(outline.size(), false);
+  for (size_t k = 0; k < parts; ++k) {
+    const Moved moved(moments[k]);
     size_t near = moved.points.size();
     for (size_t i = 0; i < outline.size(); ++i) {
       if (lost[i]) continue;
       const auto crossing = crossing_px(moved, outline[i], near);
       lost[i] = !crossing;
-      if (crossing) sweeps[i].shift_px[static_cast<size_t>(k)] = *crossing;
+      if (crossing) sweeps[i].shift_px[k] = *crossing;
     }
   }
-  for (size_t i = 0; i < outline.size(); ++i) sweeps[i].count = lost[i] ? 0 : parts;
+  for (size_t i = 0; i < outline.size(); ++i)
+    sweeps[i].count = lost[i] ? 0 : static_cast<int>(parts);
   return sweeps;
 }
 

@@ -41,11 +41,15 @@ struct Sweep {
 /// Of a place between those of two sweeps, `part` of the way.
 [[nodiscard]] Sweep between(const Sweep& from, const Sweep& to, double part);
 
-/// Sweeps of all samples of an outline about `middle`; each within `parts` parts, at most
-/// Sweep::kMost.
-[[nodiscard]] std::vector<Sweep> sweeps_of(const data::Body& body, const data::Camera& camera,
-                                           const PoseMotion& motion, const ExposureMotion& exposure,
-                                           const data::Pose<>& middle,
-                                           const std::vector<OutlineSample>& outline, int parts);
+/// Outlines at the middles of so many equal parts of the exposure.
+using Moments = std::vector<std::vector<OutlineSample>>;
+[[nodiscard]] Moments moments_of(const data::Body& body, const data::Camera& camera,
+                                 const PoseMotion& motion, const ExposureMotion& exposure,
+                                 const data::Pose<>& middle, int parts);
+
+/// Sweeps of all samples of the outline in the middle, each within as many parts as there are
+/// moments, at most Sweep::kMost.
+[[nodiscard]] std::vector<Sweep> sweeps_of(const Moments& moments,
+                                           const std::vector<OutlineSample>& outline);
 
 }  // namespace trochoid::tracking

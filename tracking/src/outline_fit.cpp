@@ -398,8 +398,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       body_, camera_, motion, LightWindow(evidence.luma, window, camera_.transfer),
       evidence.background.empty() ? LightWindow()
                                   : LightWindow(evidence.background, window, camera_.transfer),
-      colour_window(evidence.chroma, window, body_, camera_, starts.front()), most_looks_,
-      evidence.visit,
+      colour_window(evidence.luma, evidence.chroma, window, body_, camera_, starts.front()),
+      most_looks_, evidence.visit,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
+#include "colour_edges.hpp"
 #include "colour_window.hpp"
+#include "contour.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -142,20 +145,19 @@ double unknown_share(const ProfileEdge& edge) {
 
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, levels beyond the range of the picture.
-double model_sd_px(const StretchProfile& look, const Surroundings& around, bool silhouette) {
+double model_sd_px(const ProfileEdge& edge, bool clipped, const Surroundings& around,
+                   bool silhouette) {
   constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
   constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
-  const double shape_px =
-      silhouette ? unknown_share(look.edge) * kShapePx / tone_of(look.edge) : kOwnShapePx;
+  const double shape_px = silhouette ? unknown_share(edge) * kShapePx / tone_of(edge) : kOwnShapePx;
   const double steep_px = std::min(kMostPx, kUnderBlurPx * around.steepness);
-  const double clipped_px = look.profile.clipped() ? kClippedPx : 0.0;
+  const double clipped_px = clipped ? kClippedPx : 0.0;
   // An edge wider than the picture's blur is not that of the body alone.
   constexpr double kPerWiderPx = 1.0;
   const double wide_px = std::min(kMostPx, kPerWiderPx * around.wider_px);
   return std::sqrt(wide_px * wide_px + steep_px * steep_px + shape_px * shape_px +
-                   clipped_px * clipped_px +
-                   kAlongShare * kAlongShare * look.edge.shading_variance_px2);
+                   clipped_px * clipped_px + kAlongShare * kAlongShare * edge.shading_variance_px2);
 }
 
 // By how much an edge is seen too far out beside the shadow of a body darker than the floor [px].
@@ -206,9 +208,8 @@ double narrow_direction_rad(const data::Camera& camera, const data::Pose<>& pose
   return std::atan2(along.y(), along.x());
 }
 
-EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look, bool colour) {
-  const ProfileEdge& edge = look.edge;
-  const bool bore = sample.edge == Edge::upper_bore || sample.edge == Edge::lower_bore;
+EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, bool colour) {
+  const bool bore = is_bore(sample.edge);
   EdgeEquation e;
   e.motion = sample.motion.transpose();
   e.swell = bore ? -1.0 : 1.0;
@@ -221,14 +222,12 @@ EdgeEquation equation_of(const OutlineSample& sample, const StretchProfile& look
     e.lower_px = std::hypot(unknown_share(edge) * kLowerPx, std::sqrt(edge.strip_variance_px2));
   e.group = colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
   e.colour = colour;
-  e.direction_rad = look.direction_rad;
+  e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   e.normal = sample.normal_px;
   e.offset_px = edge.offset_px;
-  // Colour planes of half the size hold fewer independent values, along the profile and across.
-  const double shared = colour ? 1.7 : 1.0;
-  e.variance_px2 = shared * (edge.noise_variance_px2 + edge.shading_variance_px2);
+  e.variance_px2 = edge.noise_variance_px2 + edge.shading_variance_px2;
   e.arc_px = sample.arc_px;
-  e.curve = static_cast<int>(sample.edge) + (colour ? 8 : 0);
+  e.curve = colour ? 8 + (bore ? 1 : 0) : static_cast<int>(sample.edge);
   return e;
 }
 
@@ -255,14 +254,19 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
   out.equations.push_back(equation);
 }
 
+constexpr double kSmoothPx = 2.0;  // closer samples of an outline are as well interpolated
+
 // What one round looked at.
 struct Round {
   std::vector<OutlineSample> outline;
-  std::vector<Crossings> crossings;                  // exact: of the outline
-  std::vector<Sweep> sweeps;                         // during the exposure; empty: hardly any
-  std::vector<bool> elsewhere;                       // of the outline: the rim, by its colours
-  std::array<std::vector<StretchProfile>, 2> looks;  // exact: luma and colour
-  std::array<std::vector<size_t>, 2> places;         // of the looks along the outline
+  std::vector<OutlineSample> smooth;   // exact: what the outline interpolates
+  std::vector<Crossings> crossings;    // exact: of the outline
+  std::vector<Sweep> sweeps;           // during the exposure; empty: hardly any
+  Moments moments;                     // of the exposure, of these
+  std::vector<bool> elsewhere;         // of the outline: the rim, by its colours
+  std::vector<StretchProfile> looks;   // exact: luma
+  std::vector<size_t> places;          // of the looks along the outline
+  std::vector<double> seen_in_colour;  // exact: 0..1, of the smooth outline
 
   [[nodiscard]] const Sweep* sweep(size_t i) const { return sweeps.empty() ? nullptr : &sweeps[i]; }
   // An edge of a shadow or a print may be here, the rim is not.
@@ -278,24 +282,23 @@ void collect_roughly(const Scenery& scenery, const Round& round, const Search& s
     if (all[i].silhouette && (colour || round.may_show_rim(i)) &&
         look_at(scenery, all[i], round.sweep(i), nullptr, search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
-      keep(all[i], look.edge, equation_of(all[i], look, colour), out);
+      keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
       out.places.push_back(i);
     }
 }
 
-// All edges, also those between two surfaces of the body; returns what the blur should grow by.
-// Light and blur of rounds before the last are not weighed by the noise of samples.
-double collect_exactly(const Scenery& scenery, const Search& search, bool colour, bool last,
-                       Round& round, Refined& out) {
+// All edges of the luma, also those between two surfaces of the body; returns what the blur should
+// grow by. Light and blur of rounds before the last are not weighed by the noise of samples.
+double collect_exactly(const Scenery& scenery, const Search& search, bool last, Round& round,
+                       Refined& out) {
   const std::vector<OutlineSample>& all = round.outline;
-  std::vector<StretchProfile>& looks = round.looks[colour ? 1 : 0];
-  std::vector<size_t>& places = round.places[colour ? 1 : 0];
+  std::vector<StretchProfile>& looks = round.looks;
+  std::vector<size_t>& places = round.places;
   places.clear();
   looks.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i)
-    if ((colour ? all[i].silhouette : round.may_show_rim(i)) &&
-        look_at(scenery, all[i], round.sweep(i), &round.crossings[i], search, colour,
-                looks[places.size()]))
+    if (round.may_show_rim(i) && look_at(scenery, all[i], round.sweep(i), &round.crossings[i],
+                                         search, false, looks[places.size()]))
       places.push_back(i);
   looks.resize(places.size());
   static const ShadingMemory kNothing;
@@ -305,34 +308,68 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool colour
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
-    EdgeEquation equation = equation_of(sample, looks[i], colour);
-    equation.model_px = model_sd_px(looks[i], around[i], sample.silhouette);
-    if (sample.silhouette && !colour)
+    EdgeEquation equation = equation_of(sample, looks[i].edge, false);
+    equation.model_px =
+        model_sd_px(looks[i].edge, looks[i].profile.clipped(), around[i], sample.silhouette);
+    if (sample.silhouette)
       allow_for_shadow(shadow_px(around[i], looks[i].edge, sample.height_px), equation);
     keep(sample, looks[i].edge, equation, out);
     out.shading.push_back(fit.shading[i]);
     out.blurs_px.push_back(looks[i].blur_px);
-    out.places.push_back(places[i]);
   }
   return fit.wider_px;
+}
+
+// One row of pixels of so many is looked at.
+int rows_of_step(double step_px) {
+  return std::max(1, static_cast<int>(std::lround(step_px)));
+}
+
+// What coding leaves of colours is off by half a level or so, alike for a few neighbours.
+double coded_px(const ColourEdge& found) {
+  constexpr double kOffLevels = 0.5, kMostPx = 1.0;
+  const double step_px = std::sqrt(2.0 * std::numbers::pi) * found.blur_px;
+  return std::min(kMostPx, kOffLevels * step_px / std::max(1.0, std::abs(found.edge.contrast)));
+}
+
+// Those of the silhouette in the colour planes.
+void collect_colours(const Scenery& scenery, const Search& search, double step_px, Round& round,
+                     Refined& out) {
+  const ExposedOutline outline{round.smooth, round.moments, scenery.smear};
+  const double reach_px = search.reach_px + std::sqrt(kHalfSizeBlur2Px2);
+  round.seen_in_colour.assign(round.smooth.size(), 0.0);
+  for (const ColourEdge& found : find_colour_edges(scenery.colour, outline, search.blur_px,
+                                                   reach_px, rows_of_step(step_px))) {
+    const OutlineSample& sample = round.smooth[found.sample];
+    EdgeEquation equation = equation_of(sample, found.edge, true);
+    equation.motion = found.motion;
+    equation.model_px = std::hypot(model_sd_px(found.edge, false, {}, true), coded_px(found));
+    keep(sample, found.edge, equation, out);
+    out.shading.emplace_back();
+    out.blurs_px.push_back(found.blur_px);
+    round.seen_in_colour[found.sample] = certainty(found.edge, found.edge.offset_px, kSeenWithinPx);
+  }
 }
 
 // Sweeps longer than the blur are ramps; shorter ones only widen the edges.
 void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round) {
   constexpr double kLeastPx = 1.5, kPartPx = 1.2;
   round.sweeps.clear();
+  round.moments.clear();
   if (!scenery.exposure) return;
   double longest = 0.0;
   for (const OutlineSample& sample : round.outline)
     longest = std::max(longest, std::abs(sample.motion.dot(scenery.smear)));
   if (longest < kLeastPx) return;
-  round.sweeps = sweeps_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose,
-                           round.outline, static_cast<int>(std::ceil(longest / kPartPx)));
+  const int parts = std::min(Sweep::kMost, static_cast<int>(std::ceil(longest / kPartPx)));
+  round.moments =
+      moments_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose, parts);
+  round.sweeps = sweeps_of(round.moments, round.outline);
 }
 
 // From the sparse outline to where it crosses rows and columns of pixels.
 void cross_outline(double step_px, Round& round) {
-  const int every = std::max(1, static_cast<int>(std::lround(step_px)));
+  const int every = rows_of_step(step_px);
   round.outline = cross_pixels(round.outline, every, round.crossings);
   if (round.sweeps.empty()) return;
   std::vector<Sweep> sweeps;
@@ -405,11 +442,13 @@ void find_rim_elsewhere(const Scenery& scenery, const Search& search, Round& rou
 bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& search, bool last,
              Round& round, Refined& out) {
   const double step_px = last ? search.step_px : search.first_step_px;
-  constexpr double kSmoothPx = 2.0;  // closer samples are as well interpolated
   round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion,
                                   search.exact ? kSmoothPx : step_px);
   find_sweeps(scenery, pose, round);
-  if (search.exact) cross_outline(step_px, round);
+  if (search.exact) {
+    round.smooth = round.outline;
+    cross_outline(step_px, round);
+  }
   find_rim_elsewhere(scenery, search, round);
   out.outline_px = 0.0;
   for (const OutlineSample& sample : round.outline)
@@ -426,8 +465,10 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
       collect_roughly(scenery, round, search, colour, out);
       continue;
     }
-    const double wider = collect_exactly(scenery, search, colour, last, round, out);
-    if (!colour) out.wider_px = wider;
+    if (colour)
+      collect_colours(scenery, search, step_px, round, out);
+    else
+      out.wider_px = collect_exactly(scenery, search, last, round, out);
   }
   return !round.outline.empty();
 }
@@ -441,16 +482,20 @@ double seen_px(const Search& search, const Round& round, const Refined& refined)
   };
   if (!search.exact)
     for (size_t i = 0; i < refined.edges.size(); ++i) count(refined.places[i], refined.edges[i]);
-  // A plain step or nothing: slopes can make an edge of any penumbra.
-  for (size_t channel = 0; search.exact && channel < 2; ++channel)
-    for (size_t i = 0; i < round.places[channel].size(); ++i) {
-      const size_t place = round.places[channel][i];
-      const StretchProfile& look = round.looks[channel][i];
-      ProfileEdge plain;
-      if (look.found && round.outline[place].silhouette && seen[place] < 1.0 &&
-          fit_edge(look.profile, look.blur_px, look.plate, kSeenReachPx, plain))
-        count(place, plain);
+  if (search.exact && !round.seen_in_colour.empty())
+    for (size_t i = 0; i < seen.size(); ++i) {
+      const Crossing& at = round.crossings[i].at.front();
+      seen[i] = round.seen_in_colour[at.part < 0.5 ? at.before : at.before + 1];
     }
+  // A plain step or nothing: slopes can make an edge of any penumbra.
+  for (size_t i = 0; search.exact && i < round.places.size(); ++i) {
+    const size_t place = round.places[i];
+    const StretchProfile& look = round.looks[i];
+    ProfileEdge plain;
+    if (look.found && round.outline[place].silhouette && seen[place] < 1.0 &&
+        fit_edge(look.profile, look.blur_px, look.plate, kSeenReachPx, plain))
+      count(place, plain);
+  }
   double sum = 0.0;
   for (size_t i = 0; i < seen.size(); ++i) sum += seen[i] * round.outline[i].arc_px;
   return sum;

@@ -67,7 +67,7 @@ struct Refined {
   std::vector<EdgeEquation> equations;
   std::vector<ShadingEvidence> shading;  ///< exact: beside each edge
   std::vector<double> blurs_px;          ///< exact: of each edge
-  std::vector<size_t> places;            ///< along the outline of all samples
+  std::vector<size_t> places;            ///< not exact: along the outline of all samples
   double outline_px = 0.0;               ///< length of the predicted silhouette
   double seen_px = 0.0;                  ///< of it, with an edge exactly there
   double covered = 0.0;                  ///< share of the predicted outline with an accepted edge

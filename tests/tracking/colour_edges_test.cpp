@@ -1,0 +1,247 @@
+#include "colour_edges.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "contour.hpp"
+#include "drawn_clip.hpp"
+#include "trochoid/tracking/outline_fit.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Rgb = std::array<double, 3>;  // levels 0..255
+
+double light_of_level(double level) {
+  const double v = level / 255.0;
+  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+}
+
+double level_of_light(double light) {
+  return 255.0 * (light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055);
+}
+
+struct Photograph {
+  cv::Mat luma, chroma;
+};
+
+// A body on its floor as a camera sees them: light mixes in the lens and on the sensor, then gets
+// the sRGB curve, luma and chroma by BT.601, chroma as the mean of four pixels.
+// @param covered share of a point that the body covers; @param floor its colour at a point.
+Photograph photographed(const cv::Size& size, const Rgb& body,
+                        const std::function<Rgb(double, double)>& floor,
+                        const std::function<double(double, double)>& covered, double noise = 0.5) {
+  constexpr int kFine = 4;
+  constexpr double kLensPx = 0.5;
+  std::array<cv::Mat, 3> levels;
+  for (std::size_t c = 0; c < 3; ++c) {
+    cv::Mat fine(size.height * kFine, size.width * kFine, CV_64F);
+    for (int y = 0; y < fine.rows; ++y)
+      for (int x = 0; x < fine.cols; ++x) {
+        const double px = (x + 0.5) / kFine - 0.5, py = (y + 0.5) / kFine - 0.5;
+        const double share = covered(px, py);
+        fine.at<double>(y, x) =
+            share * light_of_level(body[c]) + (1.0 - share) * light_of_level(floor(px, py)[c]);
+      }
+    cv::GaussianBlur(fine, fine, {}, kLensPx * kFine);
+    cv::resize(fine, levels[c], size, 0.0, 0.0, cv::INTER_AREA);
+    for (double& v : cv::Mat_<double>(levels[c])) v = level_of_light(v);
+  }
+  const cv::Mat luma = 0.299 * levels[0] + 0.587 * levels[1] + 0.114 * levels[2];
+  cv::Mat cb = (levels[2] - luma) / 1.772 + 128.0, cr = (levels[0] - luma) / 1.402 + 128.0;
+  for (cv::Mat* plane : {&cb, &cr}) cv::resize(*plane, *plane, size / 2, 0.0, 0.0, cv::INTER_AREA);
+  std::mt19937 random(21);
+  Photograph out{developed(luma, noise, random), {}};
+  cv::merge(std::vector<cv::Mat>{developed(cb, noise, random), developed(cr, noise, random)},
+            out.chroma);
+  return out;
+}
+
+struct ThinDisc {
+  data::Body body;
+  data::Camera camera = data::Camera::from_scale(160, 140, 1000.0);
+  ThinDisc() { body.radius_m = 0.036, body.thickness_m = 1e-4; }
+
+  [[nodiscard]] data::Pose<> at(const Eigen::Vector2d& centre_px, double theta_rad,
+                                double phi_rad = 0.0) const {
+    data::Pose<> pose;
+    pose.theta_rad = theta_rad, pose.phi_rad = phi_rad;
+    pose.centre_m = camera.table_from_image(
+        centre_px, data::height_on_floor_m(theta_rad, body.radius_m, body.half_thickness_m()));
+    return pose;
+  }
+};
+
+// In the picture y points down: precession turns the other way round.
+bool in_ellipse(double x, double y, double a, double b, double phi_rad) {
+  const double c = std::cos(phi_rad), s = -std::sin(phi_rad);
+  return std::hypot((c * x + s * y) / a, (-s * x + c * y) / b) < 1.0;
+}
+
+// As bright as its floor, brown on blue, and precessing by half a radian while the shutter is open:
+// its ends sweep over 18 px, farther than they are wide.
+TEST(ColourEdges, ADiscThatTurnsUnderTheOpenShutterIsMeasuredByWhatItCovers) {
+  constexpr double kTheta = 1.15, kTurned_rad = 0.5, kFraction = 0.5, kRadius_px = 36.0;
+  constexpr int kMoments = 41;
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const auto covered = [&](double x, double y) {
+    int inside = 0;
+    for (int k = 0; k < kMoments; ++k)
+      inside +=
+          in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
+                     kTurned_rad * ((k + 0.5) / kMoments - 0.5))
+              ? 1
+              : 0;
+    return static_cast<double>(inside) / kMoments;
+  };
+  const auto [luma, chroma] = photographed(
+      {160, 140}, {100.0, 86.0, 66.0},
+      [](double, double) -> Rgb {
+        return {76.0, 88.0, 118.0};
+      },
+      covered);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const Eigen::Vector2d off(1.0, -0.5);
+  const cv::Mat no_plate;
+  const auto seen = fitter.measure(
+      {.luma = luma,
+       .background = no_plate,
+       .detection = {},
+       .predicted = disc.at(centre + off, kTheta + 0.02, 0.02),
+       .attitude_known = true,
+       .previous = disc.at(centre + off, kTheta + 0.02, 0.02 - kTurned_rad / kFraction),
+       .exposure_fraction = kFraction,
+       .chroma = chroma});
+  ASSERT_TRUE(seen);
+  constexpr double kTolerance_px = 0.1;
+  EXPECT_NEAR(seen->centre_px.x(), centre.x(), kTolerance_px);
+  EXPECT_NEAR(seen->centre_px.y(), centre.y(), kTolerance_px);
+}
+
+// What the colour planes alone say of the centre of a disc predicted 0.4 px beside its place.
+Eigen::Vector2d centre_by_colour(const ThinDisc& disc, const Photograph& picture,
+                                 const Eigen::Vector2d& centre, double theta_rad) {
+  const PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const data::Pose<> predicted = disc.at(centre + Eigen::Vector2d(0.4, 0.0), theta_rad);
+  const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
+                                            disc.body, disc.camera, predicted);
+  const auto outline = outline_samples(disc.body, predicted, disc.camera, motion, 2.0);
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  constexpr double kBlurPx = 0.6, kReachPx = 3.0;
+  for (const ColourEdge& found :
+       find_colour_edges(colour, {outline, Moments(), PoseMotion::Step()}, kBlurPx, kReachPx)) {
+    const Eigen::Vector2d n = outline[found.sample].normal_px;
+    const Eigen::Vector3d row(n.x(), n.y(), 1.0);  // and of the size
+    const double weight = 1.0 / (found.edge.noise_variance_px2 + found.edge.shading_variance_px2);
+    normal += weight * row * row.transpose();
+    right += weight * found.edge.offset_px * row;
+  }
+  const Eigen::Vector3d answer = normal.ldlt().solve(right);
+  return centre + Eigen::Vector2d(0.4, 0.0) + answer.head<2>();
+}
+
+// Beside a disc lies its shadow: there the floor has less of its colour, as it has less light.
+TEST(ColourEdges, AFloorThatShowsLessColourInTheShadeDoesNotPullTheDisc) {
+  constexpr double kTheta = 0.3, kRadius_px = 36.0;
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const auto floor = [&](double x, double y) -> Rgb {
+    const double shade =
+        in_ellipse(x - centre.x() - 9.0, y - centre.y(), 34.0, 34.0, 0.0) ? 0.6 : 1.0;
+    return {shade * 120.0, shade * 150.0, shade * 215.0};
+  };
+  const auto covered = [&](double x, double y) {
+    return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
+                      0.0)
+               ? 1.0
+               : 0.0;
+  };
+  const Photograph picture = photographed({160, 140}, {150.0, 60.0, 40.0}, floor, covered);
+  constexpr double kTolerance_px = 0.12;
+  EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
+}
+
+// Glints that have no colour, on a tenth of the rim and all to one side.
+TEST(ColourEdges, GlintsOnOneSideAreOutliers) {
+  constexpr double kTheta = 0.3, kRadius_px = 36.0;
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const auto in_disc = [&](double x, double y) {
+    return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
+                      0.0);
+  };
+  Photograph picture = photographed(
+      {160, 140}, {150.0, 60.0, 40.0},
+      [](double, double) -> Rgb {
+        return {120.0, 150.0, 215.0};
+      },
+      [&](double x, double y) { return in_disc(x, y) ? 1.0 : 0.0; });
+  for (int y = 58; y < 82; y += 4)
+    for (int x = 108; x < 114; x += 2)
+      if (in_disc(x, y)) picture.chroma.at<cv::Vec2b>(y / 2, x / 2) = {128, 128};
+  constexpr double kTolerance_px = 0.08;
+  EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
+}
+
+// Black covers half of a pixel of orange: what is left of the light is coded as 0.735 of the level,
+// and of the colour as much.
+TEST(ColourMixing, HalfOfABrightColourBesideBlackIsMostOfIt) {
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const Photograph picture = photographed(
+      {160, 140}, {1.0, 1.0, 1.0},
+      [](double, double) -> Rgb {
+        return {230.0, 160.0, 90.0};
+      },
+      [&](double x, double y) {
+        return in_ellipse(x - centre.x(), y - centre.y(), 36.0, 36.0, 0.0) ? 1.0 : 0.0;
+      });
+  const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
+                                            disc.body, disc.camera, disc.at(centre, 0.0));
+  constexpr double kTolerance = 0.03;  // what sRGB is besides a power
+  EXPECT_NEAR(colour.mixing_in(1.0).shown(0.5), 1.0 - 0.735, kTolerance);
+  EXPECT_NEAR(colour.mixing_in(1.0).shown(0.0), 0.0, 1e-9);
+  EXPECT_NEAR(colour.mixing_in(1.0).shown(1.0), 1.0, 1e-9);
+}
+
+// A ring lying flat below the camera: its upper rim and, deeper in, the lower rim of its bore are
+// two circles about one centre.
+TEST(Contour, DistancesAreThoseFromTheCirclesOfARing) {
+  data::Body ring;
+  ring.kind = data::BodyKind::ring;
+  ring.radius_m = 0.036, ring.inner_radius_m = 0.026, ring.thickness_m = 0.004;
+  const auto camera = data::Camera::overhead(160, 140, 1000.0, 1.0);
+  const PoseMotion motion(ring, {data::SupportKind::flat, {}}, camera);
+  data::Pose<> pose;
+  const Eigen::Vector2d centre(79.5, 69.5);
+  pose.centre_m = camera.table_from_image(centre, 0.002);
+  const auto outline = outline_samples(ring, pose, camera, motion, 2.0);
+  const Contour rim(outline, Contour::Of::rim), bore(outline, Contour::Of::bore);
+  ASSERT_FALSE(rim.empty());
+  ASSERT_FALSE(bore.empty());
+  constexpr double kRim_px = 36.0 / (1.0 - 0.004), kBore_px = 26.0;
+  constexpr double kTolerance_px = 0.01;  // samples are 2 px apart: chords would be off by 0.02
+  for (const double angle_rad : {0.1, 1.3, 2.9, -2.0})
+    for (const double radius_px : {24.0, 31.0, 38.5}) {
+      const Eigen::Vector2d p =
+          centre + radius_px * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+      EXPECT_NEAR(rim.nearest(p).off_px, radius_px - kRim_px, kTolerance_px);
+      EXPECT_NEAR(bore.nearest(p).off_px, kBore_px - radius_px, kTolerance_px);
+      EXPECT_NEAR(rim.nearest_from(3, p).off_px, radius_px - kRim_px, kTolerance_px);
+      EXPECT_TRUE(rim.may_be_within(std::abs(radius_px - kRim_px) + 0.1, p));
+    }
+  EXPECT_FALSE(rim.may_be_within(5.0, centre));
+}
+
+}  // namespace
+}  // namespace trochoid::tracking

@@ -1,0 +1,438 @@
+#include "colour_edges.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "contour.hpp"
+#include "normal_table.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Edge = data::OutlinePoint::Edge;
+
+// A level by the direction of the outline's normal.
+constexpr int kHarmonics = 5;
+using Harmonics = Eigen::Matrix<double, kHarmonics, 1>;
+
+Harmonics harmonics_of(const Eigen::Vector2d& normal) {
+  const double c = normal.x(), s = normal.y();
+  return {1.0, c, s, c * c - s * s, 2.0 * c * s};
+}
+
+// The borders of the silhouette at one moment.
+struct Silhouette {
+  explicit Silhouette(const std::vector<OutlineSample>& outline)
+      : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)} {}
+  std::array<Contour, 2> borders;
+};
+
+enum Side { kInside, kOutside };
+
+// How much of a pixel the body covers, and by how much more if the border were 1 px farther out or
+// a parameter of the motion larger by one.
+struct Cover {
+  double covered = 0.0, density = 0.0;
+  PoseMotion::Step change{};
+};
+
+// Pixels of the colour planes are means of coded pixels of luma: halves towards the inside and the
+// outside of a border, half a pixel off the middle.
+constexpr std::array<double, 2> kHalvesPx{-0.5, 0.5};
+
+using Halves = std::array<Cover, kHalvesPx.size()>;
+
+// A pixel of the colour planes near one border.
+struct Pixel {
+  double value = 0.0, luma = 0.0;  // beyond what has no colour
+  Halves halves{};
+  double covered = 0.0, density = 0.0;  // as a share of the body's colour
+  PoseMotion::Step change{};
+  std::size_t stretch = 0;
+  bool wall = false;
+
+  // So far from the border that it shows a level.
+  [[nodiscard]] bool is_clear() const {
+    constexpr double kShare = 0.02;
+    return covered < kShare || covered > 1.0 - kShare;
+  }
+  [[nodiscard]] Side side() const { return covered > 0.5 ? kInside : kOutside; }
+};
+
+// Pixels about one sample of a border.
+struct Stretch {
+  std::size_t sample;
+  Harmonics harmonics;
+  std::vector<std::size_t> pixels;
+  double shade = 1.0;               // luma of the surroundings here over that of all around
+  std::array<double, 2> levels{};   // by those of the whole outline
+  std::array<double, 2> uneven2{};  // variance about these
+};
+
+class ColourFit {
+ public:
+  ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px, int every);
+  [[nodiscard]] std::vector<ColourEdge> edges(double reach_px);
+
+ private:
+  // Where a pixel is about the middle outline.
+  struct Nearest {
+    std::size_t border;
+    Contour::Place place;
+  };
+
+  void collect(const ColourWindow& colour, double blur_px, int every);
+  [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
+  [[nodiscard]] Pixel pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
+  void cover(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
+             Halves& halves) const;
+  void find_shades(double ground_luma);
+  [[nodiscard]] double longest_sweep_px() const;
+  [[nodiscard]] double parts() const {
+    return std::max<double>(1.0, static_cast<double>(moments_.size()));
+  }
+
+  template <class Use>
+  void over_neighbours(std::size_t reach, const Use& use);
+  static void mix(const ColourMixing& mixing, Pixel& pixel);
+
+  [[nodiscard]] double off_level(const Pixel& pixel) const;
+  void fit_levels(Side side);
+  bool find_noise(Side side);
+  bool find_levels();
+  void find_unevenness();
+  [[nodiscard]] std::optional<ColourEdge> edge_of(const Stretch& stretch) const;
+
+  const std::vector<OutlineSample>& outline_;
+  const PoseMotion::Step& smear_;
+  Silhouette middle_;
+  std::vector<Silhouette> moments_;
+  double body_;  // colour of the body, about
+  double blur2_px2_;
+  std::vector<Stretch> stretches_;
+  std::vector<Pixel> pixels_;
+  double wall_ = 0.0;              // by how much the wall differs from the face
+  std::array<double, 2> noise_{};  // sd of a pixel
+};
+
+ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px,
+                     int every)
+    : outline_(outline.middle),
+      smear_(outline.smear),
+      middle_(outline.middle),
+      body_(colour.body),
+      blur2_px2_(blur_px * blur_px) {
+  for (const auto& moment : outline.moments) moments_.emplace_back(moment);
+  collect(colour, blur_px, every);
+  find_shades(colour.ground_luma);
+  for (Pixel& pixel : pixels_) mix(colour.mixing_in(stretches_[pixel.stretch].shade), pixel);
+}
+
+double ColourFit::longest_sweep_px() const {
+  double longest = 0.0;
+  if (moments_.empty()) return longest;
+  for (const OutlineSample& sample : outline_)
+    longest = std::max(longest, std::abs(sample.motion.dot(smear_)));
+  return longest;
+}
+
+void ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
+  // What turns fast shows no level near its ends: farther in and out it does.
+  constexpr double kPerSweep = 0.3;
+  const double sweep_px = longest_sweep_px();
+  const double level_px = 2.5 + 5.0 * blur_px + kPerSweep * sweep_px;
+  for (const Contour& border : middle_.borders)
+    for (std::size_t k = 0; k < border.size(); ++k)
+      stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px), {}});
+  for (int y = 0; y < colour.planes.rows; y += every)
+    for (int x = 0; x < colour.planes.cols; ++x) {
+      const Eigen::Vector2d at_px = colour.place_of(x, y);
+      const auto at = nearest(at_px, level_px + 0.5 * sweep_px);
+      if (!at) continue;
+      Pixel pixel = pixel_at(at_px, *at);
+      constexpr double kNoEdge = 0.01;
+      const double density = pixel.halves.front().density + pixel.halves.back().density;
+      if (std::abs(at->place.off_px) > level_px && density < kNoEdge) continue;
+      pixel.value = static_cast<double>(colour.planes.at<float>(y, x)) - colour.neutral;
+      pixel.luma = static_cast<double>(colour.luma.at<float>(y, x));
+      stretches_[pixel.stretch].pixels.push_back(pixels_.size());
+      pixels_.push_back(std::move(pixel));
+    }
+}
+
+std::optional<ColourFit::Nearest> ColourFit::nearest(const Eigen::Vector2d& at_px,
+                                                     double far_px) const {
+  constexpr double kAsidePx = 2.0;  // farther, there is a gap in the border
+  std::optional<Nearest> best;
+  for (std::size_t k = 0; k < middle_.borders.size(); ++k) {
+    const Contour& border = middle_.borders[k];
+    if (border.empty() || !border.may_be_within(far_px, at_px)) continue;
+    const Contour::Place place = border.nearest(at_px);
+    if (!best || std::abs(place.off_px) < std::abs(best->place.off_px)) best = Nearest{k, place};
+  }
+  if (best && (std::abs(best->place.off_px) > far_px || best->place.aside_px > kAsidePx))
+    return std::nullopt;
+  return best;
+}
+
+Pixel ColourFit::pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const {
+  const OutlineSample& sample = middle_.borders[nearest.border][nearest.place.at];
+  Pixel pixel;
+  pixel.stretch = (nearest.border == 0 ? 0 : middle_.borders[0].size()) + nearest.place.at;
+  const bool of_far_face = sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore;
+  pixel.wall = of_far_face && -nearest.place.off_px < sample.inside_px;
+  pixel.halves.fill({0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
+  if (moments_.empty()) cover(middle_, at_px, nearest, pixel.halves);
+  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, pixel.halves);
+  return pixel;
+}
+
+// Adds what one part of the exposure says.
+void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
+                      const Nearest& nearest, Halves& halves) const {
+  const NormalTable& table = NormalTable::instance();
+  const double part = 1.0 / parts();
+  const Contour& own = moment.borders[nearest.border];
+  const Contour& other = moment.borders[1 - nearest.border];
+  if (own.empty()) return;
+  const Contour::Place place =
+      &moment == &middle_ ? nearest.place : own.nearest_from(nearest.place.at, at_px);
+  const OutlineSample& sample = own[place.at];
+  const double swept_px = smear_.size() > 0 ? sample.motion.dot(smear_) * part : 0.0;
+  const double inverse = 1.0 / std::sqrt(blur2_px2_ + swept_px * swept_px / 12.0);
+  const double beside_other =
+      other.empty()
+          ? 1.0
+          : 1.0 - static_cast<double>(
+                      table.at(static_cast<float>(other.nearest(at_px).off_px * inverse)).share);
+  for (std::size_t h = 0; h < halves.size(); ++h) {
+    const auto step = table.at(static_cast<float>((place.off_px + kHalvesPx[h]) * inverse));
+    const double density = part * beside_other * static_cast<double>(step.density) * inverse;
+    halves[h].covered += part * beside_other * (1.0 - static_cast<double>(step.share));
+    halves[h].density += density;
+    halves[h].change += density * sample.motion.transpose();
+  }
+}
+
+// From what the surroundings of a stretch and its neighbours look like.
+void ColourFit::find_shades(double ground_luma) {
+  constexpr double kUncovered = 0.02, kDarkest = 0.2, kBrightest = 2.0;
+  constexpr std::size_t kReach = 2;
+  std::vector<double> sums(stretches_.size(), 0.0), counts(stretches_.size(), 0.0);
+  for (const Pixel& pixel : pixels_) {
+    if (pixel.halves.front().covered + pixel.halves.back().covered > kUncovered) continue;
+    sums[pixel.stretch] += pixel.luma;
+    counts[pixel.stretch] += 1.0;
+  }
+  over_neighbours(kReach, [&](std::size_t k, const std::vector<std::size_t>& near) {
+    double sum = 0.0, count = 0.0;
+    for (const std::size_t j : near) sum += sums[j], count += counts[j];
+    if (count > 0.0)
+      stretches_[k].shade =
+          std::clamp(sum / (count * std::max(1.0, ground_luma)), kDarkest, kBrightest);
+  });
+}
+
+// Calls `use` with each stretch and those within reach of it along its border.
+template <class Use>
+void ColourFit::over_neighbours(std::size_t reach, const Use& use) {
+  std::vector<std::size_t> near;
+  std::size_t first = 0;
+  for (const Contour& border : middle_.borders) {
+    const std::size_t n = border.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      near.clear();
+      for (std::size_t j = 0; j < std::min(n, 2 * reach + 1); ++j)
+        near.push_back(first + (k + n + j - std::min(n, reach)) % n);
+      use(first + k, near);
+    }
+    first += n;
+  }
+}
+
+// From what is covered to what is shown.
+void ColourFit::mix(const ColourMixing& mixing, Pixel& pixel) {
+  pixel.change = PoseMotion::Step::Zero(pixel.halves.front().change.size());
+  for (const Cover& half : pixel.halves) {
+    const double slope = mixing.slope(half.covered) / kHalvesPx.size();
+    pixel.covered += mixing.shown(half.covered) / kHalvesPx.size();
+    pixel.density += slope * half.density;
+    pixel.change += slope * half.change;
+  }
+}
+
+double ColourFit::off_level(const Pixel& pixel) const {
+  const Stretch& stretch = stretches_[pixel.stretch];
+  const double inner = stretch.levels[kInside] + (pixel.wall ? wall_ : 0.0);
+  return pixel.value - pixel.covered * inner - (1.0 - pixel.covered) * stretch.levels[kOutside];
+}
+
+// Robustly and beside the border only: on it, where that lies is asked.
+void ColourFit::fit_levels(Side side) {
+  constexpr double kTukey = 4.685;
+  constexpr double kWallShare = 0.1;  // of the colour, by which the wall may differ
+  constexpr int kWall = kHarmonics, kUnknowns = kHarmonics + 1;
+  using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+  Eigen::Matrix<double, kUnknowns, kUnknowns> normal =
+      1e-6 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
+  normal(kWall, kWall) = 1.0 / std::pow(kWallShare * body_, 2);
+  Unknowns right = Unknowns::Zero();
+  const auto add = [&](const Stretch& stretch, bool wall, double weight, double weighted) {
+    if (weight == 0.0) return;
+    Unknowns row;
+    row << (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics, wall ? 1.0 : 0.0;
+    normal.noalias() += weight * row * row.transpose();
+    right += weighted * row;
+  };
+  for (const Stretch& stretch : stretches_) {
+    std::array<double, 2> weights{}, weighted{};  // of the face or the floor, and of the wall
+    for (const std::size_t i : stretch.pixels) {
+      const Pixel& pixel = pixels_[i];
+      if (!pixel.is_clear() || pixel.side() != side) continue;
+      const double t = off_level(pixel) / (kTukey * noise_[side]);
+      if (std::abs(t) >= 1.0) continue;
+      const double weight = std::pow((1.0 - t * t) / noise_[side], 2);
+      const std::size_t wall = side == kInside && pixel.wall ? 1 : 0;
+      weights[wall] += weight;
+      weighted[wall] += weight * pixel.value;
+    }
+    add(stretch, false, weights[0], weighted[0]);
+    add(stretch, true, weights[1], weighted[1]);
+  }
+  const Unknowns found = normal.ldlt().solve(right);
+  for (Stretch& stretch : stretches_)
+    stretch.levels[side] =
+        (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics.dot(found.head<kHarmonics>());
+  if (side == kInside) wall_ = found[kWall];
+}
+
+// False if hardly any pixel shows the level.
+bool ColourFit::find_noise(Side side) {
+  constexpr std::size_t kFewest = 2 * kHarmonics;
+  constexpr double kLeastNoise = 0.3;
+  std::vector<double> off;
+  for (const Pixel& pixel : pixels_)
+    if (pixel.is_clear() && pixel.side() == side) off.push_back(std::abs(off_level(pixel)));
+  if (off.size() < kFewest) return false;
+  noise_[side] = std::max(kLeastNoise, 1.4826 * data::upper_median(std::move(off)));
+  return std::isfinite(noise_[side]);
+}
+
+bool ColourFit::find_levels() {
+  constexpr int kRounds = 4;
+  constexpr double kNotYetKnown = 1e3;
+  noise_.fill(kNotYetKnown);
+  for (int round = 0; round < kRounds; ++round)
+    for (const Side side : {kInside, kOutside}) {
+      fit_levels(side);
+      if (!find_noise(side)) return false;
+    }
+  return true;
+}
+
+// By how much the levels of stretches differ from those of the whole outline beyond the noise of
+// their pixels, as neighbours show: beside a shadow they do, elsewhere hardly.
+void ColourFit::find_unevenness() {
+  constexpr std::size_t kReach = 4;  // to either side
+  for (const Side side : {kInside, kOutside}) {
+    std::vector<double> beyond2(stretches_.size(), 0.0), counted(stretches_.size(), 0.0);
+    for (std::size_t k = 0; k < stretches_.size(); ++k) {
+      double sum = 0.0, count = 0.0;
+      for (const std::size_t i : stretches_[k].pixels)
+        if (pixels_[i].is_clear() && pixels_[i].side() == side)
+          sum += off_level(pixels_[i]), count += 1.0;
+      if (count == 0.0) continue;
+      beyond2[k] = std::pow(sum / count, 2) - std::pow(noise_[side], 2) / count;
+      counted[k] = 1.0;
+    }
+    over_neighbours(kReach, [&](std::size_t k, const std::vector<std::size_t>& near) {
+      double sum = 0.0, count = 0.0;
+      for (const std::size_t j : near) sum += beyond2[j], count += counted[j];
+      stretches_[k].uneven2[side] = std::max(0.0, sum) / std::max(1.0, count);
+    });
+  }
+}
+
+// The offset that explains the pixels of a stretch best, with levels that differ from those of the
+// whole outline as its neighbours' do; none if nothing there depends on it.
+std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
+  const OutlineSample& sample = outline_[stretch.sample];
+  const double inner = stretch.levels[kInside], outer = stretch.levels[kOutside];
+  // Of the offset and of the levels inside and outside.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double sum = 0.0, square = 0.0, left = 0.0;
+  PoseMotion::Step motion = PoseMotion::Step::Zero(sample.motion.size());
+  for (const std::size_t i : stretch.pixels) {
+    const Pixel& p = pixels_[i];
+    const double contrast = inner + (p.wall ? wall_ : 0.0) - outer;
+    const double slope = contrast * p.density, off = off_level(p);
+    const double usual2 = p.covered * std::pow(noise_[kInside], 2) +
+                          (1.0 - p.covered) * std::pow(noise_[kOutside], 2);
+    const double uneven2 =
+        p.covered * stretch.uneven2[kInside] + (1.0 - p.covered) * stretch.uneven2[kOutside];
+    sum += p.value, square += p.value * p.value, left += off * off;
+    // What a border half a pixel off leaves is no outlier, nor what other levels do.
+    constexpr double kTukey = 4.685, kOffPx = 0.5;
+    const double t2 =
+        off * off / (kTukey * kTukey * (usual2 + uneven2 + std::pow(kOffPx * slope, 2)));
+    if (t2 >= 1.0) continue;
+    const double weight = std::pow(1.0 - t2, 2) / usual2;
+    const Eigen::Vector3d row(slope, p.covered, 1.0 - p.covered);
+    normal += weight * row * row.transpose();
+    right += weight * off * row;
+    motion += weight * slope * contrast * p.change;
+  }
+  const double information = normal(0, 0);
+  constexpr double kLeast = 1e-9, kLeastUneven2 = 1e-4;
+  if (!(information > kLeast)) return std::nullopt;
+  for (const Side side : {kInside, kOutside})
+    normal(1 + side, 1 + side) += 1.0 / std::max(kLeastUneven2, stretch.uneven2[side]);
+  const Eigen::Matrix3d covariance = normal.inverse();
+  const Eigen::Vector3d found = covariance * right;
+  ColourEdge out{
+      stretch.sample, motion / information, std::sqrt(blur2_px2_ + kHalfSizeBlur2Px2), {}};
+  ProfileEdge& e = out.edge;
+  e.offset_px = found[0];
+  e.noise_variance_px2 = 1.0 / information;
+  e.shading_variance_px2 = std::max(0.0, covariance(0, 0) - 1.0 / information);
+  constexpr double kUsualUnevenness = 0.1, kLeastGainNoise2 = 0.1;
+  e.unevenness = kUsualUnevenness;
+  e.contrast = outer + found[1 + kOutside] - inner - found[1 + kInside];
+  e.mean_level = 0.5 * (outer + inner);
+  e.lines = std::max(1, static_cast<int>(std::lround(sample.arc_px)));
+  const auto count = static_cast<double>(stretch.pixels.size());
+  const double noise2 = 0.5 * (std::pow(noise_[kInside], 2) + std::pow(noise_[kOutside], 2));
+  const double without = std::max(0.0, square - sum * sum / count);
+  const double with = std::max(0.0, left - right.dot(found) * noise2);
+  e.gain = 0.5 * count / e.lines *
+           std::log((without + count * kLeastGainNoise2) / (with + count * kLeastGainNoise2));
+  return out;
+}
+
+std::vector<ColourEdge> ColourFit::edges(double reach_px) {
+  constexpr std::size_t kFewest = 8 * kHarmonics;
+  std::vector<ColourEdge> found;
+  if (pixels_.size() < kFewest || !find_levels()) return found;
+  find_unevenness();
+  for (const Stretch& stretch : stretches_)
+    if (auto edge = edge_of(stretch); edge && std::abs(edge->edge.offset_px) < reach_px)
+      found.push_back(std::move(*edge));
+  return found;
+}
+
+}  // namespace
+
+std::vector<ColourEdge> find_colour_edges(const ColourWindow& colour, const ExposedOutline& outline,
+                                          double blur_px, double reach_px, int every) {
+  return ColourFit(colour, outline, blur_px, every).edges(reach_px);
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,77 @@
+#include "contour.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trochoid::tracking {
+
+bool is_bore(data::OutlinePoint::Edge edge) {
+  return edge == data::OutlinePoint::Edge::upper_bore ||
+         edge == data::OutlinePoint::Edge::lower_bore;
+}
+
+Contour::Contour(const std::vector<OutlineSample>& outline, Of which) : outline_(&outline) {
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (!outline[i].silhouette || is_bore(outline[i].edge) != (which == Of::bore)) continue;
+    points_.push_back({i, outline[i].image_px});
+    middle_ += outline[i].image_px;
+  }
+  if (empty()) return;
+  middle_ /= static_cast<double>(points_.size());
+  nearest_px_ = farthest_px_ = (points_.front().image_px - middle_).norm();
+  for (Point& point : points_) {
+    const double radius_px = (point.image_px - middle_).norm();
+    point.angle_rad = angle_of(point.image_px);
+    nearest_px_ = std::min(nearest_px_, radius_px);
+    farthest_px_ = std::max(farthest_px_, radius_px);
+  }
+  std::sort(points_.begin(), points_.end(),
+            [](const Point& a, const Point& b) { return a.angle_rad < b.angle_rad; });
+  for (std::size_t k = 0; k < points_.size(); ++k) points_[k].curvature_per_px = curvature_at(k);
+}
+
+bool Contour::may_be_within(double far_px, const Eigen::Vector2d& p) const {
+  const double radius_px = (p - middle_).norm();
+  return radius_px > nearest_px_ - far_px && radius_px < farthest_px_ + far_px;
+}
+
+Contour::Place Contour::nearest(const Eigen::Vector2d& p) const {
+  const auto behind = std::lower_bound(
+      points_.begin(), points_.end(), angle_of(p),
+      [](const Point& point, double angle_rad) { return point.angle_rad < angle_rad; });
+  return nearest_from(static_cast<std::size_t>(behind - points_.begin()), p);
+}
+
+Contour::Place Contour::nearest_from(std::size_t at, const Eigen::Vector2d& p) const {
+  const auto square_to = [&](std::size_t k) { return (points_[k].image_px - p).squaredNorm(); };
+  const std::size_t last = size() - 1;
+  at %= size();
+  double least = square_to(at);
+  for (const bool ahead : {true, false})
+    while (true) {
+      const std::size_t next = ahead ? (at == last ? 0 : at + 1) : (at == 0 ? last : at - 1);
+      const double there = square_to(next);
+      if (there >= least) break;
+      at = next, least = there;
+    }
+  const OutlineSample& sample = (*this)[at];
+  const Eigen::Vector2d off = p - sample.image_px;
+  const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
+  const double aside = along.dot(off);
+  return {at, sample.normal_px.dot(off) + 0.5 * points_[at].curvature_per_px * aside * aside,
+          std::abs(aside)};
+}
+
+double Contour::angle_of(const Eigen::Vector2d& p) const {
+  return std::atan2(p.y() - middle_.y(), p.x() - middle_.x());
+}
+
+double Contour::curvature_at(std::size_t k) const {
+  const OutlineSample& before = (*this)[(k + size() - 1) % size()];
+  const OutlineSample& behind = (*this)[(k + 1) % size()];
+  const Eigen::Vector2d chord = behind.image_px - before.image_px;
+  const double square = chord.squaredNorm();
+  return square > 0.0 ? (behind.normal_px - before.normal_px).dot(chord) / square : 0.0;
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,57 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "outline_samples.hpp"
+
+namespace trochoid::tracking {
+
+/// Whether an edge borders the bore of a ring rather than its outside.
+[[nodiscard]] bool is_bore(data::OutlinePoint::Edge edge);
+
+/// One closed border of a body's silhouette, star-shaped about its middle: distances of points in
+/// the picture from it.
+class Contour {
+ public:
+  enum class Of { rim, bore };
+  struct Place {
+    std::size_t at;   ///< the nearest point of the contour
+    double off_px;    ///< distance, > 0 where the body is not
+    double aside_px;  ///< along the contour from that point
+  };
+
+  /// Of the samples of an outline, which must outlive it, those that belong to it.
+  Contour(const std::vector<OutlineSample>& outline, Of which);
+
+  /// Too few points to be one; nothing else may be asked then.
+  [[nodiscard]] bool empty() const { return points_.size() < kFewest; }
+  [[nodiscard]] std::size_t size() const { return points_.size(); }
+  [[nodiscard]] const OutlineSample& operator[](std::size_t k) const {
+    return (*outline_)[points_[k].sample];
+  }
+  /// The place of that point in the outline.
+  [[nodiscard]] std::size_t sample_of(std::size_t k) const { return points_[k].sample; }
+  /// False if a point is farther away than this, at a glance.
+  [[nodiscard]] bool may_be_within(double far_px, const Eigen::Vector2d& p) const;
+  [[nodiscard]] Place nearest(const Eigen::Vector2d& p) const;
+  /// The same, sought from a point of the contour nearby.
+  [[nodiscard]] Place nearest_from(std::size_t at, const Eigen::Vector2d& p) const;
+
+ private:
+  static constexpr std::size_t kFewest = 8;
+  struct Point {
+    std::size_t sample;
+    Eigen::Vector2d image_px;
+    double angle_rad = 0.0;         // about the middle
+    double curvature_per_px = 0.0;  // > 0 where the body is convex
+  };
+  [[nodiscard]] double angle_of(const Eigen::Vector2d& p) const;
+  [[nodiscard]] double curvature_at(std::size_t k) const;
+
+  const std::vector<OutlineSample>* outline_;
+  Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
+  double nearest_px_ = 0.0, farthest_px_ = 0.0;  // of its points, from the middle
+  std::vector<Point> points_;                    // by angle
+};
+
+}  // namespace trochoid::tracking
