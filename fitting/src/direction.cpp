@@ -1,5 +1,6 @@
 #include "direction.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace trochoid::fitting {
@@ -29,14 +30,20 @@ Departure departure(const Eigen::Vector2d& seen, const Eigen::Vector2d& predicte
     ab = -ab, c = -c;
     slope = -slope, slope_c = -slope_c;
   }
-  // All ways lead to the opposite direction: short of it the length stays below this angle.
+  // All ways lead to the opposite direction: from this angle on the length stays what it is.
   constexpr double kMost = 3.0;  // rad
   const double omega = std::atan2(ab.norm(), c);
+  if (omega > kMost) {
+    constexpr double kLeastNorm = 1e-9;
+    const double norm = std::max(kLeastNorm, ab.norm());
+    const Eigen::Vector2d along = ab / norm;
+    result.way = kMost * along;
+    result.slope = kMost / norm * (Eigen::Matrix2d::Identity() - along * along.transpose()) * slope;
+    return result;
+  }
   double f = 1.0, f_by_c = -1.0 / 3.0;  // limits for omega -> 0
   constexpr double kSmall = 1e-3;
-  if (omega > kMost) {
-    f = kMost / std::sin(kMost), f_by_c = 0.0;
-  } else if (omega > kSmall) {
+  if (omega > kSmall) {
     const double s = std::sin(omega);
     f = omega / s, f_by_c = (omega * c - s) / (s * s * s);
   }

@@ -80,6 +80,19 @@ TEST(Direction, IsAsFarOffAsTheAngleBetweenBoth) {
               200.0 * std::asin(std::sin(0.4) * std::sin(0.25)), 1e-9);
 }
 
+// Up to the axis turned over, from which every way is as long: nothing draws a fit there.
+TEST(Direction, IsFarthestFromTheOppositeAxis) {
+  const Seen seen{0.7, 0.1, 1.0, 0.1 / std::sin(0.7)};
+  double before = 0.0;
+  for (double off = 2.5; off < std::numbers::pi; off += 0.05) {
+    const double there = misfit(seen, {seen.theta_rad + off, seen.phi_rad}, Faces::different);
+    EXPECT_GE(there, before - 1e-9) << off;
+    before = there;
+  }
+  constexpr double kFar = 25.0;  // standard deviations
+  EXPECT_GT(before, kFar);
+}
+
 TEST(Direction, ChangesWithThePredictedAnglesAsItsDerivativesSay) {
   constexpr double kStep_rad = 1e-6, kTolerance = 1e-6;  // of the largest; differences cancel
   const Seen seen{0.5, 0.03, 1.0, 0.02};

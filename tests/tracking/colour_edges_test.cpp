@@ -87,44 +87,46 @@ bool in_ellipse(double x, double y, double a, double b, double phi_rad) {
 }
 
 // As bright as its floor, brown on blue, and precessing by half a radian while the shutter is open:
-// its ends sweep over 18 px, farther than they are wide.
+// its ends sweep over 18 px, farther than they are wide. Seen more from aside it is narrower still.
 TEST(ColourEdges, ADiscThatTurnsUnderTheOpenShutterIsMeasuredByWhatItCovers) {
-  constexpr double kTheta = 1.15, kTurned_rad = 0.5, kFraction = 0.5, kRadius_px = 36.0;
+  constexpr double kTurned_rad = 0.5, kFraction = 0.5, kRadius_px = 36.0;
   constexpr int kMoments = 41;
   const ThinDisc disc;
   const Eigen::Vector2d centre(80.3, 70.2);
-  const auto covered = [&](double x, double y) {
-    int inside = 0;
-    for (int k = 0; k < kMoments; ++k)
-      inside +=
-          in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
-                     kTurned_rad * ((k + 0.5) / kMoments - 0.5))
-              ? 1
-              : 0;
-    return static_cast<double>(inside) / kMoments;
-  };
-  const auto [luma, chroma] = photographed(
-      {160, 140}, {100.0, 86.0, 66.0},
-      [](double, double) -> Rgb {
-        return {76.0, 88.0, 118.0};
-      },
-      covered);
-  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
-  const Eigen::Vector2d off(1.0, -0.5);
-  const cv::Mat no_plate;
-  const auto seen = fitter.measure(
-      {.luma = luma,
-       .background = no_plate,
-       .detection = {},
-       .predicted = disc.at(centre + off, kTheta + 0.02, 0.02),
-       .attitude_known = true,
-       .previous = disc.at(centre + off, kTheta + 0.02, 0.02 - kTurned_rad / kFraction),
-       .exposure_fraction = kFraction,
-       .chroma = chroma});
-  ASSERT_TRUE(seen);
-  constexpr double kTolerance_px = 0.1;
-  EXPECT_NEAR(seen->centre_px.x(), centre.x(), kTolerance_px);
-  EXPECT_NEAR(seen->centre_px.y(), centre.y(), kTolerance_px);
+  for (const double theta_rad : {1.15, 1.35}) {
+    const auto covered = [&](double x, double y) {
+      int inside = 0;
+      for (int k = 0; k < kMoments; ++k)
+        inside +=
+            in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(theta_rad),
+                       kTurned_rad * ((k + 0.5) / kMoments - 0.5))
+                ? 1
+                : 0;
+      return static_cast<double>(inside) / kMoments;
+    };
+    const auto [luma, chroma] = photographed(
+        {160, 140}, {100.0, 86.0, 66.0},
+        [](double, double) -> Rgb {
+          return {76.0, 88.0, 118.0};
+        },
+        covered);
+    const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+    const Eigen::Vector2d off(1.0, -0.5);
+    const cv::Mat no_plate;
+    const auto seen = fitter.measure(
+        {.luma = luma,
+         .background = no_plate,
+         .detection = {},
+         .predicted = disc.at(centre + off, theta_rad + 0.02, 0.02),
+         .attitude_known = true,
+         .previous = disc.at(centre + off, theta_rad + 0.02, 0.02 - kTurned_rad / kFraction),
+         .exposure_fraction = kFraction,
+         .chroma = chroma});
+    ASSERT_TRUE(seen);
+    constexpr double kTolerance_px = 0.1;
+    EXPECT_NEAR(seen->centre_px.x(), centre.x(), kTolerance_px);
+    EXPECT_NEAR(seen->centre_px.y(), centre.y(), kTolerance_px);
+  }
 }
 
 // What the colour planes alone say of the centre of a disc predicted 0.4 px beside its place.
@@ -237,10 +239,56 @@ TEST(Contour, DistancesAreThoseFromTheCirclesOfARing) {
           centre + radius_px * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
       EXPECT_NEAR(rim.nearest(p).off_px, radius_px - kRim_px, kTolerance_px);
       EXPECT_NEAR(bore.nearest(p).off_px, kBore_px - radius_px, kTolerance_px);
-      EXPECT_NEAR(rim.nearest_from(3, p).off_px, radius_px - kRim_px, kTolerance_px);
       EXPECT_TRUE(rim.may_be_within(std::abs(radius_px - kRim_px) + 0.1, p));
     }
   EXPECT_FALSE(rim.may_be_within(5.0, centre));
+}
+
+// A disc seen from aside is five times as long as wide: from its middle, the nearest point lies in
+// quite another direction than the point asked about.
+TEST(Contour, TheNearestPointOfAFlatEllipseIsFound) {
+  const ThinDisc disc;
+  const PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const auto outline =
+      outline_samples(disc.body, disc.at(centre, std::acos(0.2), 0.4), disc.camera, motion, 1.5);
+  const Contour rim(outline, Contour::Of::rim);
+  int near = 0;
+  for (double y = 30.0; y < 110.0; y += 2.3)
+    for (double x = 40.0; x < 120.0; x += 2.7) {
+      const Eigen::Vector2d p(x, y);
+      double least = 1e9;
+      for (const OutlineSample& sample : outline)
+        if (sample.silhouette) least = std::min(least, (sample.image_px - p).norm());
+      constexpr double kFarPx = 10.0, kBetweenPx = 0.8;  // half of what samples are apart
+      if (least > kFarPx) continue;
+      ++near;
+      EXPECT_NEAR(std::abs(rim.nearest(p).off_px), least, kBetweenPx) << x << ", " << y;
+    }
+  EXPECT_GT(near, 100);
+}
+
+// Brown and tan: half of each is more of the tan's colour than tan itself.
+TEST(ColourMixing, ColoursThatGoPastEachOtherMixAsLight) {
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const Photograph picture = photographed(
+      {160, 140}, {90.0, 60.0, 30.0},
+      [](double, double) -> Rgb {
+        return {200.0, 170.0, 130.0};
+      },
+      [&](double x, double y) {
+        return in_ellipse(x - centre.x(), y - centre.y(), 36.0, 36.0, 0.0) ? 1.0 : 0.0;
+      });
+  const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
+                                            disc.body, disc.camera, disc.at(centre, 0.0));
+  ASSERT_FALSE(colour.empty());
+  for (const double shade : ColourWindow::kShades)
+    for (double covered = 0.0; covered <= 1.0; covered += 0.05) {
+      EXPECT_GE(colour.mixing_in(shade).shown(covered), -1e-9) << shade << ", " << covered;
+      EXPECT_LE(colour.mixing_in(shade).shown(covered), 1.0 + 1e-9) << shade << ", " << covered;
+      EXPECT_GE(colour.mixing_in(shade).slope(covered), -1e-9) << shade << ", " << covered;
+    }
 }
 
 }  // namespace

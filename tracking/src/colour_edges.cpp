@@ -194,28 +194,32 @@ Pixel ColourFit::pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) 
   return pixel;
 }
 
-// Adds what one part of the exposure says.
+// Adds what one part of the exposure says. A border that is not there then hides nothing.
 void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
                       const Nearest& nearest, Halves& halves) const {
   const NormalTable& table = NormalTable::instance();
   const double part = 1.0 / parts();
   const Contour& own = moment.borders[nearest.border];
   const Contour& other = moment.borders[1 - nearest.border];
-  if (own.empty()) return;
-  const Contour::Place place =
-      &moment == &middle_ ? nearest.place : own.nearest_from(nearest.place.at, at_px);
+  const double usual = 1.0 / std::sqrt(blur2_px2_);
+  const auto within = [&](double off_px, double inverse) {
+    return 1.0 - static_cast<double>(table.at(static_cast<float>(off_px * inverse)).share);
+  };
+  const double beside_other = other.empty() ? 1.0 : within(other.nearest(at_px).off_px, usual);
+  if (own.empty()) {
+    for (Cover& half : halves) half.covered += part * beside_other;
+    return;
+  }
+  const Contour::Place place = &moment == &middle_ ? nearest.place : own.nearest(at_px);
   const OutlineSample& sample = own[place.at];
   const double swept_px = smear_.size() > 0 ? sample.motion.dot(smear_) * part : 0.0;
   const double inverse = 1.0 / std::sqrt(blur2_px2_ + swept_px * swept_px / 12.0);
-  const double beside_other =
-      other.empty()
-          ? 1.0
-          : 1.0 - static_cast<double>(
-                      table.at(static_cast<float>(other.nearest(at_px).off_px * inverse)).share);
   for (std::size_t h = 0; h < halves.size(); ++h) {
-    const auto step = table.at(static_cast<float>((place.off_px + kHalvesPx[h]) * inverse));
-    const double density = part * beside_other * static_cast<double>(step.density) * inverse;
-    halves[h].covered += part * beside_other * (1.0 - static_cast<double>(step.share));
+    const double off_px = place.off_px + kHalvesPx[h];
+    const double density =
+        part * beside_other * inverse *
+        static_cast<double>(table.at(static_cast<float>(off_px * inverse)).density);
+    halves[h].covered += part * beside_other * within(off_px, inverse);
     halves[h].density += density;
     halves[h].change += density * sample.motion.transpose();
   }

@@ -13,7 +13,7 @@ namespace trochoid::tracking {
 struct ColourEdge {
   std::size_t sample;       ///< of the outline
   PoseMotion::Step motion;  ///< how far it moves along its normal per unit of each parameter
-  double blur_px;
+  double blur_px;           ///< of the edge in the planes
   ProfileEdge edge;
 };
 

@@ -112,7 +112,8 @@ Coded coded_as(const std::array<double, 3>& light) {
   return {luma, (blue - luma) / 1.772, (red - luma) / 1.402};
 }
 
-// Along the difference of the two colours, as far as the primaries can show these.
+// Along the difference of the two colours, as far as the primaries can show these. Colours that on
+// the way from one to the other go back or past it do not tell the share: as light, then.
 ColourMixing mixing_between(const Coded& body, const Coded& ground) {
   const auto one = light_of_primaries(body), other = light_of_primaries(ground);
   const auto chroma_at = [&](double share) {
@@ -129,7 +130,7 @@ ColourMixing mixing_between(const Coded& body, const Coded& ground) {
     const double share = static_cast<double>(k) / ColourMixing::kParts;
     shown[k] = apart.dot(chroma_at(share) - from) / apart.squaredNorm();
   }
-  return ColourMixing(shown);
+  return std::is_sorted(shown.begin(), shown.end()) ? ColourMixing(shown) : ColourMixing();
 }
 
 }  // namespace

@@ -20,10 +20,10 @@ inline constexpr double kHalfSizeBlur2Px2 = 4.0 / 12.0 - 1.0 / 12.0;
 /// something much darker.
 class ColourMixing {
  public:
-  /// As light.
-  ColourMixing();
-  /// @param shown at shares 0, 1 / kParts .. 1 of the body; 0 at the first and 1 at the last.
   static constexpr int kParts = 32;
+  /// As light does.
+  ColourMixing();
+  /// @param shown at shares 0, 1 / kParts .. 1 of the body; grows from 0 to 1.
   explicit ColourMixing(const std::array<double, kParts + 1>& shown) : shown_(shown) {}
   [[nodiscard]] double shown(double covered) const;
   /// Derivative of that.
@@ -56,7 +56,7 @@ struct ColourWindow {
   [[nodiscard]] Eigen::Vector2d place_of(int x, int y) const {
     return {2.0 * (corner.x + x) + 0.5, 2.0 * (corner.y + y) + 0.5};
   }
-  /// The same blurred by a Gaussian.
+  /// The same with `levels` blurred by a Gaussian.
   [[nodiscard]] ColourWindow blurred(double sigma_px) const {
     ColourWindow out = *this;
     out.levels = levels.blurred(sigma_px);
@@ -64,7 +64,7 @@ struct ColourWindow {
   }
 };
 
-/// That of the body at `pose`, of full size. Shadows hardly change it, so it shows rims that the
+/// That of the body at `pose`. Shadows hardly change it, so it shows rims that the
 /// luma loses. Empty where the colours are too much alike, or without chroma. Taken to lie in the
 /// middle of the four pixels it belongs to; other codings shift it by half a pixel.
 [[nodiscard]] ColourWindow colour_window(const cv::Mat& luma, const cv::Mat& chroma,

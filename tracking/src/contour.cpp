@@ -5,6 +5,22 @@
 
 namespace trochoid::tracking {
 
+namespace {
+
+// Distance from the circle that touches a contour: of a point that far out of its tangent and aside
+// of where it touches.
+double off_circle(double out_px, double aside_px, double curvature_per_px) {
+  constexpr double kStraight = 1e-6;
+  if (std::abs(curvature_per_px) < kStraight) return out_px;
+  const double radius_px = 1.0 / std::abs(curvature_per_px);
+  const double from_middle_px = curvature_per_px > 0.0 ? radius_px + out_px : radius_px - out_px;
+  if (from_middle_px < 0.0) return out_px;
+  const double beyond_px = std::hypot(from_middle_px, aside_px) - radius_px;
+  return curvature_per_px > 0.0 ? beyond_px : -beyond_px;
+}
+
+}  // namespace
+
 bool is_bore(data::OutlinePoint::Edge edge) {
   return edge == data::OutlinePoint::Edge::upper_bore ||
          edge == data::OutlinePoint::Edge::lower_bore;
@@ -39,13 +55,9 @@ Contour::Place Contour::nearest(const Eigen::Vector2d& p) const {
   const auto behind = std::lower_bound(
       points_.begin(), points_.end(), angle_of(p),
       [](const Point& point, double angle_rad) { return point.angle_rad < angle_rad; });
-  return nearest_from(static_cast<std::size_t>(behind - points_.begin()), p);
-}
-
-Contour::Place Contour::nearest_from(std::size_t at, const Eigen::Vector2d& p) const {
+  std::size_t at = static_cast<std::size_t>(behind - points_.begin()) % size();
   const auto square_to = [&](std::size_t k) { return (points_[k].image_px - p).squaredNorm(); };
   const std::size_t last = size() - 1;
-  at %= size();
   double least = square_to(at);
   for (const bool ahead : {true, false})
     while (true) {
@@ -58,7 +70,7 @@ Contour::Place Contour::nearest_from(std::size_t at, const Eigen::Vector2d& p) c
   const Eigen::Vector2d off = p - sample.image_px;
   const Eigen::Vector2d along(-sample.normal_px.y(), sample.normal_px.x());
   const double aside = along.dot(off);
-  return {at, sample.normal_px.dot(off) + 0.5 * points_[at].curvature_per_px * aside * aside,
+  return {at, off_circle(sample.normal_px.dot(off), aside, points_[at].curvature_per_px),
           std::abs(aside)};
 }
 

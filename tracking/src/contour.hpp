@@ -33,9 +33,8 @@ class Contour {
   [[nodiscard]] std::size_t sample_of(std::size_t k) const { return points_[k].sample; }
   /// False if a point is farther away than this, at a glance.
   [[nodiscard]] bool may_be_within(double far_px, const Eigen::Vector2d& p) const;
+  /// Sought along the contour from the point in the same direction from its middle.
   [[nodiscard]] Place nearest(const Eigen::Vector2d& p) const;
-  /// The same, sought from a point of the contour nearby.
-  [[nodiscard]] Place nearest_from(std::size_t at, const Eigen::Vector2d& p) const;
 
  private:
   static constexpr std::size_t kFewest = 8;
