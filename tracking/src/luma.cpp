@@ -37,11 +37,46 @@ void stretch_row(const std::uint8_t* in, std::uint8_t* out, int width) {
   }
 }
 
-/// Deep samples to 8 bit, rounded, the range kept.
-void narrow_row(const std::uint16_t* in, std::uint8_t* out, int width, int depth) {
-  const int shift = depth - 8, half = 1 << (shift - 1);
+/// Samples of so many bits, those below them included, to 8 bit, rounded, the range kept.
+void narrow_row(const std::uint16_t* in, std::uint8_t* out, int width, int bits) {
+  const int shift = bits - 8, half = 1 << (shift - 1);
   for (int x = 0; x < width; ++x)
     out[x] = static_cast<std::uint8_t>(std::min((in[x] + half) >> shift, 255));
+}
+
+/// One of the colour differences to 8 bit at half the size: the mean of all samples there.
+void fill_chroma(const AVFrame& picture, const AVPixFmtDescriptor& format, int which,
+                 cv::Mat& chroma) {
+  const AVComponentDescriptor& c = format.comp[1 + which];
+  const int across = 2 >> format.log2_chroma_w, down = 2 >> format.log2_chroma_h;
+  const int width = AV_CEIL_RSHIFT(picture.width, format.log2_chroma_w);
+  const int height = AV_CEIL_RSHIFT(picture.height, format.log2_chroma_h);
+  const auto row = [&](int y) {
+    return picture.data[c.plane] + c.offset +
+           static_cast<std::ptrdiff_t>(std::min(y, height - 1)) * picture.linesize[c.plane];
+  };
+  const auto sample = [&](const std::uint8_t* in, int x) {
+    const std::uint8_t* at = in + std::min(x, width - 1) * c.step;
+    const int value = c.depth > 8 ? *reinterpret_cast<const std::uint16_t*>(at) : *at;
+    return value >> c.shift;
+  };
+  const int unit = (across * down) << (c.depth - 8);
+  for (int y = 0; y < chroma.rows; ++y) {
+    const std::uint8_t *first = row(down * y), *last = row(down * y + down - 1);
+    std::uint8_t* out = chroma.ptr(y) + which;
+    for (int x = 0; x < chroma.cols; ++x, out += 2) {
+      if (unit == 1) {  // most videos
+        *out = first[x * c.step];
+        continue;
+      }
+      int sum = unit / 2;
+      for (int i = 0; i < across; ++i) {
+        sum += sample(first, across * x + i);
+        if (down > 1) sum += sample(last, across * x + i);
+      }
+      *out = static_cast<std::uint8_t>(std::min(sum / unit, 255));
+    }
+  }
 }
 
 cv::Mat scaled_to(const AVFrame& picture, AVPixelFormat target, int type, Scaler& scaler) {
@@ -66,12 +101,12 @@ cv::Mat luma_of(const AVFrame& picture, Scaler& scaler) {
   if (!has_luma_plane(*format)) return scaled_to(picture, AV_PIX_FMT_GRAY8, CV_8UC1, scaler);
   cv::Mat luma(picture.height, picture.width, CV_8UC1);
   const bool full = is_full_range(picture, *format);
-  const int depth = format->comp[0].depth;
+  const int depth = format->comp[0].depth, bits = depth + format->comp[0].shift;
   for (int y = 0; y < picture.height; ++y) {
     const std::uint8_t* in = picture.data[0] + static_cast<std::ptrdiff_t>(y) * picture.linesize[0];
     std::uint8_t* out = luma.ptr(y);
     if (depth > 8) {
-      narrow_row(reinterpret_cast<const std::uint16_t*>(in), out, picture.width, depth);
+      narrow_row(reinterpret_cast<const std::uint16_t*>(in), out, picture.width, bits);
       in = out;
     }
     if (!full)
@@ -83,14 +118,14 @@ cv::Mat luma_of(const AVFrame& picture, Scaler& scaler) {
 }
 
 cv::Mat chroma_of(const AVFrame& picture) {
-  if (picture.format != AV_PIX_FMT_YUV420P && picture.format != AV_PIX_FMT_YUVJ420P) return {};
+  const AVPixFmtDescriptor* format =
+      av_pix_fmt_desc_get(static_cast<AVPixelFormat>(picture.format));
+  constexpr int kComponents = 3;
+  if (format == nullptr || !has_luma_plane(*format) || format->nb_components < kComponents ||
+      format->log2_chroma_w > 1 || format->log2_chroma_h > 1)
+    return {};
   cv::Mat chroma((picture.height + 1) / 2, (picture.width + 1) / 2, CV_8UC2);
-  for (int y = 0; y < chroma.rows; ++y) {
-    const std::uint8_t* cb = picture.data[1] + static_cast<std::ptrdiff_t>(y) * picture.linesize[1];
-    const std::uint8_t* cr = picture.data[2] + static_cast<std::ptrdiff_t>(y) * picture.linesize[2];
-    std::uint8_t* out = chroma.ptr(y);
-    for (int x = 0; x < chroma.cols; ++x) out[2 * x] = cb[x], out[2 * x + 1] = cr[x];
-  }
+  for (const int which : {0, 1}) fill_chroma(picture, *format, which, chroma);
   return chroma;
 }
 

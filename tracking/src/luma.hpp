@@ -10,8 +10,8 @@ namespace trochoid::tracking {
 /// context is kept in `scaler`.
 [[nodiscard]] cv::Mat luma_of(const AVFrame& picture, Scaler& scaler);
 
-/// Colour differences at half the size as coded, CV_8UC2 (Cb, Cr); empty for anything but 8-bit
-/// 4:2:0.
+/// Colour differences at half the size, CV_8UC2 (Cb, Cr): as coded where that is 8-bit 4:2:0, deeper
+/// samples rounded, finer ones averaged; empty for anything but such YUV with a luma plane.
 [[nodiscard]] cv::Mat chroma_of(const AVFrame& picture);
 
 /// The same picture in colour, CV_8UC3 in OpenCV's order.

@@ -16,7 +16,7 @@ struct Frame {
   std::int64_t index = 0;
   double t_s = 0.0;
   bool damaged = false;  ///< the decoder reported an error in it
-  /// CV_8UC2 (Cb, Cr) at half the size, as coded; empty unless asked for and coded as 8-bit 4:2:0.
+  /// CV_8UC2 (Cb, Cr) at half the size; empty unless asked for and coded as YUV with a luma plane.
   cv::Mat chroma{};
 };
 
