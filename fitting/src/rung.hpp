@@ -48,6 +48,7 @@ struct Rung {
 /// A rung's fit with full error bars; as it is where there are no others.
 [[nodiscard]] data::Fit with_full_bars(const Rung& rung);
 
+/// Makes a draft the rung's fit, and what full error bars are made from.
 void take(Draft draft, Rung& rung);
 
 /// Free and fixed values by name; empty where there are several arcs.

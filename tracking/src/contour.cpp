@@ -21,11 +21,6 @@ double off_circle(double out_px, double aside_px, double curvature_per_px) {
 
 }  // namespace
 
-bool is_bore(data::OutlinePoint::Edge edge) {
-  return edge == data::OutlinePoint::Edge::upper_bore ||
-         edge == data::OutlinePoint::Edge::lower_bore;
-}
-
 Contour::Contour(const std::vector<OutlineSample>& outline, Of which) : outline_(&outline) {
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (!outline[i].silhouette || is_bore(outline[i].edge) != (which == Of::bore)) continue;

@@ -6,9 +6,6 @@
 
 namespace trochoid::tracking {
 
-/// Whether an edge borders the bore of a ring rather than its outside.
-[[nodiscard]] bool is_bore(data::OutlinePoint::Edge edge);
-
 /// One closed border of a body's silhouette, star-shaped about its middle: distances of points in
 /// the picture from it.
 class Contour {

@@ -19,8 +19,7 @@ Eigen::Vector3d turned(const Eigen::Vector3d& v, double angle_rad) {
 // Edges that take each other's place as the body turns: the outer border, that of the bore, and
 // those between two surfaces of the body each for itself.
 int family_of(Edge edge, bool silhouette) {
-  const bool bore = edge == Edge::upper_bore || edge == Edge::lower_bore;
-  return silhouette ? (bore ? 1 : 0) : 2 + static_cast<int>(edge);
+  return silhouette ? (is_bore(edge) ? 1 : 0) : 2 + static_cast<int>(edge);
 }
 
 // An outline at one moment of the exposure.

@@ -121,6 +121,10 @@ OutlineSample middle_of(const OutlineSample& a, const OutlineSample& b) {
 
 }  // namespace
 
+bool is_bore(Edge edge) {
+  return edge == Edge::upper_bore || edge == Edge::lower_bore;
+}
+
 std::vector<OutlineSample> cross_pixels(const std::vector<OutlineSample>& outline, int every,
                                         std::vector<Crossings>& crossings) {
   std::vector<OutlineSample> samples;

@@ -8,6 +8,9 @@
 
 namespace trochoid::tracking {
 
+/// Whether an edge borders the bore of a ring rather than its outside.
+[[nodiscard]] bool is_bore(data::OutlinePoint::Edge edge);
+
 /// A point of the predicted outline with what a fit needs to know about it.
 struct OutlineSample {
   data::OutlinePoint::Edge edge;
