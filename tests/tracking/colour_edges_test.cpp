@@ -195,25 +195,39 @@ TEST(ColourEdges, GlintsOnOneSideAreOutliers) {
   EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
 }
 
-// Black covers half of a pixel of orange: what is left of the light is coded as 0.735 of the level,
-// and of the colour as much.
-TEST(ColourMixing, HalfOfABrightColourBesideBlackIsMostOfIt) {
+// What colours a flat disc of one colour on a floor of another shows.
+ColourWindow seen_on(const Rgb& disc_colour, const Rgb& floor_colour) {
   const ThinDisc disc;
   const Eigen::Vector2d centre(80.3, 70.2);
   const Photograph picture = photographed(
-      {160, 140}, {1.0, 1.0, 1.0},
-      [](double, double) -> Rgb {
-        return {230.0, 160.0, 90.0};
-      },
+      {160, 140}, disc_colour, [&](double, double) { return floor_colour; },
       [&](double x, double y) {
         return in_ellipse(x - centre.x(), y - centre.y(), 36.0, 36.0, 0.0) ? 1.0 : 0.0;
       });
-  const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
-                                            disc.body, disc.camera, disc.at(centre, 0.0));
+  return colour_window(picture.luma, picture.chroma, {0, 0, 160, 140}, disc.body, disc.camera,
+                       disc.at(centre, 0.0));
+}
+
+// Black covers half of a pixel of orange: what is left of the light is coded as 0.735 of the level,
+// and of the colour as much.
+TEST(ColourMixing, HalfOfABrightColourBesideBlackIsMostOfIt) {
+  const ColourMixing mixing = seen_on({1.0, 1.0, 1.0}, {230.0, 160.0, 90.0}).mixing_in(1.0);
   constexpr double kTolerance = 0.03;  // what sRGB is besides a power
-  EXPECT_NEAR(colour.mixing_in(1.0).shown(0.5), 1.0 - 0.735, kTolerance);
-  EXPECT_NEAR(colour.mixing_in(1.0).shown(0.0), 0.0, 1e-9);
-  EXPECT_NEAR(colour.mixing_in(1.0).shown(1.0), 1.0, 1e-9);
+  EXPECT_NEAR(mixing.shown(0.5), 1.0 - 0.735, kTolerance);
+  EXPECT_NEAR(mixing.shown(0.0), 0.0, 1e-9);
+  EXPECT_NEAR(mixing.shown(1.0), 1.0, 1e-9);
+}
+
+// Brown and tan: half of each is more of the tan's colour than tan itself.
+TEST(ColourMixing, ColoursThatGoPastEachOtherMixAsLight) {
+  const ColourWindow colour = seen_on({90.0, 60.0, 30.0}, {200.0, 170.0, 130.0});
+  ASSERT_FALSE(colour.empty());
+  for (const double shade : ColourWindow::kShades)
+    for (double covered = 0.0; covered <= 1.0; covered += 0.05) {
+      EXPECT_GE(colour.mixing_in(shade).shown(covered), -1e-9) << shade << ", " << covered;
+      EXPECT_LE(colour.mixing_in(shade).shown(covered), 1.0 + 1e-9) << shade << ", " << covered;
+      EXPECT_GE(colour.mixing_in(shade).slope(covered), -1e-9) << shade << ", " << covered;
+    }
 }
 
 // A ring lying flat below the camera: its upper rim and, deeper in, the lower rim of its bore are
@@ -266,29 +280,6 @@ TEST(Contour, TheNearestPointOfAFlatEllipseIsFound) {
       EXPECT_NEAR(std::abs(rim.nearest(p).off_px), least, kBetweenPx) << x << ", " << y;
     }
   EXPECT_GT(near, 100);
-}
-
-// Brown and tan: half of each is more of the tan's colour than tan itself.
-TEST(ColourMixing, ColoursThatGoPastEachOtherMixAsLight) {
-  const ThinDisc disc;
-  const Eigen::Vector2d centre(80.3, 70.2);
-  const Photograph picture = photographed(
-      {160, 140}, {90.0, 60.0, 30.0},
-      [](double, double) -> Rgb {
-        return {200.0, 170.0, 130.0};
-      },
-      [&](double x, double y) {
-        return in_ellipse(x - centre.x(), y - centre.y(), 36.0, 36.0, 0.0) ? 1.0 : 0.0;
-      });
-  const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
-                                            disc.body, disc.camera, disc.at(centre, 0.0));
-  ASSERT_FALSE(colour.empty());
-  for (const double shade : ColourWindow::kShades)
-    for (double covered = 0.0; covered <= 1.0; covered += 0.05) {
-      EXPECT_GE(colour.mixing_in(shade).shown(covered), -1e-9) << shade << ", " << covered;
-      EXPECT_LE(colour.mixing_in(shade).shown(covered), 1.0 + 1e-9) << shade << ", " << covered;
-      EXPECT_GE(colour.mixing_in(shade).slope(covered), -1e-9) << shade << ", " << covered;
-    }
 }
 
 }  // namespace

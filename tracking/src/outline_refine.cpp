@@ -87,8 +87,8 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
           : sample_profile(picture, plate, sample.image_px + middle * sample.normal_px,
                            sample.normal_px, {inside, outside}, look.profile);
   if (!sampled) return false;
-  look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8) + (colour ? 16 : 0);
-  look.outside = sample.silhouette ? (colour ? -2 : -1) : look.curve;
+  look.curve = static_cast<int>(sample.edge) + (sample.silhouette ? 0 : 8);
+  look.outside = sample.silhouette ? -1 : look.curve;
   look.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
   look.reach_px = std::min(search.reach_px + widen, std::min(inside, outside));
   look.curved = !colour && scenery.camera.transfer != data::Transfer::linear;
