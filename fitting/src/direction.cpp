@@ -34,11 +34,14 @@ Departure departure(const Eigen::Vector2d& seen, const Eigen::Vector2d& predicte
   constexpr double kMost = 3.0;  // rad
   const double omega = std::atan2(ab.norm(), c);
   if (omega > kMost) {
-    constexpr double kLeastNorm = 1e-9;
-    const double norm = std::max(kLeastNorm, ab.norm());
-    const Eigen::Vector2d along = ab / norm;
+    // There every direction is as good as any other, and turns without bounds from one to the next.
+    constexpr double kLeastNorm = 1e-3;
+    const double norm = ab.norm();
+    const Eigen::Vector2d along =
+        norm > 0.0 ? Eigen::Vector2d(ab / norm) : Eigen::Vector2d::UnitX();
     result.way = kMost * along;
-    result.slope = kMost / norm * (Eigen::Matrix2d::Identity() - along * along.transpose()) * slope;
+    result.slope = kMost / std::max(kLeastNorm, norm) *
+                   (Eigen::Matrix2d::Identity() - along * along.transpose()) * slope;
     return result;
   }
   double f = 1.0, f_by_c = -1.0 / 3.0;  // limits for omega -> 0

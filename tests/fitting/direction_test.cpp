@@ -91,6 +91,11 @@ TEST(Direction, IsFarthestFromTheOppositeAxis) {
   }
   constexpr double kFar = 25.0;  // standard deviations
   EXPECT_GT(before, kFar);
+  const Eigen::Vector2d opposite(std::numbers::pi - seen.theta_rad,
+                                 seen.phi_rad + std::numbers::pi);
+  Eigen::MatrixXd by_angles;
+  EXPECT_GT(residuals(seen, opposite, Faces::different, &by_angles).norm(), kFar);
+  EXPECT_TRUE(by_angles.allFinite());
 }
 
 TEST(Direction, ChangesWithThePredictedAnglesAsItsDerivativesSay) {
