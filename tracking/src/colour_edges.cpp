@@ -51,7 +51,8 @@ using Halves = std::array<Cover, kHalvesPx.size()>;
 
 // A pixel of the colour planes near one border.
 struct Pixel {
-  double value = 0.0, luma = 0.0;  // beyond what has no colour
+  double value = 0.0;  // colour, from what has none
+  double luma = 0.0;
   Halves halves{};
   double covered = 0.0, density = 0.0;  // as a share of the body's colour
   PoseMotion::Step change{};

@@ -43,14 +43,14 @@ struct ColourWindow {
   cv::Point corner{};        ///< their first pixel, in pixels of the planes
   double neutral = 0.0;      ///< level of what has no colour
   double ground_luma = 1.0;  ///< of the surroundings
-  /// Where the surroundings are as bright as usual and where they lie in the shade, darker by these
-  /// factors.
+  /// Brightness of the surroundings, over that of all around, for which it is known how they mix.
   static constexpr std::array<double, 5> kShades{1.25, 1.0, 0.75, 0.5, 0.3};
   std::array<ColourMixing, kShades.size()> mixings{};
   double body = 0.0;
   bool plain = false;  ///< so much apart that a few pixels tell the body from its surroundings
 
   [[nodiscard]] bool empty() const { return levels.empty(); }
+  /// How body and surroundings mix where the latter are so much brighter (> 1) or darker.
   [[nodiscard]] const ColourMixing& mixing_in(double shade) const;
   /// Where a pixel of the planes is in the picture: amid the four it belongs to.
   [[nodiscard]] Eigen::Vector2d place_of(int x, int y) const {
