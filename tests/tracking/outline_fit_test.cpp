@@ -151,6 +151,33 @@ TEST(EdgeStretch, ANarrowStripIsNotTheEdge) {
   EXPECT_NEAR(mean_offset_px(profiles), 0.1, kTolerance_px);
 }
 
+// A face in the light, a wall in the shade and a floor in the shadow: between the two dark ones
+// there is next to no contrast, and what tells where both edges are is the wall's inner one.
+TEST(EdgeStretch, AWallInTheShadeIsSeenByWhereItBegins) {
+  constexpr double kFace = 85.0, kWall = 19.0, kFloor = 8.0, kWall_px = 1.9, kBlur_px = 0.6;
+  std::mt19937 random(23);
+  std::normal_distribution<double> noise(0.0, 0.7);
+  const auto beyond = [](double s) {
+    return 0.5 * std::erfc(-s / (kBlur_px * std::numbers::sqrt2));
+  };
+  for (const double offset_px : {-0.2, 0.0, 0.2}) {
+    std::vector<StretchProfile> profiles;
+    for (int i = 0; i < kProfiles; ++i) {
+      profiles.push_back(profile_of(0.0, kBlur_px, 0.0, kWall_px, 0.0, random));
+      Profile& p = profiles.back().profile;
+      for (size_t j = 0; j < static_cast<size_t>(p.count); ++j) {
+        const double s = static_cast<double>(p.s_px[j]) - offset_px;
+        p.light[j] = static_cast<float>(kFace + (kWall - kFace) * beyond(s + kWall_px) +
+                                        (kFloor - kWall) * beyond(s) + noise(random));
+      }
+    }
+    fit_stretches(profiles);
+    constexpr double kTolerance_px = 0.04;  // a fifth of how far it is off
+    EXPECT_NEAR(mean_offset_px(profiles), offset_px, kTolerance_px);
+    EXPECT_GT(profiles[kProfiles / 2].edge.strip_share, 0.5);
+  }
+}
+
 double mean_square_px2(const std::vector<StretchProfile>& profiles) {
   double sum = 0.0;
   for (const StretchProfile& p : profiles) sum += p.edge.offset_px * p.edge.offset_px;
@@ -712,6 +739,33 @@ TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
       fitter.measure({.luma = luma, .background = plate, .detection = {}, .predicted = predicted});
   ASSERT_TRUE(seen);
   constexpr double kTolerance_rad = 0.05, kTolerance_px = 0.4;
+  EXPECT_NEAR(seen->pose.theta_rad, kTheta, kTolerance_rad);
+  EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
+}
+
+// The wall lies in the shade and the floor beside it in the shadow. A disc half a pixel off and
+// tilted more, beside a brighter wall, looks nearly like it.
+TEST(OutlineFitter, AWallInTheShadeOverADarkFloorDoesNotTiltTheDisc) {
+  FlatDisc disc;
+  disc.body.thickness_m = 0.005;
+  constexpr double kTheta = 0.4, kFloor = 10.0, kWall = 25.0, kFace = 120.0;
+  const Eigen::Vector2d centre(80.2, 70.4);
+  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
+  draw_cylinder(picture, centre, 30.0, 2.5, kTheta, kWall, kFace);
+  std::mt19937 random(15);
+  const cv::Mat luma = developed(picture, 2.0, random);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  data::Pose<> predicted;
+  predicted.theta_rad = kTheta + 0.05;
+  predicted.centre_m =
+      disc.camera.table_from_image(centre + Eigen::Vector2d(0.0, 0.6),
+                                   data::height_on_floor_m(predicted.theta_rad, disc.body.radius_m,
+                                                           disc.body.half_thickness_m()));
+  const cv::Mat no_plate;
+  const auto seen = fitter.measure(
+      {.luma = luma, .background = no_plate, .detection = {}, .predicted = predicted});
+  ASSERT_TRUE(seen);
+  constexpr double kTolerance_rad = 0.02, kTolerance_px = 0.15;
   EXPECT_NEAR(seen->pose.theta_rad, kTheta, kTolerance_rad);
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
 }

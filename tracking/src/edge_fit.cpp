@@ -97,7 +97,8 @@ bool fit_edge(const Profile& profile, double blur_px, bool plate, double reach_p
   }
   edge.offset_px = offset;
   edge.noise_variance_px2 = profile.shared * kUsualNoise2 / information;
-  edge.shading_variance_px2 = edge.strip_variance_px2 = edge.inner_slope = edge.outer_slope = 0.0;
+  edge.shading_variance_px2 = edge.strip_variance_px2 = edge.strip_share = edge.inner_slope =
+      edge.outer_slope = 0.0;
   const double ground = plate ? profile.background[profile.nearest(offset)] : 1.0;
   edge.contrast = static_cast<double>(sums.outer) * ground - static_cast<double>(sums.inner);
   edge.mean_level = static_cast<double>(sums.inner) + 0.5 * edge.contrast;

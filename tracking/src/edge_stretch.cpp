@@ -35,10 +35,10 @@ const std::array<float, 256>& gains_of_light() {
   return table;
 }
 
-// Largest slopes [per px] and bends [per px^2] of the light and difference of a strip, as shares of
-// the light.
+// Largest slopes [per px] and bends [per px^2] as shares of the light, and difference of a strip as
+// one of the body's.
 Shading largest_shading() {
-  constexpr double kSlope = 0.06, kBend = 0.02, kStrip = 0.3;
+  constexpr double kSlope = 0.06, kBend = 0.02, kStrip = 0.6;
   return (Shading() << kSlope, kSlope, kBend, kBend, kStrip).finished();
 }
 
@@ -96,6 +96,7 @@ class Fitting {
                                      std::optional<double> wider_px = {});
   void widen(double step);
   void find_noise(const std::vector<Noise>& assumed);
+  void take_strips();
   void find_levels(Side side, const std::vector<double>& noise2);
   [[nodiscard]] double change_of_levels(size_t i) const;
   void find_stretches(Side side);
@@ -233,6 +234,7 @@ void Fitting::take_sums(size_t i) {
   const Block& b = block_of(i);
   const size_t l = i % kLanes;
   look.most = b.light[l] * largest_shading();
+  look.most[kShading - 1] = b.body[l] * largest_shading()[kShading - 1];
   look.left_square = b.left_square[l];
   ShadingEvidence& e = evidence_[i];
   for (int j = 0; j < kShading; ++j) {
@@ -348,7 +350,10 @@ double Fitting::find_shadings(const std::vector<double>& noise2, int rounds,
 // Squared residuals beside and on the edge about the best step with this shading.
 void Fitting::find_noise(const std::vector<Noise>& assumed) {
   for (size_t i = 0; i < looks_.size(); ++i) {
-    const Shading shading = looks_[i].most.cwiseProduct(looks_[i].estimate.shading);
+    Shading shading = looks_[i].most.cwiseProduct(looks_[i].estimate.shading);
+    // No wall is darker than black.
+    shading[kShading - 1] =
+        std::max(shading[kShading - 1], -static_cast<double>(block_of(i).inner[i % kLanes]));
     for (int k = 0; k < kShading; ++k)
       block_of(i).shading[k][i % kLanes] = static_cast<float>(shading[k]);
   }
@@ -371,6 +376,14 @@ void Fitting::find_noise(const std::vector<Noise>& assumed) {
     look.noise_freedom -= Eigen::Array3d(0.5, 0.5, 0.0) * shading;
     look.noise_freedom = look.noise_freedom.max(kLeastFreedom);
   }
+}
+
+// What strips there are, as far as the shading tells.
+void Fitting::take_strips() {
+  constexpr int kStrip = kShading - 1;
+  for (Block& b : blocks_)
+    for (size_t l = 0; l < kLanes; ++l)
+      b.strip[l] = b.strip_px[l] > 0.0f ? b.shading[kStrip][l] : 0.0f;
 }
 
 // Variances of a sample from a stretch of the outline.
@@ -545,6 +558,7 @@ void Fitting::find_offsets(const std::vector<Noise>& noise) {
     for (int k = 0; k < kShading; ++k) pull[k] = look.most[k] * static_cast<double>(b.pull[k][l]);
     ProfileEdge& e = profiles_[i].edge;
     e.offset_px = static_cast<double>(b.offset_px[l]);
+    e.strip_share = static_cast<double>(b.strip_share[l]);
     e.noise_variance_px2 = 1.0 / static_cast<double>(b.information[l]);
     const ShadingMatrix& covariance = look.estimate.covariance;
     e.shading_variance_px2 = pull.dot(covariance * pull);
@@ -582,6 +596,7 @@ StretchFit Fitting::run(bool weighed) {
       expect_levels(side);
     }
     compare_with_rest();
+    take_strips();
     sum(noise);
     out.wider_px = find_shadings(std::vector<double>(looks_.size(), 1.0), 2, out.wider_px);
     find_noise(noise);

@@ -72,7 +72,8 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   // A wall too narrow to look past: a strip of its own beside the face.
   look.strip_px = 0.0;
   if (search.exact && sample.edge == Edge::lower_rim && inside < extent) {
-    look.strip_px = sample.inside_px;
+    constexpr double kTooNarrowPx = 0.25;  // to show a level of its own
+    look.strip_px = sample.inside_px > kTooNarrowPx ? sample.inside_px : 0.0;
     inside = extent;
   }
   const double outside = clear_of_next(sample.outside_px - half_range, extent, look.blur_px);
@@ -212,6 +213,8 @@ EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, b
   const bool bore = is_bore(sample.edge);
   EdgeEquation e;
   e.motion = sample.motion.transpose();
+  if (edge.strip_share != 0.0)
+    e.motion += edge.strip_share * (sample.near_motion - sample.motion).transpose();
   e.swell = bore ? -1.0 : 1.0;
   e.polarity = edge.contrast < 0.0 ? -1.0 : 1.0;
   constexpr double kMostTone = 2.0;

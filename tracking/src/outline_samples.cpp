@@ -88,6 +88,7 @@ class Piece {
     s.inside_px = between(from_.inside_px, to_.inside_px);
     s.outside_px = between(from_.outside_px, to_.outside_px);
     s.motion += u * (to_.motion - from_.motion);
+    if (s.near_motion.size() > 0) s.near_motion += u * (to_.near_motion - from_.near_motion);
     return s;
   }
   [[nodiscard]] double curvature_per_px() const { return curvature_; }
@@ -116,6 +117,7 @@ OutlineSample middle_of(const OutlineSample& a, const OutlineSample& b) {
   both.inside_px = std::min(a.inside_px, b.inside_px);
   both.outside_px = std::min(a.outside_px, b.outside_px);
   both.motion = 0.5 * (a.motion + b.motion);
+  if (both.near_motion.size() > 0) both.near_motion = 0.5 * (a.near_motion + b.near_motion);
   return both;
 }
 
@@ -202,14 +204,27 @@ std::vector<OutlineSample> outline_samples(const data::Body& body, const data::P
     Reach reach{point, J};
     limit_reach(shape, reach);
     const double px_per_m = J.leftCols<2>().norm() / std::numbers::sqrt2;
-    OutlineSample sample{point.edge,      point.silhouette, point.image_px,
-                         point.normal_px, point.arc_px,     px_per_m * point.table_m.z(),
-                         reach.inside,    reach.outside,    {}};
+    OutlineSample sample{point.edge,
+                         point.silhouette,
+                         point.image_px,
+                         point.normal_px,
+                         point.arc_px,
+                         px_per_m * point.table_m.z(),
+                         reach.inside,
+                         reach.outside,
+                         {},
+                         {}};
     const Eigen::RowVector3d normal = point.normal_px.transpose() * J;
+    const auto motion_at = [&](const Eigen::Vector3d& arm) {
+      OutlineSample::Motion out(motion.count());
+      for (int i = 0; i < motion.count(); ++i)
+        out[i] = normal.dot(v.col(i).head<3>() + v.col(i).tail<3>().cross(arm));
+      return out;
+    };
     const Eigen::Vector3d arm = point.table_m - pose.centre_m;
-    sample.motion.resize(motion.count());
-    for (int i = 0; i < motion.count(); ++i)
-      sample.motion[i] = normal.dot(v.col(i).head<3>() + v.col(i).tail<3>().cross(arm));
+    sample.motion = motion_at(arm);
+    if (point.edge == Edge::lower_rim)
+      sample.near_motion = motion_at(arm + shape.thickness * shape.axis);
     samples.push_back(sample);
   }
   return samples;

@@ -20,7 +20,9 @@ struct OutlineSample {
   double height_px;              ///< above the floor, at the scale of the picture there
   double inside_px, outside_px;  ///< along the normal to the next edge of the body itself
   /// How far the outline moves along its normal per unit of each parameter.
-  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, PoseMotion::kMost> motion;
+  using Motion = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, PoseMotion::kMost>;
+  Motion motion;
+  Motion near_motion;  ///< of the near face's rim across the wall, along the same normal; or empty
 };
 
 /// Samples the visible outline about every `step_px`. A smooth body's apparent contour moves along

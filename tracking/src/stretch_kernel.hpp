@@ -37,6 +37,7 @@ struct alignas(kAlign) Sample {
   // fast the first, a slope and a bend grow with the edge; slopes, bends and strip.
   Floats share, inside, outside;
   Floats density, sloping_density, bending_density;
+  Floats strip_density, sloping_strip_density;  // of the strip's inner edge
   Floats shading[kShading];
   Floats gain;  ///< of the light, over the levels of the picture, in which noise is even
 };
@@ -55,12 +56,16 @@ struct alignas(kAlign) Block {
   // Given or 0: what the levels inside and outside are expected to be, in light, and how surely, as
   // the inverse variance.
   Floats expected_level[2] = {}, level_precision[2] = {};
+  // Given or 0: by how much the strip's light differs from that of the rest, for how the picture
+  // changes with the offset and the blur. Its inner edge moves along with the outer one.
+  Floats strip = {};
   // By find_columns.
   Masks usable = {};
   Floats inner = {}, outer = {};  ///< levels of the plain step
   // By sum_columns.
   Floats normal[at(kAll, 0)], right[kAll];
   Doubles light;  ///< brighter level
+  Doubles body;   ///< that inside, or a little of the former
   // Of shading and blur with levels and offset free; of all residuals, after fitting everything.
   Doubles shading_normal[at(kShading, 0)], shading_right[kShading], blur_cross[kShading];
   Doubles blur_normal, blur_right, left_square;
@@ -74,6 +79,7 @@ struct alignas(kAlign) Block {
   // By find_offsets.
   Masks found;
   Floats offset_px, information, pull[kShading];
+  Floats strip_share;  ///< of the offset, that the strip's inner edge tells
 };
 
 /// Variances of a sample inside, outside and on the edge.

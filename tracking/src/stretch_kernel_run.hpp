@@ -66,7 +66,8 @@ void find_columns(Block& b, Sample* samples, const Tables& tables) {
     Sample& c = samples[k];
     const Floats s = c.s_px, ground = c.ground;
     Floats share = zero, sloping = zero, bending = zero;
-    Floats density = zero, sloping_density = zero, bending_density = zero, beyond = zero;
+    Floats density = zero, sloping_density = zero, bending_density = zero;
+    Floats beyond = zero, strip_density = zero, sloping_strip_density = zero;
     for (int j = 0; j < b.steps; ++j) {
       const Floats off = s - b.step_at_px[j], part = b.step_part[j] * c.valid;
       const Step step = normal_at(tables.normal, off * inverse);
@@ -74,11 +75,17 @@ void find_columns(Block& b, Sample* samples, const Tables& tables) {
       share += of_share, sloping += off * of_share, bending += off * off * of_share;
       density += of_density, sloping_density += off * of_density;
       bending_density += off * off * of_density;
-      if (strips) beyond += part * normal_at(tables.normal, (off + b.strip_px) * inverse).share;
+      if (!strips) continue;
+      const Floats within = off + b.strip_px;
+      const Step inner = normal_at(tables.normal, within * inverse);
+      beyond += part * inner.share;
+      strip_density += part * inverse * inner.density;
+      sloping_strip_density += within * part * inverse * inner.density;
     }
     c.share = share;
     c.inside = c.valid - share, c.outside = share * ground;
     c.density = density, c.sloping_density = sloping_density, c.bending_density = bending_density;
+    c.strip_density = strip_density, c.sloping_strip_density = sloping_strip_density;
     c.shading[0] = s - sloping, c.shading[1] = sloping * ground;
     c.shading[2] = (s * s + square) * c.valid - bending, c.shading[3] = bending * ground;
     c.shading[4] = b.strip_px > zero ? beyond - share : zero;
@@ -100,6 +107,11 @@ void find_columns(Block& b, Sample* samples, const Tables& tables) {
     for (int l = 0; l < kLanes; ++l) gain[l] = tables.gain[place[l]];
     c.gain = b.curved * c.valid > zero ? gain : c.gain;
   }
+}
+
+// How fast a sample's light grows with the offset, levels being as they are beside plain steps.
+TROCHOID_INLINE Floats change_with_offset(const Block& b, const Sample& c) {
+  return (b.inner + b.strip - b.outer * c.ground) * c.density - b.strip * c.strip_density;
 }
 
 // The columns of the model, then the residual of the plain step; with their weights beside.
@@ -148,8 +160,10 @@ void reduce(Block& b, Floats square_sum, const double* largest) {
   const Doubles zero = {}, least_light = zero + 2.0;
   const Doubles inner = wide(b.inner), outer = wide(b.outer);
   b.light = larger(least_light, larger(larger(inner, -inner), larger(outer, -outer)));
+  constexpr double kLeastOfLight = 0.05;
+  b.body = larger(larger(inner, -inner), kLeastOfLight * b.light);
   for (int k = 0; k < kShading; ++k) {
-    const Doubles most = b.light * largest[k];
+    const Doubles most = (k < kShading - 1 ? b.light : b.body) * largest[k];
     m[at(kOwn + k, kOwn + k)] += 1.0 / (most * most);
     eliminate(kOwn + k, kAll - 1, m, r, square);
   }
@@ -162,10 +176,11 @@ void sum_columns(Block& b, const Sample* samples, const Variances& noise, const 
   for (int k = 0; k < b.samples; ++k) {
     const Sample& c = samples[k];
     WeighedRow& row = rows[k];
-    const Floats contrast = b.inner - b.outer * c.ground;
-    row.value[0] = c.inside, row.value[1] = c.outside, row.value[2] = contrast * c.density;
+    const Floats contrast = b.inner + b.strip - b.outer * c.ground;
+    row.value[0] = c.inside, row.value[1] = c.outside, row.value[2] = change_with_offset(b, c);
     for (int i = 0; i < kShading; ++i) row.value[kOwn + i] = c.shading[i];
-    row.value[kAll - 1] = contrast * c.sloping_density * inverse_sharp;
+    row.value[kAll - 1] =
+        (contrast * c.sloping_density - b.strip * c.sloping_strip_density) * inverse_sharp;
     row.value[kAll] = c.light - b.inner * c.inside - b.outer * c.outside;
     Floats parts[3];
     parts_of(c.share, parts);
@@ -225,7 +240,7 @@ void find_noise(Block& b, const Sample* samples, const Variances& assumed) {
   Floats light_square = zero, square[3] = {}, freedom[3] = {};
   for (int k = 0; k < b.samples; ++k) {
     const Sample& c = samples[k];
-    const Floats in = c.inside, out = c.outside, d = (b.inner - b.outer * c.ground) * c.density;
+    const Floats in = c.inside, out = c.outside, d = change_with_offset(b, c);
     Floats rest = c.light - inner * in - outer * out - own2 * d;
     for (int i = 0; i < kShading; ++i) rest -= c.shading[i] * b.shading[i];
     Floats parts[3];
@@ -247,14 +262,16 @@ void find_noise(Block& b, const Sample* samples, const Variances& assumed) {
 void find_offsets(Block& b, const Sample* samples, const Variances& noise) {
   const Floats zero = {};
   const Floats* v = b.shading;
-  const Floats beside = b.strip_px > zero ? v[4] : zero;  // of the edge the strip's level counts
+  const Floats strip = b.strip_px > zero ? v[4] : zero;
   Floats aa = zero, ab = zero, bb = zero, ad = zero, bd = zero, dd = zero;
   Floats ar = zero, br = zero, dr = zero;
   Floats of_a[kShading] = {}, of_b[kShading] = {}, of_d[kShading] = {};
+  Floats strip_a = zero, strip_b = zero, strip_d = zero;  // of its inner edge
   for (int k = 0; k < b.samples; ++k) {
     const Sample& c = samples[k];
     const Floats in = c.inside, out = c.outside, ground = c.ground;
-    const Floats d = (b.inner + beside - b.outer * ground) * c.density +
+    const Floats of_strip = -strip * c.strip_density;
+    const Floats d = (b.inner + strip - b.outer * ground) * c.density + of_strip +
                      (v[0] - v[1] * ground) * c.sloping_density +
                      (v[2] - v[3] * ground) * c.bending_density;
     Floats rest = c.light - b.inner * in - b.outer * out;
@@ -265,6 +282,7 @@ void find_offsets(Block& b, const Sample* samples, const Variances& noise) {
     const Floats wa = weight * in, wb = weight * out, wd = weight * d;
     aa += wa * in, ab += wb * in, bb += wb * out, ad += wd * in, bd += wd * out, dd += wd * d;
     ar += wa * rest, br += wb * rest, dr += wd * rest;
+    strip_a += wa * of_strip, strip_b += wb * of_strip, strip_d += wd * of_strip;
     for (int i = 0; i < kShading; ++i) {
       of_a[i] += wa * c.shading[i];
       of_b[i] += wb * c.shading[i];
@@ -278,6 +296,7 @@ void find_offsets(Block& b, const Sample* samples, const Variances& noise) {
   const Floats in = (bb * ad - ab * bd) / determinant, out = (aa * bd - ab * ad) / determinant;
   b.information = dd - in * ad - out * bd;
   b.offset_px = (dr - in * ar - out * br) / b.information;
+  b.strip_share = (strip_d - in * strip_a - out * strip_b) / b.information;
   for (int i = 0; i < kShading; ++i)
     b.pull[i] = (of_d[i] - in * of_a[i] - out * of_b[i]) / b.information;
   const Floats off = larger(b.offset_px, -b.offset_px);
