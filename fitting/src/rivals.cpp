@@ -26,14 +26,16 @@ bool in_question(const Rung& rung, const Rung& chosen) {
 
 // Those that may be right as well, or those against which there is strong evidence, but only for
 // being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
-// where residuals hang together: a further term may then only follow the tracker's errors.
+// where residuals hang together, as a further term may then only follow the tracker's errors; but
+// those do for which BIC speaks, though not strongly, all the same.
 std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen, bool too_large) {
   const bool white = chosen.fit.whiteness_p >= kWhite;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
-    if (!in_question(rung, chosen) || (larger && !white) ||
+    const bool trusted = white || rung.bic < chosen.bic;
+    if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
     const double lead = larger && !too_large ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;

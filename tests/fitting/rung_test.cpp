@@ -177,6 +177,23 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
       << fit.warnings[0];
 }
 
+// The simplest model that is not clearly worse is chosen, though one with a term more may be
+// better.
+TEST(Rivals, WithATermMoreForWhichBicSpeaksWidenTheErrorBarsThoughResidualsHangTogether) {
+  std::vector<Rung> rungs{
+      rung_of({1}, {loss("pivoting_friction_m", 2.1, 0.01)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("pivoting_friction_m", 2.0, 0.04), loss("air_N_m_s", 1.0, 0.3)}, 90.0,
+              97.0)};
+  rungs[0].fit.whiteness_p = 1e-6;
+  const double weight = std::exp(1.5) / (1.0 + std::exp(1.5));
+  const double expected =
+      std::sqrt((1.0 - weight) * 0.01 * 0.01 + weight * (0.04 * 0.04 + 0.1 * 0.1));
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  EXPECT_NEAR(fit.parameters[0].sigma, expected, 1e-12);
+  EXPECT_EQ(fit.warnings.size(), 1u);
+}
+
 // It was left out for being larger, not for being wrong.
 TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals) {
   std::vector<Rung> rungs{
