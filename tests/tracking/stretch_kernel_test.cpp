@@ -15,7 +15,7 @@ extern const Kernel isa_baseline;
 namespace {
 
 constexpr int kSamples = 24;
-constexpr double kLargest[kShading] = {0.06, 0.06, 0.02, 0.02, 0.3};
+constexpr double kLargest[kShading] = {0.06, 0.06, 0.02, 0.02, 0.6};
 
 // Noisy steps at different places, some of them with a strip beside.
 std::vector<Sample> steps_of(unsigned seed, Block& block) {
@@ -29,6 +29,7 @@ std::vector<Sample> steps_of(unsigned seed, Block& block) {
     block.own_share[l] = 1.0f;
     block.reach_px[l] = 2.0f;
     block.strip_px[l] = l % 2 == 0 ? 0.0f : 2.0f;
+    block.strip[l] = block.shading[kShading - 1][l] = l % 2 == 0 ? 0.0f : -30.0f;
     block.expected_level[1][l] = 139.0f;
     block.level_precision[1][l] = l % 3 == 0 ? 0.0f : 2.0f;
     const float at_px = 0.3f * noise(random);
@@ -36,7 +37,9 @@ std::vector<Sample> steps_of(unsigned seed, Block& block) {
       Sample& s = samples[static_cast<size_t>(k)];
       s.s_px[l] = 0.4f * static_cast<float>(k - kSamples / 2);
       const float share = 0.5f * std::erfc((at_px - s.s_px[l]) / (0.8f * std::sqrt(2.0f)));
-      s.light[l] = 60.0f + 80.0f * share + noise(random);
+      const float within_px = at_px - s.s_px[l] - block.strip_px[l];
+      const float beyond = 0.5f * std::erfc(within_px / (0.8f * std::sqrt(2.0f)));
+      s.light[l] = 60.0f + 80.0f * share + block.strip[l] * (beyond - share) + noise(random);
       s.ground[l] = s.valid[l] = 1.0f;
     }
   }
@@ -64,6 +67,7 @@ TEST(StretchKernel, EveryMachineFindsTheSameOffsets) {
       ASSERT_NE(here.found[l], 0) << "seed " << seed << ", look " << l;
       EXPECT_EQ(here.offset_px[l], plain.offset_px[l]) << "seed " << seed;
       EXPECT_EQ(here.information[l], plain.information[l]) << "seed " << seed;
+      EXPECT_EQ(here.strip_share[l], plain.strip_share[l]) << "seed " << seed;
     }
   }
 }

@@ -10,7 +10,8 @@ struct ProfileEdge {
   double shading_variance_px2 = 0.0;  ///< from not knowing how the levels go on under the blur
   /// From thinking a strip beside it less than it is, alike all along the edge.
   double strip_variance_px2 = 0.0;
-  /// How much of the offset is that of the strip's inner edge: a share of one, mostly.
+  /// How much of the offset is that of the strip's inner edge: 0..1, and beyond where one of the
+  /// two edges is dark towards what the other is bright to.
   double strip_share = 0.0;
   double unevenness = 1.0;  ///< 0..1: how much the light beside edges here changes
   double contrast = 0.0;    ///< outer minus inner level at the edge

@@ -35,8 +35,8 @@ const std::array<float, 256>& gains_of_light() {
   return table;
 }
 
-// Largest slopes [per px] and bends [per px^2] as shares of the light, and difference of a strip as
-// one of the body's.
+// Largest slopes [per px] and bends [per px^2], as shares of the light; largest difference of a
+// strip, as a share of the light of the body.
 Shading largest_shading() {
   constexpr double kSlope = 0.06, kBend = 0.02, kStrip = 0.6;
   return (Shading() << kSlope, kSlope, kBend, kBend, kStrip).finished();

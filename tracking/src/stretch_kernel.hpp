@@ -65,7 +65,7 @@ struct alignas(kAlign) Block {
   // By sum_columns.
   Floats normal[at(kAll, 0)], right[kAll];
   Doubles light;  ///< brighter level
-  Doubles body;   ///< that inside, or a little of the former
+  Doubles body;   ///< level inside, at least a share of `light`
   // Of shading and blur with levels and offset free; of all residuals, after fitting everything.
   Doubles shading_normal[at(kShading, 0)], shading_right[kShading], blur_cross[kShading];
   Doubles blur_normal, blur_right, left_square;
@@ -100,7 +100,7 @@ struct Kernel {
   void (*find_columns)(Block&, Sample*, const Tables&);
   /// Sums of all columns, samples weighed by their noise, with what is expected of the levels;
   /// projects levels and offset out of those for shading and blur, and shading as large as it can
-  /// be (of unit light) out of the square.
+  /// be (of unit light, the strip of that of the body) out of the square.
   void (*sum_columns)(Block&, const Sample*, const Variances&, const double* largest_shading);
   /// Residuals beside and on the edge about the best step with the given shading, whose levels it
   /// keeps, and the degrees of freedom that the fit has left them.
