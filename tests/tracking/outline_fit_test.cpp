@@ -702,6 +702,20 @@ void draw_cylinder(cv::Mat& picture, const Eigen::Vector2d& centre_px, double ra
               radius_px * std::cos(theta_rad), 0.0, k < kSlices ? wall : face);
 }
 
+// Levels of a cylinder and the floor it is on.
+struct Lit {
+  double floor, wall, face;
+};
+
+// That of a disc 60 px across, with noise of 2 levels.
+cv::Mat photograph_of_cylinder(const Eigen::Vector2d& centre_px, double half_thickness_px,
+                               double theta_rad, const Lit& lit) {
+  cv::Mat picture(140, 160, CV_64F, cv::Scalar(lit.floor));
+  draw_cylinder(picture, centre_px, 30.0, half_thickness_px, theta_rad, lit.wall, lit.face);
+  std::mt19937 random(15);
+  return developed(picture, 2.0, random);
+}
+
 // What of each pixel of the chroma planes a cylinder covers, blended once.
 cv::Mat covered_by_cylinder(const cv::Size& size, const Eigen::Vector2d& centre_px,
                             double radius_px, double half_thickness_px, double theta_rad) {
@@ -722,12 +736,9 @@ cv::Mat covered_by_cylinder(const cv::Size& size, const Eigen::Vector2d& centre_
 TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
   FlatDisc disc;
   disc.body.thickness_m = 0.008;
-  constexpr double kTheta = 0.4, kFloor = 130.0, kWall = 80.0, kFace = 230.0;
+  constexpr double kTheta = 0.4, kFloor = 130.0;
   const Eigen::Vector2d centre(80.2, 70.4);
-  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
-  draw_cylinder(picture, centre, 30.0, 4.0, kTheta, kWall, kFace);
-  std::mt19937 random(15);
-  const cv::Mat luma = developed(picture, 2.0, random);
+  const cv::Mat luma = photograph_of_cylinder(centre, 4.0, kTheta, {kFloor, 80.0, 230.0});
   const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
   const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
   data::Pose<> predicted;
@@ -748,12 +759,9 @@ TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
 TEST(OutlineFitter, AWallInTheShadeOverADarkFloorDoesNotTiltTheDisc) {
   FlatDisc disc;
   disc.body.thickness_m = 0.005;
-  constexpr double kTheta = 0.4, kFloor = 10.0, kWall = 25.0, kFace = 120.0;
+  constexpr double kTheta = 0.4;
   const Eigen::Vector2d centre(80.2, 70.4);
-  cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
-  draw_cylinder(picture, centre, 30.0, 2.5, kTheta, kWall, kFace);
-  std::mt19937 random(15);
-  const cv::Mat luma = developed(picture, 2.0, random);
+  const cv::Mat luma = photograph_of_cylinder(centre, 2.5, kTheta, {10.0, 25.0, 120.0});
   const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
   data::Pose<> predicted;
   predicted.theta_rad = kTheta + 0.05;
