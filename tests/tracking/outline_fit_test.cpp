@@ -773,6 +773,7 @@ TEST(OutlineFitter, AWallInTheShadeOverADarkFloorDoesNotTiltTheDisc) {
   const auto seen = fitter.measure(
       {.luma = luma, .background = no_plate, .detection = {}, .predicted = predicted});
   ASSERT_TRUE(seen);
+  // A third of how far off the other reading is.
   constexpr double kTolerance_rad = 0.02, kTolerance_px = 0.15;
   EXPECT_NEAR(seen->pose.theta_rad, kTheta, kTolerance_rad);
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
