@@ -97,6 +97,17 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   return true;
 }
 
+// Blur moves what is seen of a curved edge towards the inside of the curve, as the light beside it
+// comes from more directions there: to first order by half the curvature times the variance.
+double rounded_by_blur_px(const Crossings& crossings, double blur_px) {
+  constexpr double kMostCurvature = 0.5;  // as far as first order goes
+  double sum = 0.0;
+  for (int i = 0; i < crossings.count; ++i)
+    sum += crossings.at[static_cast<size_t>(i)].curvature_per_px;
+  const double curvature = std::clamp(sum / crossings.count, -kMostCurvature, kMostCurvature);
+  return -0.5 * curvature * blur_px * blur_px;
+}
+
 // What stretches of the outline look like; single profiles are too noisy for this, and their errors
 // would go with those of their edges.
 struct Surroundings {
@@ -312,6 +323,7 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool last, 
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
     EdgeEquation equation = equation_of(sample, looks[i].edge, false);
+    equation.offset_px -= rounded_by_blur_px(round.crossings[places[i]], search.blur_px);
     equation.model_px =
         model_sd_px(looks[i].edge, looks[i].profile.clipped(), around[i], sample.silhouette);
     if (sample.silhouette)
