@@ -129,19 +129,32 @@ TEST(ColourEdges, ADiscThatTurnsUnderTheOpenShutterIsMeasuredByWhatItCovers) {
   }
 }
 
-// What the colour planes alone say of the centre of a disc predicted 0.4 px beside its place.
-Eigen::Vector2d centre_by_colour(const ThinDisc& disc, const Photograph& picture,
-                                 const Eigen::Vector2d& centre, double theta_rad) {
+// What the colour planes alone say of a disc where it is predicted to be.
+struct ByColour {
+  std::vector<OutlineSample> outline;
+  std::vector<ColourEdge> edges;
+};
+
+ByColour seen_by_colour(const ThinDisc& disc, const Photograph& picture,
+                        const data::Pose<>& predicted) {
   const PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
-  const data::Pose<> predicted = disc.at(centre + Eigen::Vector2d(0.4, 0.0), theta_rad);
   const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
                                             disc.body, disc.camera, predicted);
-  const auto outline = outline_samples(disc.body, predicted, disc.camera, motion, 2.0);
+  ByColour seen{outline_samples(disc.body, predicted, disc.camera, motion, 2.0), {}};
+  constexpr double kBlurPx = 0.6, kReachPx = 3.0;
+  seen.edges =
+      find_colour_edges(colour, {seen.outline, Moments(), PoseMotion::Step()}, kBlurPx, kReachPx);
+  return seen;
+}
+
+// The centre of a disc predicted 0.4 px beside its place.
+Eigen::Vector2d centre_by_colour(const ThinDisc& disc, const Photograph& picture,
+                                 const Eigen::Vector2d& centre, double theta_rad) {
+  const auto [outline, edges] =
+      seen_by_colour(disc, picture, disc.at(centre + Eigen::Vector2d(0.4, 0.0), theta_rad));
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  constexpr double kBlurPx = 0.6, kReachPx = 3.0;
-  for (const ColourEdge& found :
-       find_colour_edges(colour, {outline, Moments(), PoseMotion::Step()}, kBlurPx, kReachPx)) {
+  for (const ColourEdge& found : edges) {
     const Eigen::Vector2d n = outline[found.sample].normal_px;
     const Eigen::Vector3d row(n.x(), n.y(), 1.0);  // and of the size
     const double weight = 1.0 / (found.edge.noise_variance_px2 + found.edge.shading_variance_px2);
@@ -193,6 +206,67 @@ TEST(ColourEdges, GlintsOnOneSideAreOutliers) {
       if (in_disc(x, y)) picture.chroma.at<cv::Vec2b>(y / 2, x / 2) = {128, 128};
   constexpr double kTolerance_px = 0.08;
   EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
+}
+
+// Coders spread colours over neighbouring pixels of the planes. Of edges twice as wide as they are
+// taken for, the offset comes out at half of what it is.
+TEST(ColourEdges, OffsetsOfColoursThatTheCoderHasBlurredAreNotShrunk) {
+  constexpr double kTheta = 0.3, kRadius_px = 36.0, kSpread = 0.6;  // sd in pixels of the planes
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  Photograph picture = photographed(
+      {160, 140}, {150.0, 60.0, 40.0},
+      [](double, double) -> Rgb {
+        return {120.0, 150.0, 215.0};
+      },
+      [&](double x, double y) {
+        return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
+                          0.0)
+                   ? 1.0
+                   : 0.0;
+      });
+  cv::GaussianBlur(picture.chroma, picture.chroma, {}, kSpread);
+  constexpr double kTolerance_px = 0.08;  // of the 0.4 px that are to be seen
+  EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
+}
+
+// The wall of a disc shows more of its colour where it faces the camera and less where it turns
+// away and shines; no pixel of the planes shows it alone.
+TEST(ColourEdges, AWallOfOtherColoursAllAlongDoesNotPullTheRim) {
+  constexpr double kTheta = 0.8, kRadius_px = 36.0, kHalfThickness_px = 3.5;
+  ThinDisc disc;
+  disc.body.thickness_m = 2e-3 * kHalfThickness_px;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const double lower_px = kHalfThickness_px * std::sin(kTheta);
+  const auto in_face = [&](double x, double y, double along_px) {
+    return in_ellipse(x - centre.x(), y - centre.y() - along_px, kRadius_px,
+                      kRadius_px * std::cos(kTheta), 0.0);
+  };
+  const auto colour_at = [&](double x, double y) -> Rgb {
+    if (in_face(x, y, lower_px)) return {170.0, 70.0, 50.0};
+    const bool beside = std::abs(y - centre.y()) < lower_px && in_face(x, centre.y(), 0.0);
+    if (in_face(x, y, -lower_px) || beside) {
+      const double turned = std::pow((x - centre.x()) / kRadius_px, 2);
+      return {170.0, 55.0 + 40.0 * turned, 35.0 + 50.0 * turned};
+    }
+    return {120.0, 150.0, 215.0};
+  };
+  Photograph picture =
+      photographed({160, 140}, {0.0, 0.0, 0.0}, colour_at, [](double, double) { return 0.0; });
+  constexpr double kSpread = 0.5;  // by the coder: sd in pixels of the planes
+  cv::GaussianBlur(picture.chroma, picture.chroma, {}, kSpread);
+  const ByColour seen = seen_by_colour(disc, picture, disc.at(centre, kTheta));
+  double off_px = 0.0;
+  int count = 0;
+  for (const ColourEdge& found : seen.edges) {
+    const OutlineSample& sample = seen.outline[found.sample];
+    const bool towards_the_ends = std::abs(sample.normal_px.x()) > 0.5;
+    if (sample.edge == data::OutlinePoint::Edge::lower_rim && towards_the_ends)
+      off_px += found.edge.offset_px, ++count;
+  }
+  ASSERT_GT(count, 10);
+  constexpr double kTolerance_px = 0.06;
+  EXPECT_NEAR(off_px / count, 0.0, kTolerance_px);
 }
 
 // What colours a flat disc of one colour on a floor of another shows.

@@ -30,8 +30,10 @@ Harmonics harmonics_of(const Eigen::Vector2d& normal) {
 // The borders of the silhouette at one moment.
 struct Silhouette {
   explicit Silhouette(const std::vector<OutlineSample>& outline)
-      : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)} {}
+      : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)},
+        faces{Contour(outline, Contour::Of::near_rim), Contour(outline, Contour::Of::near_bore)} {}
   std::array<Contour, 2> borders;
+  std::array<Contour, 2> faces;  // those of the near face beside them
 };
 
 enum Side { kInside, kOutside };
@@ -40,24 +42,25 @@ enum Side { kInside, kOutside };
 // a parameter of the motion larger by one.
 struct Cover {
   double covered = 0.0, density = 0.0;
+  double wall = 0.0;  // of what is covered
   PoseMotion::Step change{};
 };
 
-// Pixels of the colour planes are means of coded pixels of luma: halves towards the inside and the
-// outside of a border, half a pixel off the middle.
-constexpr std::array<double, 2> kHalvesPx{-0.5, 0.5};
-
-using Halves = std::array<Cover, kHalvesPx.size()>;
+// Pixels of the colour planes are means of coded pixels of luma, two wide, and coders blur them as
+// much again (x264 at quality 11 to 23, by how steep edges are): so many equal parts, towards the
+// inside and the outside of a border.
+constexpr std::array<double, 4> kTapsPx{-1.5, -0.5, 0.5, 1.5};
+using Taps = std::array<Cover, kTapsPx.size()>;
 
 // A pixel of the colour planes near one border.
 struct Pixel {
   double value = 0.0;  // colour, from what has none
   double luma = 0.0;
-  Halves halves{};
+  Taps taps{};
   double covered = 0.0, density = 0.0;  // as a share of the body's colour
+  double wall = 0.0;                    // likewise, of its wall
   PoseMotion::Step change{};
   std::size_t stretch = 0;
-  bool wall = false;
 
   // So far from the border that it shows a level.
   [[nodiscard]] bool is_clear() const {
@@ -74,6 +77,7 @@ struct Stretch {
   std::vector<std::size_t> pixels;
   double shade = 1.0;               // luma of the surroundings here over that of all around
   std::array<double, 2> levels{};   // by those of the whole outline
+  double wall = 0.0;                // by how much its wall differs from the face
   std::array<double, 2> uneven2{};  // variance about these
 };
 
@@ -93,7 +97,7 @@ class ColourFit {
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
   [[nodiscard]] Pixel pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
   void cover(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
-             Halves& halves) const;
+             Taps& taps) const;
   void find_shades(double ground_luma);
   [[nodiscard]] double longest_sweep_px() const;
   [[nodiscard]] double parts() const {
@@ -119,7 +123,6 @@ class ColourFit {
   double blur2_px2_;
   std::vector<Stretch> stretches_;
   std::vector<Pixel> pixels_;
-  double wall_ = 0.0;              // by how much the wall differs from the face
   std::array<double, 2> noise_{};  // sd of a pixel
 };
 
@@ -158,8 +161,9 @@ void ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
       const auto at = nearest(at_px, level_px + 0.5 * sweep_px);
       if (!at) continue;
       Pixel pixel = pixel_at(at_px, *at);
-      constexpr double kNoEdge = 0.01;
-      const double density = pixel.halves.front().density + pixel.halves.back().density;
+      constexpr double kNoEdge = 0.02;
+      double density = 0.0;
+      for (const Cover& tap : pixel.taps) density += tap.density;
       if (std::abs(at->place.off_px) > level_px && density < kNoEdge) continue;
       pixel.value = static_cast<double>(colour.planes.at<float>(y, x)) - colour.neutral;
       pixel.luma = static_cast<double>(colour.luma.at<float>(y, x));
@@ -187,17 +191,15 @@ Pixel ColourFit::pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) 
   const OutlineSample& sample = middle_.borders[nearest.border][nearest.place.at];
   Pixel pixel;
   pixel.stretch = (nearest.border == 0 ? 0 : middle_.borders[0].size()) + nearest.place.at;
-  const bool of_far_face = sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore;
-  pixel.wall = of_far_face && -nearest.place.off_px < sample.inside_px;
-  pixel.halves.fill({0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
-  if (moments_.empty()) cover(middle_, at_px, nearest, pixel.halves);
-  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, pixel.halves);
+  pixel.taps.fill({0.0, 0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
+  if (moments_.empty()) cover(middle_, at_px, nearest, pixel.taps);
+  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, pixel.taps);
   return pixel;
 }
 
 // Adds what one part of the exposure says. A border that is not there then hides nothing.
 void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
-                      const Nearest& nearest, Halves& halves) const {
+                      const Nearest& nearest, Taps& taps) const {
   const NormalTable& table = NormalTable::instance();
   const double part = 1.0 / parts();
   const Contour& own = moment.borders[nearest.border];
@@ -208,21 +210,28 @@ void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
   };
   const double beside_other = other.empty() ? 1.0 : within(other.nearest(at_px).off_px, usual);
   if (own.empty()) {
-    for (Cover& half : halves) half.covered += part * beside_other;
+    for (Cover& tap : taps) tap.covered += part * beside_other;
     return;
   }
   const Contour::Place place = &moment == &middle_ ? nearest.place : own.nearest(at_px);
   const OutlineSample& sample = own[place.at];
   const double swept_px = smear_.size() > 0 ? sample.motion.dot(smear_) * part : 0.0;
   const double inverse = 1.0 / std::sqrt(blur2_px2_ + swept_px * swept_px / 12.0);
-  for (std::size_t h = 0; h < halves.size(); ++h) {
-    const double off_px = place.off_px + kHalvesPx[h];
+  const Contour& face = moment.faces[nearest.border];
+  const bool shows_wall =
+      sample.edge != Edge::upper_rim && sample.edge != Edge::upper_bore && !face.empty();
+  const double face_px = shows_wall ? face.nearest(at_px).off_px : place.off_px;
+  for (std::size_t k = 0; k < kTapsPx.size(); ++k) {
+    const double off_px = place.off_px + kTapsPx[k];
+    const double covered = within(off_px, inverse);
+    const double of_face = shows_wall ? within(face_px + kTapsPx[k], inverse) : covered;
     const double density =
         part * beside_other * inverse *
         static_cast<double>(table.at(static_cast<float>(off_px * inverse)).density);
-    halves[h].covered += part * beside_other * within(off_px, inverse);
-    halves[h].density += density;
-    halves[h].change += density * sample.motion.transpose();
+    taps[k].covered += part * beside_other * covered;
+    taps[k].wall += part * beside_other * std::max(0.0, covered - of_face);
+    taps[k].density += density;
+    taps[k].change += density * sample.motion.transpose();
   }
 }
 
@@ -232,7 +241,9 @@ void ColourFit::find_shades(double ground_luma) {
   constexpr std::size_t kReach = 2;
   std::vector<double> sums(stretches_.size(), 0.0), counts(stretches_.size(), 0.0);
   for (const Pixel& pixel : pixels_) {
-    if (pixel.halves.front().covered + pixel.halves.back().covered > kUncovered) continue;
+    if (std::any_of(pixel.taps.begin(), pixel.taps.end(),
+                    [](const Cover& tap) { return tap.covered > kUncovered; }))
+      continue;
     sums[pixel.stretch] += pixel.luma;
     counts[pixel.stretch] += 1.0;
   }
@@ -264,58 +275,63 @@ void ColourFit::over_neighbours(std::size_t reach, const Use& use) {
 
 // From what is covered to what is shown.
 void ColourFit::mix(const ColourMixing& mixing, Pixel& pixel) {
-  pixel.change = PoseMotion::Step::Zero(pixel.halves.front().change.size());
-  for (const Cover& half : pixel.halves) {
-    const double slope = mixing.slope(half.covered) / kHalvesPx.size();
-    pixel.covered += mixing.shown(half.covered) / kHalvesPx.size();
-    pixel.density += slope * half.density;
-    pixel.change += slope * half.change;
+  pixel.change = PoseMotion::Step::Zero(pixel.taps.front().change.size());
+  for (std::size_t k = 0; k < kTapsPx.size(); ++k) {
+    const Cover& tap = pixel.taps[k];
+    const double slope = mixing.slope(tap.covered) / kTapsPx.size();
+    const double shown = mixing.shown(tap.covered) / kTapsPx.size();
+    pixel.covered += shown;
+    if (tap.covered > 0.0) pixel.wall += shown * tap.wall / tap.covered;
+    pixel.density += slope * tap.density;
+    pixel.change += slope * tap.change;
   }
 }
 
 double ColourFit::off_level(const Pixel& pixel) const {
   const Stretch& stretch = stretches_[pixel.stretch];
-  const double inner = stretch.levels[kInside] + (pixel.wall ? wall_ : 0.0);
-  return pixel.value - pixel.covered * inner - (1.0 - pixel.covered) * stretch.levels[kOutside];
+  return pixel.value - pixel.covered * stretch.levels[kInside] - pixel.wall * stretch.wall -
+         (1.0 - pixel.covered) * stretch.levels[kOutside];
 }
 
 // Robustly and beside the border only: on it, where that lies is asked.
 void ColourFit::fit_levels(Side side) {
   constexpr double kTukey = 4.685;
-  constexpr double kWallShare = 0.1;  // of the colour, by which the wall may differ
-  constexpr int kWall = kHarmonics, kUnknowns = kHarmonics + 1;
+  constexpr double kWallShare = 0.1;  // of the colour, by which the wall may differ here and there
+  constexpr int kWall = kHarmonics, kWallHarmonics = 3, kUnknowns = kHarmonics + kWallHarmonics;
   using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
   Eigen::Matrix<double, kUnknowns, kUnknowns> normal =
       1e-6 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
-  normal(kWall, kWall) = 1.0 / std::pow(kWallShare * body_, 2);
+  for (int k = kWall; k < kUnknowns; ++k) normal(k, k) = 1.0 / std::pow(kWallShare * body_, 2);
   Unknowns right = Unknowns::Zero();
-  const auto add = [&](const Stretch& stretch, bool wall, double weight, double weighted) {
-    if (weight == 0.0) return;
-    Unknowns row;
-    row << (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics, wall ? 1.0 : 0.0;
-    normal.noalias() += weight * row * row.transpose();
-    right += weighted * row;
-  };
   for (const Stretch& stretch : stretches_) {
-    std::array<double, 2> weights{}, weighted{};  // of the face or the floor, and of the wall
+    // Columns of what a pixel shows of the face or the floor, and of its wall.
+    Eigen::Matrix<double, kUnknowns, 2> columns = Eigen::Matrix<double, kUnknowns, 2>::Zero();
+    columns.col(0).head<kHarmonics>() =
+        (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics;
+    columns.col(1).tail<kWallHarmonics>() = stretch.harmonics.head<kWallHarmonics>();
+    Eigen::Matrix2d weights = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
     for (const std::size_t i : stretch.pixels) {
       const Pixel& pixel = pixels_[i];
       if (!pixel.is_clear() || pixel.side() != side) continue;
       const double t = off_level(pixel) / (kTukey * noise_[side]);
       if (std::abs(t) >= 1.0) continue;
       const double weight = std::pow((1.0 - t * t) / noise_[side], 2);
-      const std::size_t wall = side == kInside && pixel.wall ? 1 : 0;
-      weights[wall] += weight;
-      weighted[wall] += weight * pixel.value;
+      const Eigen::Vector2d shares(1.0, side == kInside ? pixel.wall : 0.0);
+      weights += weight * shares * shares.transpose();
+      weighted += weight * pixel.value * shares;
     }
-    add(stretch, false, weights[0], weighted[0]);
-    add(stretch, true, weights[1], weighted[1]);
+    if (weights(0, 0) == 0.0) continue;
+    normal.noalias() += columns * weights * columns.transpose();
+    right += columns * weighted;
   }
   const Unknowns found = normal.ldlt().solve(right);
-  for (Stretch& stretch : stretches_)
+  for (Stretch& stretch : stretches_) {
     stretch.levels[side] =
         (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics.dot(found.head<kHarmonics>());
-  if (side == kInside) wall_ = found[kWall];
+    if (side == kInside)
+      stretch.wall = stretch.harmonics.head<kWallHarmonics>().dot(found.tail<kWallHarmonics>());
+  }
 }
 
 // False if hardly any pixel shows the level.
@@ -377,7 +393,8 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   PoseMotion::Step motion = PoseMotion::Step::Zero(sample.motion.size());
   for (const std::size_t i : stretch.pixels) {
     const Pixel& p = pixels_[i];
-    const double contrast = inner + (p.wall ? wall_ : 0.0) - outer;
+    const double wall_share = p.covered > 0.0 ? p.wall / p.covered : 0.0;
+    const double contrast = inner + wall_share * stretch.wall - outer;
     const double slope = contrast * p.density, off = off_level(p);
     const double usual2 = p.covered * std::pow(noise_[kInside], 2) +
                           (1.0 - p.covered) * std::pow(noise_[kOutside], 2);

@@ -19,11 +19,25 @@ double off_circle(double out_px, double aside_px, double curvature_per_px) {
   return curvature_per_px > 0.0 ? beyond_px : -beyond_px;
 }
 
+bool belongs_to(const OutlineSample& sample, Contour::Of which) {
+  switch (which) {
+    case Contour::Of::rim:
+      return sample.silhouette && !is_bore(sample.edge);
+    case Contour::Of::bore:
+      return sample.silhouette && is_bore(sample.edge);
+    case Contour::Of::near_rim:
+      return sample.edge == data::OutlinePoint::Edge::upper_rim;
+    case Contour::Of::near_bore:
+      return sample.edge == data::OutlinePoint::Edge::upper_bore;
+  }
+  return false;
+}
+
 }  // namespace
 
 Contour::Contour(const std::vector<OutlineSample>& outline, Of which) : outline_(&outline) {
   for (std::size_t i = 0; i < outline.size(); ++i) {
-    if (!outline[i].silhouette || is_bore(outline[i].edge) != (which == Of::bore)) continue;
+    if (!belongs_to(outline[i], which)) continue;
     points_.push_back({i, outline[i].image_px});
     middle_ += outline[i].image_px;
   }

@@ -10,7 +10,7 @@ namespace trochoid::tracking {
 /// the picture from it.
 class Contour {
  public:
-  enum class Of { rim, bore };
+  enum class Of { rim, bore, near_rim, near_bore };
   struct Place {
     std::size_t at;   ///< the nearest point of the contour
     double off_px;    ///< distance, > 0 where the body is not
