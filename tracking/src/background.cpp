@@ -382,6 +382,7 @@ void Background::scaled_into(Plate& plate, double gain, const cv::Rect& box) con
   }
   plate.noise_levels = plate_.noise_levels;
   plate.chroma_noise_levels = plate_.chroma_noise_levels;
+  plate.chroma_site_px = plate_.chroma_site_px;
   scale(plate_.luma(box), plate.luma(box), gain, 0.0);
   if (plate_.chroma.empty()) return;
   const cv::Rect half = halved(box, plate_.chroma.size());

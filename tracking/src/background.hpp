@@ -15,6 +15,8 @@ struct Plate {
   cv::Mat chroma;  ///< CV_8UC2 of half the size as Frame::chroma, or empty
   /// Standard deviation of one pixel over time [levels].
   double noise_levels = 1.0, chroma_noise_levels = 1.0;
+  /// Where samples of chroma lie, from the middle of the four pixels they belong to.
+  Eigen::Vector2d chroma_site_px = Eigen::Vector2d::Zero();
 };
 
 /// Pictures spread over a recording: luma, and chroma of the same frames or none.
@@ -49,6 +51,13 @@ class Background {
     return lit;
   }
   [[nodiscard]] const std::optional<Lamp>& lamp() const { return lamp_; }
+
+  /// The same, with Plate::chroma_site_px known.
+  [[nodiscard]] Background sited_at(const Eigen::Vector2d& chroma_site_px) const {
+    Background sited = *this;
+    sited.plate_.chroma_site_px = chroma_site_px;
+    return sited;
+  }
 
   [[nodiscard]] bool empty() const { return plate_.luma.empty(); }
   /// At the brightness of one of the samples; noise at least 0.7 levels.

@@ -109,6 +109,7 @@ class CylinderFinder final : public BodyFinder {
         .exposure_fraction = exposure_fraction_,
         .chroma = look.frame.chroma,
         .background_chroma = look.background.chroma,
+        .chroma_site_px = look.background.chroma_site_px,
         .blur_px = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->blur_px)
                                                            : std::nullopt,
         .shading = look.shading,

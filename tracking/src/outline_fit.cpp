@@ -300,6 +300,8 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.polarity_px = r.solution.polarity_px;
   m.rms_px = r.solution.rms_px;
   m.blur_px = fitted.blur_px;
+  m.colour_off_px = r.solution.colour_off_px;
+  m.colour_information = r.solution.colour_information;
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
   m.larger_px = larger_px(r);
@@ -394,12 +396,14 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   const double margin_px = evidence.predicted ? 12.0 : 24.0;
   cv::Rect window = window_of(body_, camera_, starts.front(), margin_px);
   for (const auto& start : starts) window |= window_of(body_, camera_, start, margin_px);
+  ColourWindow colour =
+      colour_window(evidence.luma, evidence.chroma, window, body_, camera_, starts.front());
+  colour.site_px = evidence.chroma_site_px;
   const Scenery scenery{
       body_, camera_, motion, LightWindow(evidence.luma, window, camera_.transfer),
       evidence.background.empty() ? LightWindow()
                                   : LightWindow(evidence.background, window, camera_.transfer),
-      colour_window(evidence.luma, evidence.chroma, window, body_, camera_, starts.front()),
-      most_looks_, evidence.visit,
+      std::move(colour), most_looks_, evidence.visit,
       evidence.predicted && evidence.previous
           ? PoseMotion::Step(evidence.exposure_fraction *
                              motion.step_between(*evidence.previous, starts.front()))

@@ -379,6 +379,14 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMoti
   if (!factorised.factorise()) return;
   Eigen::MatrixXd inverse(n, n);
   const Vector variance = variances(factorised, first, inverse);
+  for (const int axis : {0, 1}) {
+    const double all_know = 1.0 / variance[static_cast<size_t>(first + n + 3 + axis)];
+    const double edges_know = all_know - 1.0 / (kColourShiftSdPx * kColourShiftSdPx);
+    constexpr double kLeast = 1e-3;
+    if (edges_know < kLeast) continue;
+    solution.colour_information[axis] = edges_know;
+    solution.colour_off_px[axis] = solution.colour_shift_px[axis] * all_know / edges_know;
+  }
   double weight = 0.0, z2 = 0.0;
   for (const EdgeEquation& e : equations) {
     weight += e.weight;

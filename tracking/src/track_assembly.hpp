@@ -23,7 +23,9 @@ struct BodyPath {
   Frames frames;
   std::shared_ptr<const SpinProfile> marks;
   std::optional<Lamp> lamp{};  ///< as its shadows last showed it
-  ReadingTallies readings{};   ///< of all its frames
+  /// Plate::chroma_site_px as its edges show it, where they do.
+  std::optional<Eigen::Vector2d> chroma_site_px{};
+  ReadingTallies readings{};  ///< of all its frames
 };
 
 /// How pixels become metres in a track measured by rims alone.

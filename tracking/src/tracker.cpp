@@ -9,6 +9,7 @@
 
 #include "attitude_sequence.hpp"
 #include "body_search.hpp"
+#include "chroma_site.hpp"
 #include "lying.hpp"
 #include "neighbours.hpp"
 #include "path_motion.hpp"
@@ -332,7 +333,10 @@ class Tracking {
     // Where there are other bodies, what is dark beside one need not be its shadow.
     if (objects_ == 1)
       if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
-    const Background lit = background_.lit_by(path.lamp);
+    if (!path.chroma_site_px)
+      path.chroma_site_px = find_chroma_site(background_, *finder_, glimpses);
+    const Background lit = background_.lit_by(path.lamp).sited_at(
+        path.chroma_site_px.value_or(Eigen::Vector2d::Zero()));
     look_at_shadows(lit, *finder_, glimpses);
     const auto doubts = decide_attitudes(lit, *finder_, glimpses);
     mend_from_neighbours(lit, *finder_, glimpses);

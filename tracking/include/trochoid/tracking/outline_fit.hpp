@@ -62,6 +62,10 @@ struct PoseMeasurement {
   /// less their misfit: compares fits to one picture.
   double evidence = 0.0;
   double blur_px = 0.0;  ///< of the edges of this picture, for the next one
+  /// How far what colours show lies off what luma does, either coordinate by itself, and the
+  /// inverse of its variance; 0 where they do not tell.
+  Eigen::Array2d colour_off_px = Eigen::Array2d::Zero();
+  Eigen::Array2d colour_information = Eigen::Array2d::Zero();
   /// Light beside the outline in this picture, for others.
   std::shared_ptr<const ShadingMemory> shading;
   std::vector<EdgePoint> edges;
@@ -79,6 +83,8 @@ struct OutlineEvidence {
   double exposure_fraction = 0.0;          ///< shutter time over frame interval: how far it smears
   cv::Mat chroma{};                        ///< CV_8UC2 of half the size, or empty: Frame::chroma
   cv::Mat background_chroma{};             ///< what it would be without the body, or empty
+  /// Where samples of chroma lie, from the middle of the four pixels they belong to.
+  Eigen::Vector2d chroma_site_px = Eigen::Vector2d::Zero();
   /// PoseMeasurement::blur_px of the frame before; without, it is found by looking repeatedly.
   std::optional<double> blur_px{};
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
