@@ -33,12 +33,29 @@ struct Photograph {
   cv::Mat luma, chroma;
 };
 
+// Where samples of chroma lie: amid four pixels, or beside the left two.
+enum class Site { amid, left };
+
+cv::Mat half_size(const cv::Mat& plane, Site site) {
+  cv::Mat half, at = plane;
+  if (site == Site::left) {
+    const cv::Mat around = (cv::Mat_<double>(1, 3) << 0.25, 0.5, 0.25);
+    cv::filter2D(plane, at, -1, around);
+    cv::Mat columns(plane.rows, plane.cols / 2, plane.type());
+    for (int x = 0; x < columns.cols; ++x) at.col(2 * x).copyTo(columns.col(x));
+    at = columns;
+  }
+  cv::resize(at, half, plane.size() / 2, 0.0, 0.0, cv::INTER_AREA);
+  return half;
+}
+
 // A body on its floor as a camera sees them: light mixes in the lens and on the sensor, then gets
 // the sRGB curve, luma and chroma by BT.601, chroma as the mean of four pixels.
 // @param covered share of a point that the body covers; @param floor its colour at a point.
 Photograph photographed(const cv::Size& size, const Rgb& body,
                         const std::function<Rgb(double, double)>& floor,
-                        const std::function<double(double, double)>& covered, double noise = 0.5) {
+                        const std::function<double(double, double)>& covered, double noise = 0.5,
+                        Site site = Site::amid) {
   constexpr int kFine = 4;
   constexpr double kLensPx = 0.5;
   std::array<cv::Mat, 3> levels;
@@ -57,7 +74,7 @@ Photograph photographed(const cv::Size& size, const Rgb& body,
   }
   const cv::Mat luma = 0.299 * levels[0] + 0.587 * levels[1] + 0.114 * levels[2];
   cv::Mat cb = (levels[2] - luma) / 1.772 + 128.0, cr = (levels[0] - luma) / 1.402 + 128.0;
-  for (cv::Mat* plane : {&cb, &cr}) cv::resize(*plane, *plane, size / 2, 0.0, 0.0, cv::INTER_AREA);
+  for (cv::Mat* plane : {&cb, &cr}) *plane = half_size(*plane, site);
   std::mt19937 random(21);
   Photograph out{developed(luma, noise, random), {}};
   cv::merge(std::vector<cv::Mat>{developed(cb, noise, random), developed(cr, noise, random)},
@@ -228,6 +245,38 @@ TEST(ColourEdges, OffsetsOfColoursThatTheCoderHasBlurredAreNotShrunk) {
   cv::GaussianBlur(picture.chroma, picture.chroma, {}, kSpread);
   constexpr double kTolerance_px = 0.08;  // of the 0.4 px that are to be seen
   EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
+}
+
+// Colours that lie half a pixel to the left of where they are looked for seem to lie to the right.
+TEST(OutlineFitter, TellsHowFarColoursLieOffLuma) {
+  constexpr double kTheta = 0.3, kRadius_px = 36.0, kNoise = 0.5;
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const auto covered = [&](double x, double y) {
+    return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
+                      0.0)
+               ? 1.0
+               : 0.0;
+  };
+  const auto floor = [](double, double) -> Rgb { return {120.0, 150.0, 215.0}; };
+  const auto [luma, chroma] =
+      photographed({160, 140}, {150.0, 60.0, 40.0}, floor, covered, kNoise, Site::left);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const cv::Mat no_plate;
+  for (const double site_px : {0.0, -0.5}) {
+    const auto seen = fitter.measure({.luma = luma,
+                                      .background = no_plate,
+                                      .detection = {},
+                                      .predicted = disc.at(centre, kTheta),
+                                      .attitude_known = true,
+                                      .chroma = chroma,
+                                      .chroma_site_px = {site_px, 0.0}});
+    ASSERT_TRUE(seen);
+    constexpr double kTolerance_px = 0.15;  // half of what Tukey's weights may take off it
+    EXPECT_NEAR(seen->colour_off_px.x(), 0.5 + site_px, kTolerance_px);
+    EXPECT_NEAR(seen->colour_off_px.y(), 0.0, kTolerance_px);
+    EXPECT_GT(seen->colour_information.minCoeff(), 50.0);
+  }
 }
 
 // The wall of a disc shows more of its colour where it faces the camera and less where it turns

@@ -22,18 +22,17 @@ struct Recorded {
       Frame& frame = frames[static_cast<std::size_t>(i)];
       frame.index = i;
       frame.t_s = i / 100.0;
-      Sighting seen;
+      Sighting& seen = glimpses.emplace_back(Glimpse{&frame}).seen.emplace();
       seen.rim = Ellipse::from_axes({0.0, 0.0}, 40.0, 30.0, 0.0);
       seen.accepted = 0.9;
       const double since = i - kHit, jitter = 0.02 * (i % 3 - 1);
       const double y = since < 0 ? 0.03 * since * since : -6.0 * since + 0.03 * since * since;
       seen.centre_px = {100.0 + 4.0 * since + jitter, 80.0 + y};
       seen.covariance_px2 = kSigmaPx * kSigmaPx * Eigen::Matrix2d::Identity();
-      seen.pose.emplace();
-      seen.pose->pose.centre_m = {1e-3 * seen.centre_px.x(), 1e-3 * seen.centre_px.y(), 0.0};
-      seen.pose->covariance_px2 = seen.covariance_px2;
-      seen.pose->covariance_m2 = 1e-6 * seen.covariance_px2;
-      glimpses.push_back({&frame, std::move(seen)});
+      PoseMeasurement& pose = seen.pose.emplace();
+      pose.pose.centre_m = {1e-3 * seen.centre_px.x(), 1e-3 * seen.centre_px.y(), 0.0};
+      pose.covariance_px2 = seen.covariance_px2;
+      pose.covariance_m2 = 1e-6 * seen.covariance_px2;
     }
   }
 };
