@@ -157,25 +157,31 @@ std::size_t step_up(const Ladder& ladder, std::span<const data::Track> tracks,
   return best;
 }
 
-// The last resort together with the usual losses: a body that slides without any may not even stay
-// on the floor as long as the track. Empty where there is no last resort.
-std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
-  bool resort = false;
-  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
-    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
-    if (term.smooth) continue;
-    resort = resort || term.last_resort;
-    if (term.last_resort || term.usual) terms.insert(index);
-  }
-  return resort ? terms : std::set<int>{};
-}
-
-// The same but the last resort.
+// What usually acts on a body that rolls.
 std::set<int> usual_losses(const Ladder& ladder) {
   std::set<int> terms;
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index)
     if (ladder.terms[static_cast<std::size_t>(index)].usual) terms.insert(index);
   return terms;
+}
+
+// The terms and the last resort; empty where there is none.
+std::set<int> with_last_resort(const Ladder& ladder, std::set<int> terms) {
+  bool resort = false;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
+    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    if (!term.last_resort || term.smooth) continue;
+    resort = true;
+    terms.insert(index);
+  }
+  return resort ? terms : std::set<int>{};
+}
+
+// The last resort together with the usual losses: a body that slides without any may not even stay
+// on the floor as long as the track. Empty where there is no last resort.
+std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
+  terms.merge(usual_losses(ladder));
+  return with_last_resort(ladder, std::move(terms));
 }
 
 // Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
@@ -220,16 +226,26 @@ std::vector<std::set<int>> with_one_more(const Ladder& ladder, const std::set<in
   return sets;
 }
 
-// Whether a rung's losses that a smaller one lacks may be zero, by the full error bars of its fit.
-bool may_do_without(const Rung& rung, const data::Fit& fit, const Rung& smaller) {
+// Whether a rung's losses that a smaller one lacks may be zero, by error bars so many times as
+// wide.
+bool may_do_without(const Rung& rung, const data::Fit& fit, const Rung& smaller, double times) {
   constexpr double kSurely = 4.0;  // sigmas, which curvature may misjudge
   std::set<std::string> lost = parameters_of(rung.scene);
   for (const std::string& name : parameters_of(smaller.scene)) lost.erase(name);
   lost.erase(kSlipScale);  // the smaller one's is fitted anew
   return std::all_of(lost.begin(), lost.end(), [&](const std::string& name) {
     const data::FitParameter* loss = fit.find(name);
-    return loss != nullptr && std::abs(loss->value) < kSurely * loss->sigma;
+    return loss != nullptr && std::abs(loss->value) < kSurely * times * loss->sigma;
   });
+}
+
+// The same by full error bars, which are only made where those by curvature do not decide it: they
+// are wider, though hardly ever so many times.
+bool may_do_without(const Rung& rung, const Rung& smaller) {
+  constexpr double kWider = 10.0;
+  if (may_do_without(rung, rung.fit, smaller, 1.0)) return true;
+  return may_do_without(rung, rung.fit, smaller, kWider) &&
+         may_do_without(rung, with_full_bars(rung), smaller, 1.0);
 }
 
 // Everything but the last resort was added before it was known what that explains: terms the data
@@ -242,9 +258,8 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
     const std::set<int> terms = rungs[current].terms;
     std::vector<std::set<int>> smaller = with_one_less(ladder, terms);
     if (smaller.empty()) return;
-    const data::Fit full = with_full_bars(rungs[current]);
     std::erase_if(smaller, [&](const std::set<int>& fewer) {
-      return !may_do_without(rungs[current], full, rung_with(ladder, fewer));
+      return !may_do_without(rungs[current], rung_with(ladder, fewer));
     });
     add_neighbours(ladder, tracks, options, smaller, current, rungs);
     std::size_t best = current;
@@ -276,6 +291,12 @@ double gain(const Promise& promise, const Promise::Change& change) {
   return promise.before - change.chi2;
 }
 
+// Up to which evidence against it a rung is worth telling of beside another. Those of a sliding
+// body are dear: only what counts in the error bars.
+double most_evidence_against(const Rung& known) {
+  return known.fit.model == "sliding" ? kStrong : kVeryStrong;
+}
+
 // Whether a promised change of a known rung may come to something. One that hardly follows the
 // track has to be mended for a good part: all else would only follow the tracker's errors. Where
 // what is left hangs together, a further term may be what is missing, and all that it takes away
@@ -288,7 +309,7 @@ bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
   if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
     return gained > kGoodPart * promise.before;
   if (larger && known.fit.whiteness_p < kWhite) return gained > paid;
-  return paid - gained / dilution < kVeryStrong;
+  return paid - gained / dilution < (larger ? most_evidence_against(known) : kVeryStrong);
 }
 
 // Sets with one more term than a known rung's, and with one more in the place of another, the most
@@ -414,11 +435,110 @@ std::optional<Rung> by_another_law(const Ladder& ladder, std::span<const data::T
   return best != nullptr && explains(*best) ? std::optional(*best) : std::nullopt;
 }
 
+// Of the known rungs the simplest that suffices, and from it on by what may do better, as long as
+// that changes which it is.
+const Rung* exchange_while_worth(const Ladder& ladder, std::span<const data::Track> tracks,
+                                 const FitOptions& options, std::vector<Rung>& rungs) {
+  const Rung* chosen = simplest_sufficient(ladder, rungs);
+  // A term found that way asks for the others anew, unless even then the model lacks something.
+  const Rung* before = nullptr;
+  for (std::size_t round = 0;
+       round < kMostRounds && chosen != before && chosen != nullptr && chosen->fit.converged;
+       ++round) {
+    if (round > 0 && chosen->fit.verdict == "unexplained") break;
+    before = chosen;
+    chosen = exchange_terms(ladder, tracks, options, *chosen, rungs);
+  }
+  return chosen;
+}
+
+// References to rungs stay valid while more are added.
+std::vector<Rung> no_rungs(const Ladder& ladder) {
+  std::vector<Rung> rungs;
+  const std::size_t terms = ladder.terms.size();
+  rungs.reserve(4 + (3 * kMostTerms + 3) * terms + (kMostRounds + 1) * terms * (terms + 1));
+  return rungs;
+}
+
+// The losses of a rung and of others that are as likely, up to so many.
+std::set<int> as_likely(const std::vector<Rung>& rungs, const Rung& chosen, std::size_t most) {
+  std::vector<const Rung*> near;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.fit.converged && rung.bic < chosen.bic + kStrong) near.push_back(&rung);
+  std::sort(near.begin(), near.end(), [](const Rung* a, const Rung* b) { return a->bic < b->bic; });
+  std::set<int> terms = chosen.terms;
+  for (const Rung* rung : near) {
+    std::set<int> more = terms;
+    more.insert(rung->terms.begin(), rung->terms.end());
+    if (more.size() <= most) terms = std::move(more);
+  }
+  return terms;
+}
+
+// With other losses a body may be seen to roll for longer: those that a first part of the track
+// asks for explain more of it, which asks for others. @param known  explains that first part.
+// @returns a rung that explains about as long a first part as any, or all of the track; of losses
+// that do so alike it has several.
+Rung longest_rolling(const Ladder& ladder, std::span<const data::Track> tracks,
+                     const FitOptions& options, Rung known) {
+  constexpr double kSurely = 0.9;  // of the first part: before its end a slip may have begun
+  constexpr double kLonger = 1.05, kAsLong = 0.85;  // of its duration
+  constexpr int kMostParts = 4;
+  const double from_s = tracks.front().samples.front().t_s;
+  for (int part = 0; part < kMostParts; ++part) {
+    const double before_s = known.first_part.until_s - from_s;
+    FitOptions early = options;
+    early.to = fmt::format("{:.17g}", from_s + kSurely * before_s);
+    std::vector<Rung> rungs = no_rungs(ladder);
+    rungs.push_back(rung_with(ladder, known.terms));
+    fit_from_values(tracks, known.first_part.values, options_for(rungs[0], early), rungs[0]);
+    step_down(ladder, tracks, early, 0, rungs);
+    const Rung* chosen = exchange_while_worth(ladder, tracks, early, rungs);
+    if (chosen == nullptr || !chosen->fit.converged) break;
+    Rung longer = rung_with(ladder, as_likely(rungs, *chosen, kMostTerms));
+    fit_from_first_part(tracks, {values_of(chosen->fit), 0.0}, options_for(longer, options),
+                        longer);
+    if (explains(longer)) return longer;
+    const double after_s = longer.first_part.until_s - from_s;
+    if (!longer.first_part.empty() && after_s > kAsLong * before_s) known = std::move(longer);
+    if (after_s < kLonger * before_s) break;
+  }
+  return known;
+}
+
+// A body that rolls first slides later: with what acts while it rolls, then with all that usually
+// acts. @returns whether a rung was added that explains the track, or follows it to its end and is
+// to go on from.
+bool slide_after_rolling(const Ladder& ladder, std::span<const data::Track> tracks,
+                         const FitOptions& options, const Rung& known, std::vector<Rung>& rungs) {
+  const Rung rolling = longest_rolling(ladder, tracks, options, known);
+  if (explains(rolling)) {
+    rungs.push_back(rolling);
+    step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+    return true;
+  }
+  std::vector<std::pair<std::set<int>, FirstPart>> ways{
+      {with_last_resort(ladder, rolling.terms), rolling.first_part}};
+  if (rolling.terms != known.terms)
+    ways.emplace_back(all_that_usually_acts(ladder, {}), known.first_part);
+  for (const auto& [terms, part] : ways) {
+    if (terms.empty()) continue;  // no floor on which it may slide
+    Rung slides = rung_with(ladder, terms);
+    fit_from_first_part(tracks, part, options_for(slides, options), slides);
+    if (!usable(slides.fit) || !slides.fit.converged) continue;
+    rungs.push_back(std::move(slides));
+    // What follows the track to its end needs other losses, not another search.
+    if (explains(rungs.back())) step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+    return true;
+  }
+  return false;
+}
+
 // Where the plainest model explains nothing its solution leads nowhere, and neither does that of
 // one with a single loss if several act: all usual losses together, then fewer of them. Where that
 // explains a first part of the track alone, further losses act as well, of which one is added at a
 // time while each helps, or the body slides from there on. @returns whether one of these explains
-// the track.
+// the track, or follows it and is to go on from.
 bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
                 const FitOptions& options, std::vector<Rung>& rungs) {
   const std::set<int> usual = usual_losses(ladder);
@@ -435,11 +555,9 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
     step_down(ladder, tracks, options, rungs.size() - 1, rungs);
     return true;
   }
-  const std::map<std::string, double> first_part = rungs[all].first_part;
-  if (first_part.empty()) return false;
-  std::vector<std::set<int>> sets = with_one_more(ladder, usual);
-  sets.push_back(all_that_usually_acts(ladder, {}));
+  if (rungs[all].first_part.empty()) return false;
   double known_bic = rungs[all].bic;
+  std::vector<std::set<int>> sets = with_one_more(ladder, usual);
   for (std::size_t more = 1; more <= kMostTerms; ++more) {
     std::vector<Rung> tried;
     for (const std::set<int>& terms : sets) tried.push_back(rung_with(ladder, terms));
@@ -447,31 +565,35 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
     one.threads = 1;
     in_parallel(static_cast<int>(tried.size()), options.threads, [&](int i) {
       Rung& rung = tried[static_cast<std::size_t>(i)];
-      fit_from_first_part(tracks, first_part, options_for(rung, one), rung);
+      fit_from_first_part(tracks, rungs[all].first_part, options_for(rung, one), rung);
     });
     const Rung* best = least_bic(tried);
-    if (best == nullptr) return false;
-    if (explains(*best)) {
+    if (best != nullptr && explains(*best)) {
       rungs.push_back(*best);  // of the others a search of their own may make more
       step_down(ladder, tracks, options, rungs.size() - 1, rungs);
       return true;
     }
-    // Two may act that each alone follow the track not much farther. A body that slides has been
-    // given all that usually acts.
-    if (best->fit.model == "sliding" || !(best->bic < known_bic - kVeryStrong)) return false;
+    // Two may act that each alone follow the track not much farther.
+    if (best == nullptr || !(best->bic < known_bic - kVeryStrong)) break;
     known_bic = best->bic;
     sets = with_one_more(ladder, best->terms);
   }
-  return false;
+  return slide_after_rolling(ladder, tracks, options, rungs[all], rungs);
+}
+
+// The longest part of the track, from its beginning on, that one of the rungs explains.
+FirstPart longest_first_part(const std::vector<Rung>& rungs) {
+  FirstPart longest;
+  for (const Rung& rung : rungs)
+    if (!rung.first_part.empty() && (longest.empty() || rung.first_part.until_s > longest.until_s))
+      longest = rung.first_part;
+  return longest;
 }
 
 // The plainest model and, one more term at a time, all extensions of the best so far.
 std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> tracks,
                         const FitOptions& options) {
-  std::vector<Rung> rungs;
-  // References to rungs stay valid while more are added.
-  const std::size_t terms = ladder.terms.size();
-  rungs.reserve(4 + (3 * kMostTerms + 3) * terms + (kMostRounds + 1) * terms * (terms + 1));
+  std::vector<Rung> rungs = no_rungs(ladder);
   rungs.push_back(rung_with(ladder, {}));
   fit_rung(tracks, nullptr, nullptr, options_for(rungs[0], options), rungs[0]);
   const bool searched = !explains(rungs[0]) && !usual_losses(ladder).empty();
@@ -507,7 +629,9 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   const std::set<int> helped =
       rungs[current].fit.converged ? rungs[current].terms : std::set<int>{};
   if (const auto all = all_that_usually_acts(ladder, helped); !all.empty()) {
+    const FirstPart rolls = longest_first_part(rungs);
     rungs.push_back(rung_with(ladder, all));
+    rungs.back().first_part = rolls;
     fit_rung(tracks, nullptr, nullptr, options_for(rungs.back(), options), rungs.back());
     step_down(ladder, tracks, options, rungs.size() - 1, rungs);
   }
@@ -564,7 +688,7 @@ void predict_held_back_by_near_ones(std::span<const data::Track> tracks, const F
                                     std::vector<Rung>& rungs, const Rung& chosen) {
   std::vector<Rung*> near;
   for (Rung& rung : rungs)
-    if (rung.bic < chosen.bic + kVeryStrong) near.push_back(&rung);
+    if (rung.bic < chosen.bic + most_evidence_against(chosen)) near.push_back(&rung);
   FitOptions one = options;
   one.threads = 1;
   in_parallel(static_cast<int>(near.size()), options.threads, [&](int i) {
@@ -593,16 +717,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   plain.model.clear();
   std::vector<Rung> rungs = climb(ladder, tracks, plain);
   let_go_of_friction(ladder, tracks, plain, rungs);
-  const Rung* chosen = simplest_sufficient(ladder, rungs);
-  // A term found that way asks for the others anew, unless even then the model lacks something.
-  const Rung* before = nullptr;
-  for (std::size_t round = 0;
-       round < kMostRounds && chosen != before && chosen != nullptr && chosen->fit.converged;
-       ++round) {
-    if (round > 0 && chosen->fit.verdict == "unexplained") break;
-    before = chosen;
-    chosen = exchange_terms(ladder, tracks, plain, *chosen, rungs);
-  }
+  const Rung* chosen = exchange_while_worth(ladder, tracks, plain, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};
     none.fit.comparison = table_of(rungs, nullptr);

@@ -172,6 +172,24 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
   return solution;
 }
 
+Solution roughly_weighed(Problem& problem, Solution solution) {
+  problem.set_base(solution.u);
+  reweight(problem, solution.u, true);
+  name_attitudes(problem);
+  solution.u = problem.start();
+  return solution;
+}
+
+// To the floor of a valley that leaves most of the motion unexplained, whatever counts for how
+// much, it is far; and all that is said of it in the end is that.
+bool leads_nowhere(const Problem& problem, const Found& found) {
+  constexpr double kTellsNothing = 0.3;  // of the variance
+  if (problem.arcs.size() > 1 || found.passed || found.unexplained < kTellsNothing) return false;
+  Problem weighed = problem;
+  const Solution solution = roughly_weighed(weighed, found.solution);
+  return !explains(weighed, solution);
+}
+
 data::Fit& refuse(const Problem& problem, const std::string& reason, data::Fit& fit) {
   fit.outcome = "no_convergence";
   fit.verdict = "unexplained";
@@ -325,8 +343,6 @@ void give_friction_a_start(data::Scene& scene) {
   if (needed && !scene.model.friction) scene.model.friction = kTypical;
 }
 
-using FirstPart = std::map<std::string, double>;
-
 /// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
 /// has its own doubts.
 enum class Word { last, one_of_several };
@@ -350,6 +366,10 @@ class OneFit {
   OneFit& operator=(const OneFit&) = delete;
 
   void find(const std::vector<Relative>& relatives, FirstPart* first_part);
+  /// To be called before find().
+  void start_as(const Settled& near);
+  /// @pre find()
+  [[nodiscard]] Settled settled() const { return {problem_.tolerance, problem_.noise_scale}; }
   /// @pre find()
   [[nodiscard]] data::Fit described(Bars bars);
 
@@ -366,6 +386,16 @@ class OneFit {
   data::Fit fit_;
   bool refused_ = false, cut_short_ = false;
 };
+
+void OneFit::start_as(const Settled& near) {
+  if (near.tolerance <= 0.0 || options_.tolerance > 0.0 || problem_.arcs.size() > 1) return;
+  problem_.tolerance = std::min(problem_.tolerance, near.tolerance);
+  // What explains nothing knows nothing of the noise.
+  constexpr double kMost = 1.5;
+  if (std::all_of(near.noise_scale.begin(), near.noise_scale.end(),
+                  [](double scale) { return scale < kMost; }))
+    problem_.noise_scale = near.noise_scale;
+}
 
 void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part) {
   const auto refuse_with = [&](const std::string& reason) {
@@ -384,13 +414,19 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
   constexpr double kWorthwhile = 0.2;
   const auto& parameters = problem_.predictor->parameters();
   if (problem_.partial &&
-      problem_.partial->samples > kWorthwhile * static_cast<double>(problem_.arcs[0].t_s.size()))
+      problem_.partial->samples > kWorthwhile * static_cast<double>(problem_.arcs[0].t_s.size())) {
+    first_part->until_s = problem_.partial->until_s;
     for (std::size_t i = 0; i < parameters.size(); ++i)
-      (*first_part)[parameters[i].name] = problem_.partial->values[static_cast<Eigen::Index>(i)];
+      first_part->values[parameters[i].name] =
+          problem_.partial->values[static_cast<Eigen::Index>(i)];
+  }
   if (!found.solution.usable) return refuse_with(problem_.shortfalls->words());
 
   stages_.enter("weighing the samples");
-  solution_ = polish(problem_, found.solution, options_, fit_);
+  if (!leads_nowhere(problem_, found))
+    solution_ = polish(problem_, found.solution, options_, fit_);
+  else
+    solution_ = roughly_weighed(problem_, found.solution);
   stages_.enter("error bars");
   try {
     by_curvature_ = uncertainty(problem_, solution_.u);
@@ -456,6 +492,8 @@ class CompletedFit {
     }
     one_.find(plain, first_part);
   }
+  void start_as(const Settled& near) { one_.start_as(near); }
+  [[nodiscard]] Settled settled() const { return one_.settled(); }
   [[nodiscard]] data::Fit described(Bars bars) {
     data::Fit fit = one_.described(bars);
     tell_idle_terms(scene_, fit);
@@ -509,18 +547,26 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
-                             const FitOptions& options, Bars bars) {
+                             const FitOptions& options, Bars bars, const Settled& near) {
   CompletedFit one(tracks, completed(given, options), options, Word::one_of_several);
+  one.start_as(near);
   one.find();
   return one.described(bars);
 }
 
 Draft draft_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
-                           const FitOptions& options, FirstPart* first_part) {
+                           const FitOptions& options, FirstPart* first_part, const Settled& near) {
   const auto one = std::make_shared<CompletedFit>(tracks, completed(given, options), options,
                                                   Word::one_of_several);
+  one->start_as(near);
   one->find(first_part);
-  return {one->described(Bars::by_curvature), [one] { return one->described(Bars::full); }};
+  const auto full = std::make_shared<std::optional<data::Fit>>();
+  return {one->described(Bars::by_curvature),
+          [one, full] {
+            if (!*full) *full = one->described(Bars::full);
+            return **full;
+          },
+          one->settled()};
 }
 
 }  // namespace trochoid::fitting

@@ -62,40 +62,58 @@ Solution descend(Problem& problem) {
   return seek(problem, problem.start(), {.function_tolerance = kNear});
 }
 
-// A vanished loss and what a little of it would do.
+// A vanished loss, what it would do, and what the others would do beside it.
 struct Probe {
   int free = 0;
   double value = 0.0;  ///< at which chi-square, linearised, is least
   double gain = 0.0;   ///< of chi-square
+  std::vector<int> others;
+  Eigen::VectorXd step;  ///< of the others
 };
 
-// Score test: residuals and derivatives with a little of the vanished losses; each is then varied
-// together with all that is not held. The most rewarding one, gain 0 if there is none.
-Probe most_missed(Problem probed, const std::vector<int>& vanished) {
-  constexpr double kLittle = 0.02;  // of the given value
-  for (const int i : vanished)
-    for (Eigen::VectorXd& base : probed.base)
-      base[probed.free[i].index] = kLittle * probed.free[i].given;
+// Score test: each of the vanished losses, which act in proportion, is varied together with all
+// that is not held. The most rewarding one, gain 0 if there is none.
+Probe most_missed(const Problem& problem, const std::vector<int>& vanished) {
   Eigen::VectorXd r;
   Eigen::MatrixXd j;
   Probe best;
-  if (!evaluate(probed, 0, probed.start(), r, &j)) return best;
+  if (!evaluate(problem, 0, problem.start(), r, &j)) return best;
   std::vector<int> others;
-  for (int i = 0; i < static_cast<int>(probed.free.size()); ++i)
-    if (!probed.free[i].held && std::find(vanished.begin(), vanished.end(), i) == vanished.end())
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (!problem.free[i].held && std::find(vanished.begin(), vanished.end(), i) == vanished.end())
       others.push_back(i);
   const Eigen::MatrixXd active = j(Eigen::all, others);
   const auto qr = active.colPivHouseholderQr();
   for (const int i : vanished) {
-    // The derivative by the logarithm is what the probe itself did.
+    // The derivative by the logarithm is what as much again does.
     const Eigen::VectorXd alone = j.col(i) - active * qr.solve(j.col(i));
     const double size2 = alone.squaredNorm();
     const double times = size2 > 0.0 ? -r.dot(alone) / size2 : 0.0;
     const double gain = times * times * size2;
-    const double value = kLittle * probed.free[i].given * (1.0 + times);
-    if (times > 0.0 && gain > best.gain) best = {i, value, gain};
+    if (times > 0.0 && gain > best.gain)
+      best = {i, problem.base[0][problem.free[i].index] * (1.0 + times), gain, others,
+              qr.solve(-r - times * j.col(i))};
   }
   return best;
+}
+
+// Lets a missed loss act, and the others with it, as far as that holds what it promises. False:
+// not at all.
+bool let_act(const Problem& problem, const Probe& probe, double chi2, Problem& trial) {
+  constexpr double kMostWorse = 2.0;
+  for (double share = 1.0; share > 0.01; share *= 0.25) {
+    trial = problem;
+    FreeParameter& missed = trial.free[probe.free];
+    missed.held = false;
+    Eigen::VectorXd u = problem.start();
+    u(probe.others) += share * probe.step;
+    u[probe.free] = missed.transform.inverse(std::min(share * probe.value, 10.0 * missed.given));
+    Eigen::VectorXd r;
+    if (!evaluate(trial, 0, u, r, nullptr) || r.squaredNorm() > kMostWorse * chi2) continue;
+    trial.set_base(u);
+    return true;
+  }
+  return false;
 }
 
 // Free parameters that are losses and next to nothing.
@@ -128,11 +146,8 @@ Solution solve_to_the_end(Problem& problem) {
     const std::vector<int> vanished = vanished_losses(problem);
     const Probe probe = vanished.empty() ? Probe{} : most_missed(problem, vanished);
     if (probe.gain < kWorth) break;
-    Problem trial = problem;
-    const FreeParameter& missed = trial.free[probe.free];
-    trial.free[probe.free].held = false;
-    for (Eigen::VectorXd& base : trial.base)
-      base[missed.index] = std::min(probe.value, 10.0 * missed.given);
+    Problem trial;
+    if (!let_act(problem, probe, best.chi2, trial)) break;
     Solution again = descend(trial);
     if (!again.usable || again.chi2 > best.chi2 - 0.1) break;
     best = std::move(again);

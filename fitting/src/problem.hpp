@@ -51,6 +51,7 @@ struct Shortfalls {
 /// The longest window from the first sample on that a search explained, and with which values.
 struct Partial {
   int samples = 0;
+  double until_s = 0.0;    ///< when the last of them was taken
   Eigen::VectorXd values;  ///< of all predictor parameters
 };
 

@@ -41,6 +41,7 @@ data::Fit with_full_bars(const Rung& rung) {
 void take(Draft draft, Rung& rung) {
   rung.fit = std::move(draft.fit);
   rung.full = std::move(draft.full);
+  rung.settled = draft.settled;
 }
 
 namespace {
@@ -159,7 +160,8 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
     options.progress = [say = options.progress](const std::string& stage) {
       say(fmt::format("without the last third, {}", stage));
     };
-  const data::Fit early = fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature);
+  const data::Fit early =
+      fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature, rung.settled);
   if (!usable(early)) return kInfinity;
   Squares seen, unseen;
   bool sigma_known = true;
@@ -294,7 +296,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     if (extends) {
       own.start = extended_start(*below, rung);
       own.strategy = "single";
-      take(draft_one_of_several(tracks, rung.scene, own), rung);
+      take(draft_one_of_several(tracks, rung.scene, own, nullptr, below->settled), rung);
     }
     // Near a solution that explains nothing there is nothing to be found.
     const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
@@ -357,20 +359,25 @@ double dilution(std::span<const data::Track> tracks, const Rung& known, const Fi
   }
 }
 
-void fit_from_first_part(std::span<const data::Track> tracks,
-                         const std::map<std::string, double>& first_part, const FitOptions& options,
-                         Rung& rung) {
+void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
+                         const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  own.start = first_part;
+  own.start = first_part.values;
   own.strategy = rung.scene.model.name == "sliding" ? kRollsFirst : "growing";
   try_rung(rung, [&] {
+    take(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+void fit_from_values(std::span<const data::Track> tracks,
+                     const std::map<std::string, double>& values, const FitOptions& options,
+                     Rung& rung) {
+  FitOptions own = options;
+  own.start = values;
+  own.strategy = "single";
+  try_rung(rung, [&] {
     take(draft_one_of_several(tracks, rung.scene, own), rung);
-    if (usable(rung.fit) && rung.fit.converged && rung.fit.whiteness_p < kWhite &&
-        softness_is_open(rung)) {
-      own.start = values_of(rung.fit);
-      own.strategy = "single";
-      fit_softly(tracks, own, rung);
-    }
     rung.fitted = usable(rung.fit);
   });
 }
@@ -386,7 +393,7 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
     if (softness_is_open(rung) && !softness_is_open(known))
       fit_softly(tracks, own, rung);
     else
-      take(draft_one_of_several(tracks, rung.scene, own), rung);
+      take(draft_one_of_several(tracks, rung.scene, own, nullptr, known.settled), rung);
     rung.fitted = usable(rung.fit);
   });
 }

@@ -29,12 +29,14 @@ struct Rung {
   data::Scene scene;
   data::Fit fit;                    ///< error bars by curvature
   std::function<data::Fit()> full;  ///< `fit` with full error bars, which cost as much as a fit
+  Settled settled;
   bool fitted = false;
   std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
-  /// What explains the longest first part of the track that a search for it came across.
-  std::map<std::string, double> first_part;
+  /// What explains the longest first part of the track that a search for it, or for the model that
+  /// only rolls, came across.
+  FirstPart first_part;
   double aicc = std::numeric_limits<double>::infinity();
   double bic = std::numeric_limits<double>::infinity();
 };
@@ -97,12 +99,16 @@ void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
 [[nodiscard]] double dilution(std::span<const data::Track> tracks, const Rung& known,
                               const FitOptions& options);
 
-/// Fits a rung from the values that explain a first part of the track. A sliding one rolls at first
-/// and slides by Coulomb's law from where that ends; softly where that law leaves something to be
-/// asked.
-void fit_from_first_part(std::span<const data::Track> tracks,
-                         const std::map<std::string, double>& first_part, const FitOptions& options,
-                         Rung& rung);
+/// Fits a rung from the values that explain a first part of the track, which it may explain more
+/// of. A sliding one rolls at first and slides by Coulomb's law from where that ends: friction that
+/// sets in gently lets a body creep, which would show in the first part.
+void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
+                         const FitOptions& options, Rung& rung);
+
+/// Fits a rung from near its solution.
+void fit_from_values(std::span<const data::Track> tracks,
+                     const std::map<std::string, double>& values, const FitOptions& options,
+                     Rung& rung);
 
 /// Fits a rung that has a term more or less than `known`, from the solution of that alone.
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,

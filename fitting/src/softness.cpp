@@ -21,11 +21,10 @@ std::optional<Draft> fit_named(std::span<const data::Track> tracks, const data::
   if (options.log)
     options.log = [=, say = options.log](const std::string& line) { say(law + line); };
   try {
-    Draft result = draft_one_of_several(tracks, scene, options);
-    if (usable(result.fit)) return result;
+    return draft_one_of_several(tracks, scene, options);
   } catch (const NumericalError&) {
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
 FitOptions going_on_from(const data::Fit& fit, FitOptions options) {
@@ -77,6 +76,13 @@ bool shows_without_asking(const Draft& gentle) {
          (shows(eps, 1.0) && shows(gentle.full().find(kSlipScale), 1.0));
 }
 
+// Whether Coulomb's law is kept: unless the gentle one is better by strong evidence.
+bool suffices(const std::optional<Draft>& sharp, const std::optional<Draft>& gentle) {
+  if (!sharp || !gentle || !usable(gentle->fit)) return sharp.has_value();
+  if (sharp->fit.converged != gentle->fit.converged) return sharp->fit.converged;
+  return usable(sharp->fit) && sharp->fit.bic < gentle->fit.bic + kStrong;
+}
+
 }  // namespace
 
 bool softness_is_open(const Rung& rung) {
@@ -86,27 +92,27 @@ bool softness_is_open(const Rung& rung) {
 void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
   FitOptions exact = options;
   exact.start.erase(kSlipScale);
+  const bool from_nothing = options.strategy == "auto";
+  const bool rolls_first = !rung.first_part.empty();
   data::Scene soft = rung.scene;
-  auto gentle = fit_gently(tracks, options, soft);
-  std::optional<Draft> sharp;
+  std::optional<Draft> gentle, sharp;
+  if (!(from_nothing && rolls_first)) gentle = fit_gently(tracks, options, soft);
   if (gentle && gentle->fit.converged) {
     if (!shows_without_asking(*gentle))
       sharp = fit_sharply(tracks, options, rung.scene, gentle->fit);
-  } else if (options.strategy == "auto") {
-    // The gentle law is dear to follow; the exact one may get where the search for it ran out.
+  } else if (from_nothing || !gentle || !usable(gentle->fit)) {
     sharp = fit_named(tracks, rung.scene, exact, kCoulomb);
-    if (sharp && sharp->fit.converged) {
+    const bool asks = !rolls_first || (sharp && sharp->fit.whiteness_p < kWhite);
+    if (from_nothing && sharp && sharp->fit.converged && asks) {
       soft = rung.scene;
       gentle = fit_gently(tracks, going_on_from(sharp->fit, exact), soft);
     }
   }
-  if (sharp && (!gentle || (sharp->fit.converged == gentle->fit.converged
-                                ? sharp->fit.bic < gentle->fit.bic + kStrong
-                                : sharp->fit.converged))) {
+  if (suffices(sharp, gentle)) {
     take(*std::move(sharp), rung);
     return;
   }
-  if (!gentle) {
+  if (!gentle) {  // both threw; this says why
     take(draft_one_of_several(tracks, rung.scene, exact), rung);
     return;
   }

@@ -285,7 +285,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
       return {};
     }
     if (problem.partial && window > problem.partial->samples && reduced < gate)
-      *problem.partial = {window, part.base[0]};
+      *problem.partial = {window, part.arcs[0].t_s.back(), part.base[0]};
     if (window == all) {
       // To the end of a valley whose floor is that high it is far, and leads nowhere.
       if (!problem.rough && solution.chi2 > kTellsNothing * null_chi2(part.arcs[0])) {

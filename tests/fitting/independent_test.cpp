@@ -61,6 +61,27 @@ TEST(Independent, TwoLossesThatOnlyTogetherExplainTheTrackAreFound) {
                            {"contour_friction_m", 7.747631453212088e-05}});
 }
 
+// A disc that began to slide was given the usual losses, with which it went astray: another search,
+// from nothing, took most of a minute. What it rolls with it slides with.
+TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
+  const data::Track track = track_of("slides_later");
+  std::vector<std::string> sliding;
+  FitOptions options;
+  options.threads = 1;
+  options.log = [&](const std::string& line) {
+    if (line.find("+ sliding: ") != line.npos) sliding.push_back(line);
+  };
+  const Comparison found = compare(std::span(&track, 1), scene_of("slides_later"), options);
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.model, "sliding");
+  expect_found(found.fit, {{"rolling_friction_m", 0.00012716222321787647},
+                           {"contour_friction_m", 1.835468557226672e-05},
+                           {"friction", 0.3313224881976967}});
+  ASSERT_FALSE(sliding.empty());
+  EXPECT_THAT(sliding.front(), testing::HasSubstr("contour friction + sliding"));
+  EXPECT_THAT(sliding, testing::Each(testing::Not(testing::HasSubstr("sets in gently"))));
+}
+
 // Where only linear drag was known most of the motion had been left unexplained.
 TEST(Independent, ADryDragThatUsesUpATopsSpinIsTold) {
   const Comparison found = comparison_of("top_dry_spin");
