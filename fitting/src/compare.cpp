@@ -484,7 +484,7 @@ Rung longest_rolling(const Ladder& ladder, std::span<const data::Track> tracks,
   constexpr double kSurely = 0.9;  // of the first part: before its end a slip may have begun
   constexpr double kLonger = 1.05, kAsLong = 0.85;  // of its duration
   constexpr int kMostParts = 4;
-  const double from_s = tracks.front().samples.front().t_s;
+  const double from_s = known.first_part.from_s;  // later than the track's where it is cut
   for (int part = 0; part < kMostParts; ++part) {
     const double before_s = known.first_part.until_s - from_s;
     FitOptions early = options;
@@ -496,7 +496,7 @@ Rung longest_rolling(const Ladder& ladder, std::span<const data::Track> tracks,
     const Rung* chosen = exchange_while_worth(ladder, tracks, early, rungs);
     if (chosen == nullptr || !chosen->fit.converged) break;
     Rung longer = rung_with(ladder, as_likely(rungs, *chosen, kMostTerms));
-    fit_from_first_part(tracks, {values_of(chosen->fit), 0.0}, options_for(longer, options),
+    fit_from_first_part(tracks, {values_of(chosen->fit), 0.0, 0.0}, options_for(longer, options),
                         longer);
     if (explains(longer)) return longer;
     const double after_s = longer.first_part.until_s - from_s;

@@ -46,7 +46,7 @@ struct Settled {
 /// fifth of it; else empty.
 struct FirstPart {
   std::map<std::string, double> values;
-  double until_s = 0.0;
+  double from_s = 0.0, until_s = 0.0;  ///< when its first and last samples were taken
   [[nodiscard]] bool empty() const { return values.empty(); }
 };
 
