@@ -45,8 +45,8 @@ struct Settled {
 /// What explains the longest first part of a single arc that a search came across, if more than a
 /// fifth of it; else empty.
 struct FirstPart {
-  std::map<std::string, double> values;
-  double from_s = 0.0, until_s = 0.0;  ///< when its first and last samples were taken
+  std::map<std::string, double> values;  ///< of the parameters, by name, in their SI units
+  double from_s = 0.0, until_s = 0.0;    ///< when its first and last samples were taken
   [[nodiscard]] bool empty() const { return values.empty(); }
 };
 

@@ -415,6 +415,7 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
   const auto& parameters = problem_.predictor->parameters();
   if (problem_.partial &&
       problem_.partial->samples > kWorthwhile * static_cast<double>(problem_.arcs[0].t_s.size())) {
+    *first_part = {};
     first_part->from_s = problem_.arcs[0].t_s[0];
     first_part->until_s = problem_.partial->until_s;
     for (std::size_t i = 0; i < parameters.size(); ++i)

@@ -100,14 +100,16 @@ Probe most_missed(const Problem& problem, const std::vector<int>& vanished) {
 // Lets a missed loss act, and the others with it, as far as that holds what it promises. False:
 // not at all.
 bool let_act(const Problem& problem, const Probe& probe, double chi2, Problem& trial) {
-  constexpr double kMostWorse = 2.0;
-  for (double share = 1.0; share > 0.01; share *= 0.25) {
+  constexpr double kMostWorse = 2.0, kMostTimes = 10.0, kLeastShare = 0.01;
+  const FreeParameter& gone = problem.free[probe.free];
+  const double whole = std::min(1.0, kMostTimes * gone.given / probe.value);
+  for (double share = whole; share > kLeastShare * whole; share *= 0.25) {
     trial = problem;
     FreeParameter& missed = trial.free[probe.free];
     missed.held = false;
     Eigen::VectorXd u = problem.start();
     u(probe.others) += share * probe.step;
-    u[probe.free] = missed.transform.inverse(std::min(share * probe.value, 10.0 * missed.given));
+    u[probe.free] = missed.transform.inverse(share * probe.value);
     Eigen::VectorXd r;
     if (!evaluate(trial, 0, u, r, nullptr) || r.squaredNorm() > kMostWorse * chi2) continue;
     trial.set_base(u);

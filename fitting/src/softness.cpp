@@ -112,7 +112,7 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
     take(*std::move(sharp), rung);
     return;
   }
-  if (!gentle) {  // both threw; this says why
+  if (!gentle) {  // no law led anywhere; this says why
     take(draft_one_of_several(tracks, rung.scene, exact), rung);
     return;
   }

@@ -82,6 +82,25 @@ TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
   EXPECT_THAT(sliding, testing::Each(testing::Not(testing::HasSubstr("sets in gently"))));
 }
 
+// What comes before it is not looked at: first parts are counted from where the fit begins.
+TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
+  data::Track track = track_of("slides_later");
+  constexpr double kLater_s = 20.0;
+  std::vector<data::TrackSample> samples(30, track.samples.front());
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i].t_s = 0.01 * static_cast<double>(i);
+  for (data::TrackSample own : track.samples) {
+    own.t_s += kLater_s;
+    samples.push_back(own);
+  }
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i].frame = static_cast<int>(i);
+  track.samples = samples;
+  FitOptions options;
+  options.from = "19.99";
+  const Comparison found = compare(std::span(&track, 1), scene_of("slides_later"), options);
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.model, "sliding");
+}
+
 // Where only linear drag was known most of the motion had been left unexplained.
 TEST(Independent, ADryDragThatUsesUpATopsSpinIsTold) {
   const Comparison found = comparison_of("top_dry_spin");

@@ -450,7 +450,7 @@ TEST_F(Promised, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
 
 // A little of a loss turns a body by whole turns seconds later: let act at a share of what it may
 // be, it lost the path, and the way back took most of the time.
-TEST_F(Promised, ALossThatWasGoneActsOnlyAsFarAsThatHoldsThePath) {
+TEST_F(Promised, ALossThatWasGoneIsLetActWithoutLosingThePath) {
   std::vector<std::string> lines;
   FitOptions from;
   from.log = [&](const std::string& line) { lines.push_back(line); };
@@ -462,6 +462,7 @@ TEST_F(Promised, ALossThatWasGoneActsOnlyAsFarAsThatHoldsThePath) {
   const data::Fit found = fit(tracks_, rung.scene, from);
   EXPECT_GT(found.find("pivoting_friction_m")->value, 1e-7);
   double last = 0.0;
+  int compared = 0;
   for (const std::string& line : lines) {
     const std::size_t at = line.find("chi2 "), to = line.find(" -> ");
     if (line == "weighing the samples") break;
@@ -469,9 +470,11 @@ TEST_F(Promised, ALossThatWasGoneActsOnlyAsFarAsThatHoldsThePath) {
     const double first = std::stod(line.substr(at + 5));
     if (last > 0.0) {
       EXPECT_LT(first, 2.1 * last) << line;
+      ++compared;
     }
     last = std::stod(line.substr(to + 4));
   }
+  EXPECT_GT(compared, 0);
 }
 
 }  // namespace
