@@ -53,7 +53,8 @@ class ChromaSite : public GlimpsedSequence {
 
 // As most cameras code, also of recordings turned by a quarter.
 TEST_F(ChromaSite, SamplesThatLieAsideAreFound) {
-  for (const Eigen::Vector2d& site_px : {Eigen::Vector2d(-0.5, 0.0), Eigen::Vector2d(0.0, 0.5)}) {
+  for (const Eigen::Vector2d& site_px :
+       {Eigen::Vector2d(-0.5, 0.0), Eigen::Vector2d(0.0, 0.5), Eigen::Vector2d(-0.5, -0.5)}) {
     const auto site = found(site_px.array(), {0.1, 0.05});
     ASSERT_TRUE(site);
     EXPECT_EQ(*site, site_px);

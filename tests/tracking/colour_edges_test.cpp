@@ -11,6 +11,8 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "background.hpp"
+#include "body_finder.hpp"
 #include "contour.hpp"
 #include "drawn_clip.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
@@ -225,23 +227,32 @@ TEST(ColourEdges, GlintsOnOneSideAreOutliers) {
   EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
 }
 
-// Coders spread colours over neighbouring pixels of the planes. Of edges twice as wide as they are
-// taken for, the offset comes out at half of what it is.
-TEST(ColourEdges, OffsetsOfColoursThatTheCoderHasBlurredAreNotShrunk) {
-  constexpr double kTheta = 0.3, kRadius_px = 36.0, kSpread = 0.6;  // sd in pixels of the planes
-  const ThinDisc disc;
-  const Eigen::Vector2d centre(80.3, 70.2);
-  Photograph picture = photographed(
+constexpr double kThinRadius_px = 36.0;  // of ThinDisc
+
+// One colour on another.
+Photograph brown_on_blue(const Eigen::Vector2d& centre, double theta_rad, Site site = Site::amid) {
+  constexpr double kNoise = 0.5;
+  return photographed(
       {160, 140}, {150.0, 60.0, 40.0},
       [](double, double) -> Rgb {
         return {120.0, 150.0, 215.0};
       },
       [&](double x, double y) {
-        return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
-                          0.0)
+        return in_ellipse(x - centre.x(), y - centre.y(), kThinRadius_px,
+                          kThinRadius_px * std::cos(theta_rad), 0.0)
                    ? 1.0
                    : 0.0;
-      });
+      },
+      kNoise, site);
+}
+
+// Coders spread colours over neighbouring pixels of the planes. Of edges twice as wide as they are
+// taken for, the offset comes out at half of what it is.
+TEST(ColourEdges, OffsetsOfColoursThatTheCoderHasBlurredAreNotShrunk) {
+  constexpr double kTheta = 0.3, kSpread = 0.6;  // the latter: sd in pixels of the planes
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  Photograph picture = brown_on_blue(centre, kTheta);
   cv::GaussianBlur(picture.chroma, picture.chroma, {}, kSpread);
   constexpr double kTolerance_px = 0.08;  // of the 0.4 px that are to be seen
   EXPECT_LT((centre_by_colour(disc, picture, centre, kTheta) - centre).norm(), kTolerance_px);
@@ -249,18 +260,10 @@ TEST(ColourEdges, OffsetsOfColoursThatTheCoderHasBlurredAreNotShrunk) {
 
 // Colours that lie half a pixel to the left of where they are looked for seem to lie to the right.
 TEST(OutlineFitter, TellsHowFarColoursLieOffLuma) {
-  constexpr double kTheta = 0.3, kRadius_px = 36.0, kNoise = 0.5;
+  constexpr double kTheta = 0.3;
   const ThinDisc disc;
   const Eigen::Vector2d centre(80.3, 70.2);
-  const auto covered = [&](double x, double y) {
-    return in_ellipse(x - centre.x(), y - centre.y(), kRadius_px, kRadius_px * std::cos(kTheta),
-                      0.0)
-               ? 1.0
-               : 0.0;
-  };
-  const auto floor = [](double, double) -> Rgb { return {120.0, 150.0, 215.0}; };
-  const auto [luma, chroma] =
-      photographed({160, 140}, {150.0, 60.0, 40.0}, floor, covered, kNoise, Site::left);
+  const auto [luma, chroma] = brown_on_blue(centre, kTheta, Site::left);
   const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
   const cv::Mat no_plate;
   for (const double site_px : {0.0, -0.5}) {
@@ -277,6 +280,34 @@ TEST(OutlineFitter, TellsHowFarColoursLieOffLuma) {
     EXPECT_NEAR(seen->colour_off_px.y(), 0.0, kTolerance_px);
     EXPECT_GT(seen->colour_information.minCoeff(), 50.0);
   }
+}
+
+TEST(CylinderFinder, LooksForColoursWhereTheBackgroundSaysTheyLie) {
+  constexpr double kTheta = 0.3, kFloor = 148.0;  // luma of the blue
+  const ThinDisc disc;
+  const Eigen::Vector2d centre(80.3, 70.2);
+  const Photograph picture = brown_on_blue(centre, kTheta, Site::left);
+  const cv::Size size = picture.luma.size();
+  Frame frame;
+  frame.luma = picture.luma, frame.chroma = picture.chroma;
+  const auto finder =
+      make_cylinder_finder(disc.body, {data::SupportKind::floor, {}}, disc.camera, 0.0);
+  Sighting guess;
+  guess.pose.emplace().pose = disc.at(centre, kTheta);
+  finder->place(guess);
+  const Background amid =
+      Background::from_samples({{cv::Mat(size, CV_8U, cv::Scalar(kFloor))}, {}});
+  const auto off_px = [&](const Background& background) {
+    Plate plate;
+    background.scaled_into(plate, 1.0, cv::Rect({}, size));
+    Look look{.frame = frame, .background = plate};
+    look.predicted = &guess;
+    const auto seen = finder->find(look);
+    return seen && seen->pose ? seen->pose->colour_off_px.x() : std::nan("");
+  };
+  constexpr double kTolerance_px = 0.15;  // half of what Tukey's weights may take off it
+  EXPECT_NEAR(off_px(amid), 0.5, kTolerance_px);
+  EXPECT_NEAR(off_px(amid.sited_at({-0.5, 0.0})), 0.0, kTolerance_px);
 }
 
 // The wall of a disc shows more of its colour where it faces the camera and less where it turns

@@ -52,17 +52,24 @@ std::optional<Eigen::Vector2d> find_chroma_site(const Background& background,
     told.push_back(i);
   }
   if (!amid.tells(0) || !amid.tells(1)) return std::nullopt;
-  const int axis = std::abs(amid.off_px(0)) > std::abs(amid.off_px(1)) ? 0 : 1;
-  Eigen::Vector2d site_px = Eigen::Vector2d::Zero();
-  if (std::abs(amid.off_px(axis)) < kNoticeable_px) return site_px;
   std::vector<std::size_t> which;
   const std::size_t looks = std::min(kLooks, told.size());
   for (std::size_t k = 0; k < looks; ++k) which.push_back(told[k * told.size() / looks]);
-  site_px[axis] = -std::copysign(kAside_px, amid.off_px(axis));
-  const Shift aside = seen_with(background.sited_at(site_px), finder, glimpses, which);
-  const bool fits =
-      aside.information[axis] > 0.0 && std::abs(aside.off_px(axis)) < std::abs(amid.off_px(axis));
-  return fits ? site_px : Eigen::Vector2d(Eigen::Vector2d::Zero());
+  Shift now = amid;
+  Eigen::Vector2d site_px = Eigen::Vector2d::Zero();
+  const int farther = std::abs(amid.off_px(0)) > std::abs(amid.off_px(1)) ? 0 : 1;
+  for (const int axis : {farther, 1 - farther}) {
+    if (std::abs(now.off_px(axis)) < kNoticeable_px) continue;
+    Eigen::Vector2d tried_px = site_px;
+    tried_px[axis] = -std::copysign(kAside_px, now.off_px(axis));
+    const Shift aside = seen_with(background.sited_at(tried_px), finder, glimpses, which);
+    if (aside.information.minCoeff() <= 0.0 ||
+        std::abs(aside.off_px(axis)) > std::abs(now.off_px(axis)))
+      continue;
+    site_px = tried_px;
+    now = aside;
+  }
+  return site_px;
 }
 
 }  // namespace trochoid::tracking

@@ -66,8 +66,8 @@ struct ColourWindow {
 };
 
 /// That of the body at `pose`. Shadows hardly change it, so it shows rims that the
-/// luma loses. Empty where the colours are too much alike, or without chroma. Taken to lie in the
-/// middle of the four pixels it belongs to; other codings shift it by half a pixel.
+/// luma loses. Empty where the colours are too much alike, or without chroma. `levels` are taken to
+/// lie in the middle of the four pixels they belong to; other codings shift them by half a pixel.
 [[nodiscard]] ColourWindow colour_window(const cv::Mat& luma, const cv::Mat& chroma,
                                          const cv::Rect& window, const data::Body& body,
                                          const data::Camera& camera, const data::Pose<>& pose);

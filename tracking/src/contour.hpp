@@ -6,14 +6,14 @@
 
 namespace trochoid::tracking {
 
-/// One closed border of a body's silhouette, star-shaped about its middle: distances of points in
-/// the picture from it.
+/// One closed border of a body's silhouette or of its near face, star-shaped about its middle:
+/// distances of points in the picture from it.
 class Contour {
  public:
   enum class Of { rim, bore, near_rim, near_bore };
   struct Place {
     std::size_t at;   ///< the nearest point of the contour
-    double off_px;    ///< distance, > 0 where the body is not
+    double off_px;    ///< distance, > 0 where what it borders is not
     double aside_px;  ///< along the contour from that point
   };
 

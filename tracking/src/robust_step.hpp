@@ -57,7 +57,7 @@ struct RobustSolution {
   /// outline, over what was expected. Noisy; frames of one clip have nearly the same.
   double inflation = 1.0;
   /// Shift of what the colour planes show as edges alone tell it, either coordinate by itself, and
-  /// the inverse of its variance; 0 where they do not tell.
+  /// the inverse of its variance [px^-2]; 0 where they do not tell.
   Eigen::Array2d colour_off_px = Eigen::Array2d::Zero();
   Eigen::Array2d colour_information = Eigen::Array2d::Zero();
   double correlation = 1.0;  ///< variance of sums of errors over that of independent errors

@@ -290,6 +290,7 @@ class Tracking {
   /// Follows a body through the window, ahead and back at once.
   [[nodiscard]] Followed follow_from(Seed seed) const {
     BodyPath path;
+    if (!paths_.empty()) path.chroma_site_px = paths_.front().chroma_site_px;
     const auto& window = recording_.window();
     const Frame& start = window[seed.held_index];
     if (!seed.seen.pose) path.marks = marks_of(start, seed.seen);
@@ -333,7 +334,8 @@ class Tracking {
     // Where there are other bodies, what is dark beside one need not be its shadow.
     if (objects_ == 1)
       if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
-    if (!path.chroma_site_px)
+    // Only what is measured again is measured with it.
+    if (!path.chroma_site_px && options_.effort != Effort::quick)
       path.chroma_site_px = find_chroma_site(background_, *finder_, glimpses);
     const Background lit = background_.lit_by(path.lamp).sited_at(
         path.chroma_site_px.value_or(Eigen::Vector2d::Zero()));

@@ -63,7 +63,7 @@ struct PoseMeasurement {
   double evidence = 0.0;
   double blur_px = 0.0;  ///< of the edges of this picture, for the next one
   /// How far what colours show lies off what luma does, either coordinate by itself, and the
-  /// inverse of its variance; 0 where they do not tell.
+  /// inverse of its variance [px^-2]; 0 where they do not tell.
   Eigen::Array2d colour_off_px = Eigen::Array2d::Zero();
   Eigen::Array2d colour_information = Eigen::Array2d::Zero();
   /// Light beside the outline in this picture, for others.
