@@ -111,7 +111,7 @@ void FloorDarkening::look_around(const cv::Mat& luma, const cv::Mat& plate,
       if (floor < kLeastLight || body.at<unsigned char>(y - box.y, x - box.x) != 0) continue;
       const auto at_m = floor_at(camera, x, y);
       if (!at_m) continue;
-      at_m_.push_back(*at_m);
+      x_m_.push_back(at_m->x()), y_m_.push_back(at_m->y());
       darker_.push_back(std::max(kBrightest, 1.0 - light(luma, x, y) / floor));
     }
   if (darker_.empty()) return;
@@ -123,30 +123,64 @@ void FloorDarkening::look_around(const cv::Mat& luma, const cv::Mat& plate,
   }
 }
 
-bool FloorDarkening::stands_between(const Eigen::Vector3d& from_m,
-                                    const Eigen::Vector3d& towards) const {
-  const Eigen::Vector3d to_centre = centre_m_ - from_m;
-  const double height = axis_.dot(to_centre), per_height = 1.0 / axis_.dot(towards);
-  for (const double off_m : {0.0, half_thickness_m_, -half_thickness_m_}) {
-    const double along = (height + off_m) * per_height;
-    if (!(along > 0.0)) continue;
-    const double off2 = (along * towards - to_centre - off_m * axis_).squaredNorm();
-    if (off2 >= bore_m_ * bore_m_ && off2 <= radius_m_ * radius_m_) return true;
-  }
-  return false;
-}
-
 bool FloorDarkening::Sums::tell() const {
   constexpr double kFewest = 4.0;
   return within >= kFewest && without >= kFewest;
 }
 
+namespace {
+
+// Something that grows linearly along the floor.
+struct OnFloor {
+  double at_origin, per_x, per_y;
+  [[nodiscard]] double at(double x_m, double y_m) const {
+    return at_origin + per_x * x_m + per_y * y_m;
+  }
+};
+
+// A plane across the axis of the body, as rays from the floor towards a lamp meet it: how far along
+// they do, and where in it, from the axis.
+struct Section {
+  OnFloor along, level_m, steep_m;
+
+  Section(const Eigen::Vector3d& middle_m, const Eigen::Vector3d& axis,
+          const Eigen::Vector3d& towards) {
+    const Eigen::Vector3d level = axis.unitOrthogonal(), steep = axis.cross(level);
+    const double per_height = 1.0 / axis.dot(towards);
+    along = {axis.dot(middle_m) * per_height, -axis.x() * per_height, -axis.y() * per_height};
+    const auto part = [&](const Eigen::Vector3d& way) -> OnFloor {
+      const double per_along = towards.dot(way);
+      return {along.at_origin * per_along - middle_m.dot(way), along.per_x * per_along + way.x(),
+              along.per_y * per_along + way.y()};
+    };
+    level_m = part(level), steep_m = part(steep);
+  }
+};
+
+}  // namespace
+
 FloorDarkening::Sums FloorDarkening::sums_under(const Eigen::Vector2d& lamp_aside) const {
   const Eigen::Vector3d towards(lamp_aside.x(), lamp_aside.y(), 1.0);
+  // A face of the body or the middle between them stands in the way.
+  const std::size_t count = darker_.size();
+  std::vector<double> hidden(count, 0.0);
+  const double least_m2 = bore_m_ * bore_m_, most_m2 = radius_m_ * radius_m_;
+  for (const double off_m : {0.0, half_thickness_m_, -half_thickness_m_}) {
+    const Section section(centre_m_ + off_m * axis_, axis_, towards);
+    // Some ten million times a recording: without a branch, two points at a time.
+    for (std::size_t i = 0; i < count; ++i) {
+      const double level_m = section.level_m.at(x_m_[i], y_m_[i]);
+      const double steep_m = section.steep_m.at(x_m_[i], y_m_[i]);
+      const double off_m2 = level_m * level_m + steep_m * steep_m;
+      const double ahead = section.along.at(x_m_[i], y_m_[i]) > 0.0 ? 1.0 : 0.0;
+      const double outside_bore = off_m2 >= least_m2 ? ahead : 0.0;
+      hidden[i] = std::max(hidden[i], off_m2 <= most_m2 ? outside_bore : 0.0);
+    }
+  }
   Sums sums;
-  for (std::size_t i = 0; i < at_m_.size(); ++i)
-    if (stands_between(at_m_[i], towards)) sums.within += 1.0, sums.darker += darker_[i];
-  sums.without = static_cast<double>(at_m_.size()) - sums.within;
+  for (std::size_t i = 0; i < count; ++i)
+    sums.within += hidden[i], sums.darker += hidden[i] * darker_[i];
+  sums.without = static_cast<double>(count) - sums.within;
   return sums;
 }
 

@@ -49,15 +49,12 @@ class FloorDarkening {
   [[nodiscard]] Sums sums_under(const Eigen::Vector2d& lamp_aside) const;
   void look_around(const cv::Mat& luma, const cv::Mat& plate, const data::Camera& camera);
   [[nodiscard]] cv::Mat covered(const data::Camera& camera, const cv::Rect& box) const;
-  /// Whether a face of the body or the middle between them stands in the way of a ray.
-  [[nodiscard]] bool stands_between(const Eigen::Vector3d& from_m,
-                                    const Eigen::Vector3d& towards) const;
 
   double radius_m_, bore_m_, half_thickness_m_;
   Eigen::Vector3d centre_m_, axis_;
-  std::vector<Eigen::Vector3d> at_m_;  ///< points of the floor
-  std::vector<double> darker_;         ///< there, as a share of the light, beyond its mean
-  double square_ = 0.0;                ///< sum of squares of these
+  std::vector<double> x_m_, y_m_;  ///< points of the floor
+  std::vector<double> darker_;     ///< there, as a share of the light, beyond its mean
+  double square_ = 0.0;            ///< sum of squares of these
 };
 
 }  // namespace trochoid::tracking
