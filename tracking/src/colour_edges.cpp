@@ -27,40 +27,57 @@ Harmonics harmonics_of(const Eigen::Vector2d& normal) {
   return {1.0, c, s, c * c - s * s, 2.0 * c * s};
 }
 
-// The borders of the silhouette at one moment.
-struct Silhouette {
-  explicit Silhouette(const std::vector<OutlineSample>& outline)
-      : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)},
-        faces{Contour(outline, Contour::Of::near_rim), Contour(outline, Contour::Of::near_bore)} {}
-  std::array<Contour, 2> borders;
-  std::array<Contour, 2> faces;  // those of the near face beside them
-};
-
 enum Side { kInside, kOutside };
 
-// How much of a pixel the body covers, and by how much more if the border were 1 px farther out or
-// a parameter of the motion larger by one.
-struct Cover {
-  double covered = 0.0, density = 0.0;
-  double wall = 0.0;  // of what is covered
-  PoseMotion::Step change{};
+// The borders of the silhouette at one moment.
+struct Silhouette {
+  // @param blur2_px2 of a border at rest, @param smear the body's motion from end to end of the
+  // exposure, or empty, @param part of it that the moment stands for.
+  Silhouette(const std::vector<OutlineSample>& outline, double blur2_px2,
+             const PoseMotion::Step& smear, double part)
+      : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)},
+        faces{Contour(outline, Contour::Of::near_rim), Contour(outline, Contour::Of::near_bore)} {
+    for (std::size_t which = 0; which < borders.size(); ++which)
+      for (std::size_t k = 0; k < borders[which].size(); ++k) {
+        const OutlineSample& sample = borders[which][k];
+        const double swept_px = smear.size() > 0 ? sample.motion.dot(smear) * part : 0.0;
+        samples[which].push_back({1.0 / std::sqrt(blur2_px2 + swept_px * swept_px / 12.0),
+                                  sample.edge != Edge::upper_rim &&
+                                      sample.edge != Edge::upper_bore && !faces[which].empty(),
+                                  sample.motion});
+      }
+  }
+  struct Sample {
+    double per_blur;  // 1 / px
+    bool shows_wall;
+    OutlineSample::Motion motion;
+  };
+  std::array<Contour, 2> borders;
+  std::array<Contour, 2> faces;                // those of the near face beside them
+  std::array<std::vector<Sample>, 2> samples;  // of the borders
 };
 
 // Pixels of the colour planes are means of coded pixels of luma, two wide, and coders blur them as
 // much again (x264 at quality 11 to 23, by how steep edges are): so many equal parts, towards the
 // inside and the outside of a border.
 constexpr std::array<double, 4> kTapsPx{-1.5, -0.5, 0.5, 1.5};
-using Taps = std::array<Cover, kTapsPx.size()>;
+using Taps = Eigen::Array<double, kTapsPx.size(), 1>;
+
+// How much of each part of a pixel the body covers, and by how much more if the border were 1 px
+// farther out or a parameter of the motion larger by one.
+struct Cover {
+  Taps covered = Taps::Zero(), density = Taps::Zero();
+  Taps wall = Taps::Zero();  // of what is covered
+  Eigen::Array<double, kTapsPx.size(), PoseMotion::kMost> change =
+      Eigen::Array<double, kTapsPx.size(), PoseMotion::kMost>::Zero();
+};
 
 // A pixel of the colour planes near one border.
 struct Pixel {
-  double value = 0.0;  // colour, from what has none
-  double luma = 0.0;
-  Taps taps{};
+  double value = 0.0;                   // colour, from what has none
   double covered = 0.0, density = 0.0;  // as a share of the body's colour
   double wall = 0.0;                    // likewise, of its wall
   PoseMotion::Step change{};
-  std::size_t stretch = 0;
 
   // So far from the border that it shows a level.
   [[nodiscard]] bool is_clear() const {
@@ -70,11 +87,18 @@ struct Pixel {
   [[nodiscard]] Side side() const { return covered > 0.5 ? kInside : kOutside; }
 };
 
+// The same before it is known how body and surroundings mix.
+struct RawPixel {
+  double value, luma;
+  std::size_t stretch;
+  Cover cover;
+};
+
 // Pixels about one sample of a border.
 struct Stretch {
   std::size_t sample;
   Harmonics harmonics;
-  std::vector<std::size_t> pixels;
+  std::size_t first = 0, end = 0;   // its pixels
   double shade = 1.0;               // luma of the surroundings here over that of all around
   std::array<double, 2> levels{};   // by those of the whole outline
   double wall = 0.0;                // by how much its wall differs from the face
@@ -93,22 +117,20 @@ class ColourFit {
     Contour::Place place;
   };
 
-  void collect(const ColourWindow& colour, double blur_px, int every);
+  [[nodiscard]] std::vector<RawPixel> collect(const ColourWindow& colour, double blur_px,
+                                              int every);
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
-  [[nodiscard]] Pixel pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
-  void cover(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
-             Taps& taps) const;
-  void find_shades(double ground_luma);
+  [[nodiscard]] Cover cover_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
+  void add_moment(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
+                  Cover& cover) const;
+  void find_shades(const std::vector<RawPixel>& raw, double ground_luma);
   [[nodiscard]] double longest_sweep_px() const;
-  [[nodiscard]] double parts() const {
-    return std::max<double>(1.0, static_cast<double>(moments_.size()));
-  }
 
   template <class Use>
   void over_neighbours(std::size_t reach, const Use& use);
-  static void mix(const ColourMixing& mixing, Pixel& pixel);
+  void mix(const ColourWindow& colour, const std::vector<RawPixel>& raw);
 
-  [[nodiscard]] double off_level(const Pixel& pixel) const;
+  [[nodiscard]] static double off_level(const Stretch& stretch, const Pixel& pixel);
   void fit_levels(Side side);
   bool find_noise(Side side);
   bool find_levels();
@@ -117,12 +139,13 @@ class ColourFit {
 
   const std::vector<OutlineSample>& outline_;
   const PoseMotion::Step& smear_;
+  double part_;  // of the exposure, that a moment stands for
+  double blur2_px2_;
   Silhouette middle_;
   std::vector<Silhouette> moments_;
   double body_;  // colour of the body, about
-  double blur2_px2_;
   std::vector<Stretch> stretches_;
-  std::vector<Pixel> pixels_;
+  std::vector<Pixel> pixels_;      // stretch by stretch
   std::array<double, 2> noise_{};  // sd of a pixel
 };
 
@@ -130,13 +153,16 @@ ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, 
                      int every)
     : outline_(outline.middle),
       smear_(outline.smear),
-      middle_(outline.middle),
-      body_(colour.body),
-      blur2_px2_(blur_px * blur_px) {
-  for (const auto& moment : outline.moments) moments_.emplace_back(moment);
-  collect(colour, blur_px, every);
-  find_shades(colour.ground_luma);
-  for (Pixel& pixel : pixels_) mix(colour.mixing_in(stretches_[pixel.stretch].shade), pixel);
+      part_(1.0 / std::max<double>(1.0, static_cast<double>(outline.moments.size()))),
+      blur2_px2_(blur_px * blur_px),
+      middle_(outline.middle, blur2_px2_, smear_, part_),
+      body_(colour.body) {
+  moments_.reserve(outline.moments.size());
+  for (const auto& moment : outline.moments)
+    moments_.emplace_back(moment, blur2_px2_, smear_, part_);
+  const std::vector<RawPixel> raw = collect(colour, blur_px, every);
+  find_shades(raw, colour.ground_luma);
+  mix(colour, raw);
 }
 
 double ColourFit::longest_sweep_px() const {
@@ -147,29 +173,29 @@ double ColourFit::longest_sweep_px() const {
   return longest;
 }
 
-void ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
+std::vector<RawPixel> ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
   // What turns fast shows no level near its ends: farther in and out it does.
   constexpr double kPerSweep = 0.3;
   const double sweep_px = longest_sweep_px();
   const double level_px = 2.5 + 5.0 * blur_px + kPerSweep * sweep_px;
   for (const Contour& border : middle_.borders)
     for (std::size_t k = 0; k < border.size(); ++k)
-      stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px), {}});
+      stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px)});
+  std::vector<RawPixel> raw;
   for (int y = 0; y < colour.planes.rows; y += every)
     for (int x = 0; x < colour.planes.cols; ++x) {
       const Eigen::Vector2d at_px = colour.place_of(x, y);
       const auto at = nearest(at_px, level_px + 0.5 * sweep_px);
       if (!at) continue;
-      Pixel pixel = pixel_at(at_px, *at);
+      const Cover cover = cover_at(at_px, *at);
       constexpr double kNoEdge = 0.02;
-      double density = 0.0;
-      for (const Cover& tap : pixel.taps) density += tap.density;
-      if (std::abs(at->place.off_px) > level_px && density < kNoEdge) continue;
-      pixel.value = static_cast<double>(colour.planes.at<float>(y, x)) - colour.neutral;
-      pixel.luma = static_cast<double>(colour.luma.at<float>(y, x));
-      stretches_[pixel.stretch].pixels.push_back(pixels_.size());
-      pixels_.push_back(std::move(pixel));
+      if (std::abs(at->place.off_px) > level_px && cover.density.sum() < kNoEdge) continue;
+      const std::size_t first = at->border == 0 ? 0 : middle_.borders[0].size();
+      raw.push_back({static_cast<double>(colour.planes.at<float>(y, x)) - colour.neutral,
+                     static_cast<double>(colour.luma.at<float>(y, x)), first + at->place.at,
+                     cover});
     }
+  return raw;
 }
 
 std::optional<ColourFit::Nearest> ColourFit::nearest(const Eigen::Vector2d& at_px,
@@ -187,63 +213,58 @@ std::optional<ColourFit::Nearest> ColourFit::nearest(const Eigen::Vector2d& at_p
   return best;
 }
 
-Pixel ColourFit::pixel_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const {
-  const OutlineSample& sample = middle_.borders[nearest.border][nearest.place.at];
-  Pixel pixel;
-  pixel.stretch = (nearest.border == 0 ? 0 : middle_.borders[0].size()) + nearest.place.at;
-  pixel.taps.fill({0.0, 0.0, 0.0, PoseMotion::Step::Zero(sample.motion.size())});
-  if (moments_.empty()) cover(middle_, at_px, nearest, pixel.taps);
-  for (const Silhouette& moment : moments_) cover(moment, at_px, nearest, pixel.taps);
-  return pixel;
+Cover ColourFit::cover_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const {
+  Cover cover;
+  if (moments_.empty()) add_moment(middle_, at_px, nearest, cover);
+  for (const Silhouette& moment : moments_) add_moment(moment, at_px, nearest, cover);
+  return cover;
 }
 
 // Adds what one part of the exposure says. A border that is not there then hides nothing.
-void ColourFit::cover(const Silhouette& moment, const Eigen::Vector2d& at_px,
-                      const Nearest& nearest, Taps& taps) const {
+void ColourFit::add_moment(const Silhouette& moment, const Eigen::Vector2d& at_px,
+                           const Nearest& nearest, Cover& cover) const {
   const NormalTable& table = NormalTable::instance();
-  const double part = 1.0 / parts();
   const Contour& own = moment.borders[nearest.border];
   const Contour& other = moment.borders[1 - nearest.border];
-  const double usual = 1.0 / std::sqrt(blur2_px2_);
-  const auto within = [&](double off_px, double inverse) {
-    return 1.0 - static_cast<double>(table.at(static_cast<float>(off_px * inverse)).share);
+  const auto outside = [&](double off_px, double per_blur) {
+    return table.at(static_cast<float>(off_px * per_blur));
   };
-  const double beside_other = other.empty() ? 1.0 : within(other.nearest(at_px).off_px, usual);
+  double part = part_;
+  if (!other.empty())
+    part *= 1.0 - static_cast<double>(
+                      outside(other.nearest(at_px).off_px, 1.0 / std::sqrt(blur2_px2_)).share);
   if (own.empty()) {
-    for (Cover& tap : taps) tap.covered += part * beside_other;
+    cover.covered += part;
     return;
   }
   const Contour::Place place = &moment == &middle_ ? nearest.place : own.nearest(at_px);
-  const OutlineSample& sample = own[place.at];
-  const double swept_px = smear_.size() > 0 ? sample.motion.dot(smear_) * part : 0.0;
-  const double inverse = 1.0 / std::sqrt(blur2_px2_ + swept_px * swept_px / 12.0);
-  const Contour& face = moment.faces[nearest.border];
-  const bool shows_wall =
-      sample.edge != Edge::upper_rim && sample.edge != Edge::upper_bore && !face.empty();
-  const double face_px = shows_wall ? face.nearest(at_px).off_px : place.off_px;
+  const Silhouette::Sample& sample = moment.samples[nearest.border][place.at];
+  const double face_px =
+      sample.shows_wall ? moment.faces[nearest.border].nearest(at_px).off_px : 0.0;
+  Taps density;
   for (std::size_t k = 0; k < kTapsPx.size(); ++k) {
-    const double off_px = place.off_px + kTapsPx[k];
-    const double covered = within(off_px, inverse);
-    const double of_face = shows_wall ? within(face_px + kTapsPx[k], inverse) : covered;
-    const double density =
-        part * beside_other * inverse *
-        static_cast<double>(table.at(static_cast<float>(off_px * inverse)).density);
-    taps[k].covered += part * beside_other * covered;
-    taps[k].wall += part * beside_other * std::max(0.0, covered - of_face);
-    taps[k].density += density;
-    taps[k].change += density * sample.motion.transpose();
+    const auto tap = static_cast<Eigen::Index>(k);
+    const NormalTable::Step step = outside(place.off_px + kTapsPx[k], sample.per_blur);
+    const double covered = 1.0 - static_cast<double>(step.share);
+    density[tap] = part * sample.per_blur * static_cast<double>(step.density);
+    cover.covered[tap] += part * covered;
+    if (!sample.shows_wall) continue;
+    const double of_face =
+        1.0 - static_cast<double>(outside(face_px + kTapsPx[k], sample.per_blur).share);
+    cover.wall[tap] += part * std::max(0.0, covered - of_face);
   }
+  cover.density += density;
+  for (Eigen::Index i = 0; i < sample.motion.size(); ++i)
+    cover.change.col(i) += density * sample.motion[i];
 }
 
 // From what the surroundings of a stretch and its neighbours look like.
-void ColourFit::find_shades(double ground_luma) {
+void ColourFit::find_shades(const std::vector<RawPixel>& raw, double ground_luma) {
   constexpr double kUncovered = 0.02, kDarkest = 0.2, kBrightest = 2.0;
   constexpr std::size_t kReach = 2;
   std::vector<double> sums(stretches_.size(), 0.0), counts(stretches_.size(), 0.0);
-  for (const Pixel& pixel : pixels_) {
-    if (std::any_of(pixel.taps.begin(), pixel.taps.end(),
-                    [](const Cover& tap) { return tap.covered > kUncovered; }))
-      continue;
+  for (const RawPixel& pixel : raw) {
+    if (pixel.cover.covered.maxCoeff() > kUncovered) continue;
     sums[pixel.stretch] += pixel.luma;
     counts[pixel.stretch] += 1.0;
   }
@@ -273,22 +294,36 @@ void ColourFit::over_neighbours(std::size_t reach, const Use& use) {
   }
 }
 
-// From what is covered to what is shown.
-void ColourFit::mix(const ColourMixing& mixing, Pixel& pixel) {
-  pixel.change = PoseMotion::Step::Zero(pixel.taps.front().change.size());
-  for (std::size_t k = 0; k < kTapsPx.size(); ++k) {
-    const Cover& tap = pixel.taps[k];
-    const double slope = mixing.slope(tap.covered) / kTapsPx.size();
-    const double shown = mixing.shown(tap.covered) / kTapsPx.size();
-    pixel.covered += shown;
-    if (tap.covered > 0.0) pixel.wall += shown * tap.wall / tap.covered;
-    pixel.density += slope * tap.density;
-    pixel.change += slope * tap.change;
+// From what is covered to what is shown, and from the rows of the picture to stretches.
+void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw) {
+  for (const RawPixel& pixel : raw) ++stretches_[pixel.stretch].end;
+  std::size_t first = 0;
+  for (Stretch& stretch : stretches_) {
+    first += stretch.end;
+    stretch.first = stretch.end = first - stretch.end;
+  }
+  pixels_.resize(raw.size());
+  const Eigen::Index parameters = outline_.front().motion.size();
+  for (const RawPixel& from : raw) {
+    Stretch& stretch = stretches_[from.stretch];
+    const ColourMixing& mixing = colour.mixing_in(stretch.shade);
+    Pixel& pixel = pixels_[stretch.end++];
+    pixel.value = from.value;
+    pixel.change = PoseMotion::Step::Zero(parameters);
+    for (Eigen::Index k = 0; k < from.cover.covered.size(); ++k) {
+      const double covered = from.cover.covered[k];
+      const double slope = mixing.slope(covered) / kTapsPx.size();
+      const double shown = mixing.shown(covered) / kTapsPx.size();
+      pixel.covered += shown;
+      if (covered > 0.0) pixel.wall += shown * from.cover.wall[k] / covered;
+      pixel.density += slope * from.cover.density[k];
+      for (Eigen::Index i = 0; i < parameters; ++i)
+        pixel.change[i] += slope * from.cover.change(k, i);
+    }
   }
 }
 
-double ColourFit::off_level(const Pixel& pixel) const {
-  const Stretch& stretch = stretches_[pixel.stretch];
+double ColourFit::off_level(const Stretch& stretch, const Pixel& pixel) {
   return pixel.value - pixel.covered * stretch.levels[kInside] - pixel.wall * stretch.wall -
          (1.0 - pixel.covered) * stretch.levels[kOutside];
 }
@@ -311,10 +346,10 @@ void ColourFit::fit_levels(Side side) {
     columns.col(1).tail<kWallHarmonics>() = stretch.harmonics.head<kWallHarmonics>();
     Eigen::Matrix2d weights = Eigen::Matrix2d::Zero();
     Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
-    for (const std::size_t i : stretch.pixels) {
+    for (std::size_t i = stretch.first; i < stretch.end; ++i) {
       const Pixel& pixel = pixels_[i];
       if (!pixel.is_clear() || pixel.side() != side) continue;
-      const double t = off_level(pixel) / (kTukey * noise_[side]);
+      const double t = off_level(stretch, pixel) / (kTukey * noise_[side]);
       if (std::abs(t) >= 1.0) continue;
       const double weight = std::pow((1.0 - t * t) / noise_[side], 2);
       const Eigen::Vector2d shares(1.0, side == kInside ? pixel.wall : 0.0);
@@ -322,8 +357,15 @@ void ColourFit::fit_levels(Side side) {
       weighted += weight * pixel.value * shares;
     }
     if (weights(0, 0) == 0.0) continue;
-    normal.noalias() += columns * weights * columns.transpose();
-    right += columns * weighted;
+    if (weights(1, 0) != 0.0) {
+      normal.noalias() += columns * weights * columns.transpose();
+      right += columns * weighted;
+    } else {  // no wall is seen there
+      const Harmonics column = columns.col(0).head<kHarmonics>();
+      normal.topLeftCorner<kHarmonics, kHarmonics>().noalias() +=
+          (weights(0, 0) * column) * column.transpose();
+      right.head<kHarmonics>() += weighted[0] * column;
+    }
   }
   const Unknowns found = normal.ldlt().solve(right);
   for (Stretch& stretch : stretches_) {
@@ -339,8 +381,10 @@ bool ColourFit::find_noise(Side side) {
   constexpr std::size_t kFewest = 2 * kHarmonics;
   constexpr double kLeastNoise = 0.3;
   std::vector<double> off;
-  for (const Pixel& pixel : pixels_)
-    if (pixel.is_clear() && pixel.side() == side) off.push_back(std::abs(off_level(pixel)));
+  for (const Stretch& stretch : stretches_)
+    for (std::size_t i = stretch.first; i < stretch.end; ++i)
+      if (pixels_[i].is_clear() && pixels_[i].side() == side)
+        off.push_back(std::abs(off_level(stretch, pixels_[i])));
   if (off.size() < kFewest) return false;
   noise_[side] = std::max(kLeastNoise, 1.4826 * data::upper_median(std::move(off)));
   return std::isfinite(noise_[side]);
@@ -366,9 +410,9 @@ void ColourFit::find_unevenness() {
     std::vector<double> beyond2(stretches_.size(), 0.0), counted(stretches_.size(), 0.0);
     for (std::size_t k = 0; k < stretches_.size(); ++k) {
       double sum = 0.0, count = 0.0;
-      for (const std::size_t i : stretches_[k].pixels)
+      for (std::size_t i = stretches_[k].first; i < stretches_[k].end; ++i)
         if (pixels_[i].is_clear() && pixels_[i].side() == side)
-          sum += off_level(pixels_[i]), count += 1.0;
+          sum += off_level(stretches_[k], pixels_[i]), count += 1.0;
       if (count == 0.0) continue;
       beyond2[k] = std::pow(sum / count, 2) - std::pow(noise_[side], 2) / count;
       counted[k] = 1.0;
@@ -391,11 +435,11 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double sum = 0.0, square = 0.0, left = 0.0;
   PoseMotion::Step motion = PoseMotion::Step::Zero(sample.motion.size());
-  for (const std::size_t i : stretch.pixels) {
+  for (std::size_t i = stretch.first; i < stretch.end; ++i) {
     const Pixel& p = pixels_[i];
     const double wall_share = p.covered > 0.0 ? p.wall / p.covered : 0.0;
     const double contrast = inner + wall_share * stretch.wall - outer;
-    const double slope = contrast * p.density, off = off_level(p);
+    const double slope = contrast * p.density, off = off_level(stretch, p);
     const double usual2 = p.covered * std::pow(noise_[kInside], 2) +
                           (1.0 - p.covered) * std::pow(noise_[kOutside], 2);
     const double uneven2 =
@@ -430,7 +474,7 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   e.contrast = outer + found[1 + kOutside] - inner - found[1 + kInside];
   e.mean_level = 0.5 * (outer + inner);
   e.lines = std::max(1, static_cast<int>(std::lround(sample.arc_px)));
-  const auto count = static_cast<double>(stretch.pixels.size());
+  const auto count = static_cast<double>(stretch.end - stretch.first);
   const double noise2 = 0.5 * (std::pow(noise_[kInside], 2) + std::pow(noise_[kOutside], 2));
   const double without = std::max(0.0, square - sum * sum / count);
   const double with = std::max(0.0, left - right.dot(found) * noise2);

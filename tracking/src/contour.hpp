@@ -1,5 +1,7 @@
 #pragma once
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "outline_samples.hpp"
@@ -35,19 +37,22 @@ class Contour {
 
  private:
   static constexpr std::size_t kFewest = 8;
+  static constexpr std::size_t kSectors = 64;
   struct Point {
     std::size_t sample;
-    Eigen::Vector2d image_px;
-    double angle_rad = 0.0;         // about the middle
-    double curvature_per_px = 0.0;  // > 0 where the body is convex
+    Eigen::Vector2d image_px, normal_px;
+    double turn = 0.0;       // from the middle, as turn_of has it
+    double radius_px = 0.0;  // of the circle that touches there, > 0 where the body is convex
   };
-  [[nodiscard]] double angle_of(const Eigen::Vector2d& p) const;
-  [[nodiscard]] double curvature_at(std::size_t k) const;
+  [[nodiscard]] static std::size_t sector_of(double turn);
+  void sort_by_turn();
+  [[nodiscard]] double radius_at(std::size_t k) const;
 
   const std::vector<OutlineSample>* outline_;
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
-  double nearest_px_ = 0.0, farthest_px_ = 0.0;  // of its points, from the middle
-  std::vector<Point> points_;                    // by angle
+  double nearest_px_ = 0.0, farthest_px_ = 0.0;      // of its points, from the middle
+  std::vector<Point> points_;                        // all round
+  std::array<std::uint32_t, kSectors + 1> first_{};  // of them, in each sector
 };
 
 }  // namespace trochoid::tracking
