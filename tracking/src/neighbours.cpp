@@ -136,6 +136,13 @@ struct Expected {
     constexpr double kSpreads = 2.0;
     return off_rad >= least_rad + kSpreads * spread_rad;
   }
+  [[nodiscard]] bool same_as(const Expected& other) const {
+    const auto same = [](const Pose& a, const Pose& b) {
+      return a.centre_m == b.centre_m && a.theta_rad == b.theta_rad && a.phi_rad == b.phi_rad;
+    };
+    return same(seen.pose->pose, other.seen.pose->pose) && same(earlier, other.earlier) &&
+           spread_rad == other.spread_rad;
+  }
 };
 
 /// How far a sighting is from a pose: in the attitude of the axis, or in place per size of the
@@ -290,10 +297,13 @@ class Mending {
     if (was_[i].seen && !was_[i].seen->pose) return std::nullopt;
     Found best;
     // Poor fits may mislead, or be all there is.
-    for (const std::vector<bool>& but : {poor_, none_}) {
-      const auto expected = expected_at(finder_, was_, i, but);
-      if (!expected) continue;
-      Found found = better(measure, i, *expected);
+    std::optional<Expected> before;
+    for (const std::vector<bool>* but : {&poor_, &none_}) {
+      auto expected = expected_at(finder_, was_, i, *but);
+      // Mostly none around is poor, and what both expect would be measured twice.
+      if (!expected || (before && before->same_as(*expected))) continue;
+      before = std::move(expected);
+      Found found = better(measure, i, *before);
       if (found.seen && found.gain > best.gain) best = std::move(found);
     }
     return std::move(best.seen);

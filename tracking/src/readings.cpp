@@ -75,9 +75,12 @@ class Readings {
     follow(others());
     solve();
     for (int round = 0; round < kRounds; ++round) {
+      const std::vector<std::size_t> before = path();
       learn();
       follow(breaks());
       solve();
+      // A path that stays would be followed on from the same frames to the same ends again.
+      if (path() == before) break;
     }
     ReadingDoubt doubt{.tallies = tallies()};
     for (Node& node : nodes_) {
@@ -101,6 +104,13 @@ class Readings {
     constexpr double kSame_rad = 0.02;
     return between_axes(axis_of(a.pose->pose), axis_of(b.pose->pose), alike_) < kSame_rad &&
            (a.centre_px - b.centre_px).norm() < kSame_rad * a.rim.semi_major_px();
+  }
+
+  /// What was chosen of each frame.
+  [[nodiscard]] std::vector<std::size_t> path() const {
+    std::vector<std::size_t> chosen;
+    for (const Node& node : nodes_) chosen.push_back(node.chosen);
+    return chosen;
   }
 
   void add(std::size_t k, Sighting seen) {
