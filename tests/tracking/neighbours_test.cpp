@@ -86,6 +86,28 @@ TEST_F(Neighbours, WrongFramesSideBySideAreOutvotedByThoseAround) {
         << i;
 }
 
+// From where the frames around put the body a wider look leads off it again.
+TEST_F(Neighbours, AWrongFrameFromWhichWiderLooksLeadAwayIsMendedClosely) {
+  class Distracted final : public Oracle {
+   public:
+    using Oracle::Oracle;
+    [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+      auto seen = Oracle::find(look);
+      if (look.frame.index == 30 && !look.there) seen->pose->pose.phi_rad += 2.0;
+      return seen;
+    }
+  };
+  const Distracted oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  const auto off_rad = [&] {
+    return std::abs(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn));
+  };
+  mend_from_neighbours(background_, oracle, glimpses);
+  EXPECT_GT(off_rad(), 1.0);
+  mend_from_neighbours(background_, oracle, glimpses, true);
+  EXPECT_LT(off_rad(), 0.01);
+}
+
 // A fortieth of a turn would be nothing beside neighbours that scatter; these do not.
 TEST_F(Neighbours, OnASmoothPathLittleIsAContradiction) {
   constexpr double kOff_rad = 0.025 * kTurn;

@@ -113,8 +113,8 @@ class CylinderFinder final : public BodyFinder {
         .blur_px = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->blur_px)
                                                            : std::nullopt,
         .shading = look.shading,
-        .visit =
-            looks_again_ ? look.shading != nullptr ? Visit::again : Visit::first : Visit::only};
+        .visit = looks_again_ ? look.shading != nullptr ? Visit::again : Visit::first : Visit::only,
+        .there = look.there};
     auto measured = fitter_.measure(evidence);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,

@@ -42,6 +42,7 @@ struct Look {
   double shape_sigma_px = 1.0;     ///< how well the predicted rim's shape is known
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< per frame
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
+  bool there = false;  ///< right where it is predicted: nothing farther off is looked for
 };
 
 /// Measures one body where it is expected. Stateless: used from several threads.

@@ -86,13 +86,14 @@ double Measuring::agreement(const std::optional<FloorDarkening>& floor) const {
 
 std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,
                                               const std::optional<data::Pose<>>& near,
-                                              const ShadingMemory* shading) {
+                                              const ShadingMemory* shading, bool there) {
   finder_.place(guess);
   if (!prepare_plate(frame, guess, background_.lamp() ? kAround_radii : kBeside_radii))
     return std::nullopt;
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.shading = shading;
+  look.there = there;
   Sighting last = guess;
   if (near) {
     last.pose->pose = *near;

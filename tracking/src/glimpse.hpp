@@ -34,9 +34,11 @@ class Measuring {
 
   /// @param near its pose one frame earlier or later, if known: how far it smears.
   /// @param shading light beside its outline in other frames, if known.
+  /// @param there it is right there: nothing farther off is looked for.
   [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
                                                    const std::optional<data::Pose<>>& near,
-                                                   const ShadingMemory* shading = nullptr);
+                                                   const ShadingMemory* shading = nullptr,
+                                                   bool there = false);
 
   /// The floor around the body in some pose, where it is seen about `seen`.
   [[nodiscard]] std::optional<FloorDarkening> floor_around(const Frame& frame, const Sighting& seen,

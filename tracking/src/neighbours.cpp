@@ -281,9 +281,11 @@ std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::
 /// Measures a frame again where its neighbours contradict it. Nothing if what was seen stands.
 class Mending {
  public:
-  Mending(const BodyFinder& finder, const std::vector<Glimpse>& was)
+  /// @param closely see mend_from_neighbours.
+  Mending(const BodyFinder& finder, const std::vector<Glimpse>& was, bool closely)
       : finder_(finder),
         was_(was),
+        closely_(closely),
         poor_(poor_fits(was)),
         none_(was.size(), false),
         usual_(finder, was) {
@@ -322,14 +324,31 @@ class Mending {
     return worth(seen) / (1.0 + off * off);
   }
 
+  /// Looking right there cannot lead astray: less of a contradiction will do for that.
+  [[nodiscard]] bool suspicious(double off_rad, const Expected& expected) const {
+    constexpr double kOfSuspicious = 0.5;
+    return closely_ ? off_rad >= kOfSuspicious * usual_.suspicious_rad()
+                    : expected.contradicts(off_rad, usual_.suspicious_rad());
+  }
+
+  /// What is seen in frame i where the body is expected.
+  [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
+                                                 const Expected& expected) const {
+    if (!closely_) return measure(*was_[i].frame, expected.seen, expected.earlier);
+    const Surroundings surroundings = surroundings_of(was_, i);
+    Sighting guess = expected.seen;
+    guess.pose->blur_px = surroundings.blur_px;
+    return measure(*was_[i].frame, std::move(guess), expected.earlier, &surroundings.shading, true);
+  }
+
   /// What is seen where the body is expected, if that explains frame i better than what it has.
   [[nodiscard]] Found better(Measuring& measure, std::size_t i, const Expected& expected) const {
     constexpr double kUsualShare = 0.5, kAsGood = 0.9, kBetter = 1.1;
     const auto& before = was_[i].seen;
     const bool alike = finder_.faces_look_alike();
     const double off = before ? off_rad(*before, expected.seen, alike) : 0.0;
-    if (before && !expected.contradicts(off, usual_.suspicious_rad()) && !poor_[i]) return {};
-    auto seen = measure(*was_[i].frame, expected.seen, expected.earlier);
+    if (before && !poor_[i] && !suspicious(off, expected)) return {};
+    auto seen = measured(measure, i, expected);
     if (!seen || !seen->pose) return {};
     const double now_off = off_rad(*seen, expected.seen, alike);
     if (expected.contradicts(now_off, Usual::kMost_rad)) return {};
@@ -347,6 +366,7 @@ class Mending {
 
   const BodyFinder& finder_;
   const std::vector<Glimpse>& was_;
+  bool closely_;
   std::vector<bool> poor_, none_;
   Usual usual_;
   double usual_worth_ = 0.0;  ///< of a sighting
@@ -508,7 +528,7 @@ void doubt(const Expected& expected, Sighting& seen) {
 }  // namespace
 
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
-                          std::vector<Glimpse>& glimpses) {
+                          std::vector<Glimpse>& glimpses, bool closely) {
   constexpr int kRounds = 3;
   constexpr std::size_t kReach = 6;
   if (std::count_if(glimpses.begin(), glimpses.end(), [](const Glimpse& g) { return g.posed(); }) <
@@ -519,7 +539,7 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
   std::vector<char> open(glimpses.size(), 1);
   for (int round = 0; std::count(open.begin(), open.end(), 1) > 0; ++round) {
     const std::vector<Glimpse> was = glimpses;
-    const Mending mend(finder, was);
+    const Mending mend(finder, was, closely);
     std::vector<char> mended(was.size(), 0);
     on_both_cores(background, finder, was.size(), [&](Measuring& measure, std::size_t i) {
       if (!open[i] || (round >= kRounds && was[i].seen)) return;

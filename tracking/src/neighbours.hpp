@@ -8,8 +8,10 @@ namespace trochoid::tracking {
 
 /// Measures frames again, from where their neighbours on both sides say the body was: those in
 /// which it was lost, seen in an attitude these contradict, or fitted clearly worse than around.
+/// @param closely only right where they say, and with what they know of the picture: a wider look
+/// may lead from there to where it led before, to an edge of the face or of the shadow.
 void mend_from_neighbours(const Background& background, const BodyFinder& finder,
-                          std::vector<Glimpse>& glimpses);
+                          std::vector<Glimpse>& glimpses, bool closely = false);
 
 /// Follows the body back from where the path breaks, and on from there: for a stretch of frames the
 /// fit may have sat on another edge of the body, its face for the whole of it, and those beyond

@@ -210,10 +210,11 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
 // body's other edges mislead it. Where it was not, or little then speaks for it, the wider looks
 // have their say.
 std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
-                                          std::optional<double> blur_px) {
+                                          std::optional<double> blur_px, bool there) {
   constexpr double kClear = 0.8, kSure = 0.6, kFarPx = 0.8;
   std::optional<Fitted> fitted =
       fit_exactly(scenery, predicted, outline_length_px(scenery, predicted), blur_px);
+  if (there) return of_near_tilts(scenery, std::move(fitted));
   if (!fitted || fitted->score < kClear || moved_px(scenery, fitted->refined, predicted) > kFarPx) {
     if (const auto drawn = refine(scenery, predicted, kDraw))
       fitted =
@@ -420,8 +421,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
-  auto best = evidence.predicted ? fit_from_prediction(scenery, starts.front(), evidence.blur_px)
-                                 : fit_best(scenery, starts, mirrors);
+  auto best = evidence.predicted
+                  ? fit_from_prediction(scenery, starts.front(), evidence.blur_px, evidence.there)
+                  : fit_best(scenery, starts, mirrors);
   if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
       best->score < kDoubtful) {
     const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);

@@ -345,7 +345,10 @@ class Tracking {
     mend_from_one_side(lit, *finder_, glimpses);
     const ReadingDoubt reading = choose_readings(lit, *finder_, glimpses);
     if (reading.otherwise) mend_from_neighbours(lit, *finder_, glimpses);
-    if (options_.effort != Effort::quick) measure_again(lit, *finder_, settled, glimpses);
+    if (options_.effort != Effort::quick) {
+      measure_again(lit, *finder_, settled, glimpses);
+      mend_from_neighbours(lit, *finder_, glimpses, true);
+    }
     doubt_attitudes(doubts, glimpses);
     measure_what_lies(lit, *finder_, glimpses);
     doubt_what_is_contradicted(*finder_, glimpses);

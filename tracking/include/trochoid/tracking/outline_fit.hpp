@@ -89,6 +89,8 @@ struct OutlineEvidence {
   std::optional<double> blur_px{};
   const ShadingMemory* shading = nullptr;  ///< light beside the outline in other frames, if known
   Visit visit = Visit::only;
+  /// The prediction is right to about the blur of the picture: nothing farther off is looked for.
+  bool there = false;
 };
 
 /// Fits the projected cylinder to sub-pixel edges: (x, y, theta, phi) with the body resting on its
