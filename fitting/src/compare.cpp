@@ -184,33 +184,38 @@ std::set<int> all_that_usually_acts(const Ladder& ladder, std::set<int> terms) {
   return with_last_resort(ladder, std::move(terms));
 }
 
+// A set of terms beside a known rung's, and where its minimum is expected.
+struct Neighbour {
+  std::set<int> terms;
+  Nearby near = {};
+};
+
 // Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
 // of rungs[known].
 void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
-                    const FitOptions& options, const std::vector<std::set<int>>& wanted,
-                    std::size_t known, std::vector<Rung>& rungs) {
+                    const FitOptions& options, std::span<const Neighbour> wanted, std::size_t known,
+                    std::vector<Rung>& rungs) {
   const std::size_t first = rungs.size();
-  for (const std::set<int>& terms : wanted)
-    if (std::none_of(rungs.begin(), rungs.end(),
-                     [&](const Rung& rung) { return rung.terms == terms; }))
-      rungs.push_back(rung_with(ladder, terms));
+  std::vector<const Nearby*> near;
+  for (const Neighbour& neighbour : wanted) {
+    if (std::any_of(rungs.begin(), rungs.end(),
+                    [&](const Rung& rung) { return rung.terms == neighbour.terms; }))
+      continue;
+    rungs.push_back(rung_with(ladder, neighbour.terms));
+    near.push_back(&neighbour.near);
+  }
   FitOptions one = options;
   one.threads = 1;
-  in_parallel(static_cast<int>(rungs.size() - first), options.threads, [&](int i) {
-    Rung& rung = rungs[first + static_cast<std::size_t>(i)];
-    fit_neighbour(tracks, rungs[known], options_for(rung, one), rung);
+  in_parallel(static_cast<int>(near.size()), options.threads, [&](int i) {
+    const auto n = static_cast<std::size_t>(i);
+    Rung& rung = rungs[first + n];
+    fit_neighbour(tracks, rungs[known], options_for(rung, one), rung, *near[n]);
   });
 }
 
-// The terms with one less.
-std::vector<std::set<int>> with_one_less(const Ladder& ladder, const std::set<int>& terms) {
-  std::vector<std::set<int>> sets;
-  for (const int index : terms) {
-    if (!may_go(ladder, terms, index)) continue;
-    sets.push_back(terms);
-    sets.back().erase(index);
-  }
-  return sets;
+// What a promise lets expect of one of its changes.
+Nearby nearby(const Promise& promise, const Promise::Change& change) {
+  return {change.values, change.chi2 - promise.before};
 }
 
 // The terms with one more; the last resort is not added.
@@ -248,6 +253,44 @@ bool may_do_without(const Rung& rung, const Rung& smaller) {
          may_do_without(rung, with_full_bars(rung), smaller, 1.0);
 }
 
+// Parameters that a rung has and one without a term of its has not.
+std::set<std::string> parameters_of_term(const Ladder& ladder, const std::set<int>& terms,
+                                         int term) {
+  std::set<int> fewer = terms;
+  fewer.erase(term);
+  std::set<std::string> own = parameters_of(rung_with(ladder, terms).scene);
+  for (const std::string& name : parameters_of(rung_with(ladder, fewer).scene)) own.erase(name);
+  return own;
+}
+
+// Those of a rung's losses that may be left out one at a time, by key, with their parameters.
+std::map<int, std::set<std::string>> that_may_go(const Ladder& ladder, const std::set<int>& terms) {
+  std::map<int, std::set<std::string>> others;
+  for (const int term : terms)
+    if (may_go(ladder, terms, term)) others[term] = parameters_of_term(ladder, terms, term);
+  return others;
+}
+
+// Sets with one term less than a rung's that may do as well.
+std::vector<Neighbour> may_suffice(const Ladder& ladder, std::span<const data::Track> tracks,
+                                   const FitOptions& options, const Rung& rung) {
+  std::map<int, std::set<std::string>> others = that_may_go(ladder, rung.terms);
+  std::erase_if(others, [&](const auto& other) {
+    std::set<int> fewer = rung.terms;
+    fewer.erase(other.first);
+    return !may_do_without(rung, rung_with(ladder, fewer));
+  });
+  if (others.empty()) return {};
+  const auto promise = promised(tracks, rung, options, rung, others);
+  std::vector<Neighbour> smaller;
+  for (const auto& [term, parameters] : others) {
+    smaller.push_back({rung.terms});
+    smaller.back().terms.erase(term);
+    if (promise) smaller.back().near = nearby(*promise, promise->instead.at(term));
+  }
+  return smaller;
+}
+
 // Everything but the last resort was added before it was known what that explains: terms the data
 // do not need any more are left out again, one at a time, as long as that costs no strong evidence;
 // those whose error bars say that it would are not tried.
@@ -256,11 +299,8 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
   while (rungs[current].fitted && rungs[current].fit.converged) {
     const std::size_t first = rungs.size();
     const std::set<int> terms = rungs[current].terms;
-    std::vector<std::set<int>> smaller = with_one_less(ladder, terms);
+    const std::vector<Neighbour> smaller = may_suffice(ladder, tracks, options, rungs[current]);
     if (smaller.empty()) return;
-    std::erase_if(smaller, [&](const std::set<int>& fewer) {
-      return !may_do_without(rungs[current], rung_with(ladder, fewer));
-    });
     add_neighbours(ladder, tracks, options, smaller, current, rungs);
     std::size_t best = current;
     for (std::size_t i = first; i < rungs.size(); ++i)
@@ -271,16 +311,6 @@ void step_down(const Ladder& ladder, std::span<const data::Track> tracks, const 
     if (best == current) return;
     current = best;
   }
-}
-
-// Parameters that a rung has and one without a term of its has not.
-std::set<std::string> parameters_of_term(const Ladder& ladder, const std::set<int>& terms,
-                                         int term) {
-  std::set<int> fewer = terms;
-  fewer.erase(term);
-  std::set<std::string> own = parameters_of(rung_with(ladder, terms).scene);
-  for (const std::string& name : parameters_of(rung_with(ladder, fewer).scene)) own.erase(name);
-  return own;
 }
 
 // What a change is promised to cost in BIC for its parameters, and to bring in chi-square.
@@ -297,6 +327,15 @@ double most_evidence_against(const Rung& known) {
   return known.fit.model == "sliding" ? kStrong : kVeryStrong;
 }
 
+// Whether a further term, however little speaks for it, widens the error bars noticeably by what it
+// moves other parameters by, as it is weighed there (rivals.cpp).
+bool counts_in_error_bars(const Promise& promise, const Promise::Change& change, double gained) {
+  constexpr double kNoticeably = 1.3;
+  const double odds = std::exp(0.5 * gained - change.parameters);  // after AIC
+  const double variance = odds / (1.0 + odds) * promise.moves * promise.moves;
+  return 1.0 + variance > kNoticeably * kNoticeably;
+}
+
 // Whether a promised change of a known rung may come to something. One that hardly follows the
 // track has to be mended for a good part: all else would only follow the tracker's errors. Where
 // what is left hangs together, a further term may be what is missing, and all that it takes away
@@ -309,18 +348,15 @@ bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
   if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
     return gained > kGoodPart * promise.before;
   if (larger && known.fit.whiteness_p < kWhite) return gained > paid;
+  if (larger && counts_in_error_bars(promise, change, gained / dilution)) return true;
   return paid - gained / dilution < (larger ? most_evidence_against(known) : kVeryStrong);
 }
 
 // Sets with one more term than a known rung's, and with one more in the place of another, the most
 // promising first.
-std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
-                                            std::span<const data::Track> tracks,
-                                            const FitOptions& options, const Rung& known) {
-  std::map<int, std::set<std::string>> others;
-  for (const int term : known.terms)
-    if (may_go(ladder, known.terms, term))
-      others[term] = parameters_of_term(ladder, known.terms, term);
+std::vector<Neighbour> worth_exchanging(const Ladder& ladder, std::span<const data::Track> tracks,
+                                        const FitOptions& options, const Rung& known) {
+  const std::map<int, std::set<std::string>> others = that_may_go(ladder, known.terms);
   const std::vector<std::set<int>> larger = with_one_more(ladder, known.terms);
   std::vector<std::optional<Promise>> promises(larger.size());
   in_parallel(static_cast<int>(larger.size()), options.threads, [&](int i) {
@@ -328,16 +364,17 @@ std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
     promises[n] = promised(tracks, known, options, rung_with(ladder, larger[n]), others);
   });
   const double diluted = dilution(tracks, known, options);
-  std::vector<std::pair<double, std::set<int>>> worth;  // by what BIC is promised to change by
+  std::vector<std::pair<double, Neighbour>> worth;  // by what BIC is promised to change by
   const auto consider = [&](const Promise& promise, const Promise::Change& change, bool is_larger,
                             std::set<int> terms) {
     if (worth_a_fit(known, diluted, promise, change, is_larger))
-      worth.emplace_back(price(promise, change) - gain(promise, change), std::move(terms));
+      worth.emplace_back(price(promise, change) - gain(promise, change),
+                         Neighbour{std::move(terms), nearby(promise, change)});
   };
   for (std::size_t i = 0; i < larger.size(); ++i) {
     const auto& promise = promises[i];
     if (!promise) {
-      worth.emplace_back(0.0, larger[i]);
+      worth.emplace_back(0.0, Neighbour{larger[i]});
       continue;
     }
     consider(*promise, promise->with, true, larger[i]);
@@ -350,8 +387,8 @@ std::vector<std::set<int>> worth_exchanging(const Ladder& ladder,
   }
   std::stable_sort(worth.begin(), worth.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<std::set<int>> sets;
-  for (auto& [bic, terms] : worth) sets.push_back(std::move(terms));
+  std::vector<Neighbour> sets;
+  for (auto& [bic, neighbour] : worth) sets.push_back(std::move(neighbour));
   return sets;
 }
 
@@ -362,10 +399,10 @@ const Rung* exchange_terms(const Ladder& ladder, std::span<const data::Track> tr
                            const FitOptions& options, const Rung& known, std::vector<Rung>& rungs) {
   constexpr std::size_t kFirst = 2;
   const auto index = static_cast<std::size_t>(&known - rungs.data());
-  std::vector<std::set<int>> worth = worth_exchanging(ladder, tracks, options, known);
+  const std::vector<Neighbour> worth = worth_exchanging(ladder, tracks, options, known);
   // Where something is missing, what promises most leads on, and changes what the others promise.
   if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
-    add_neighbours(ladder, tracks, options, {worth.begin(), worth.begin() + kFirst}, index, rungs);
+    add_neighbours(ladder, tracks, options, std::span(worth).first(kFirst), index, rungs);
     const Rung* best = simplest_sufficient(ladder, rungs);
     if (best->fit.converged && best->bic < known.bic - kVeryStrong) return best;
   }
@@ -388,8 +425,9 @@ void let_go_of_friction(const Ladder& ladder, std::span<const data::Track> track
   std::erase_if(
       terms, [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].last_resort; });
   terms.insert(*smooth);
-  add_neighbours(ladder, tracks, options, {terms}, static_cast<std::size_t>(best - rungs.data()),
-                 rungs);
+  const Neighbour none{terms};
+  add_neighbours(ladder, tracks, options, std::span(&none, 1),
+                 static_cast<std::size_t>(best - rungs.data()), rungs);
   const auto added = std::find_if(rungs.begin(), rungs.end(),
                                   [&](const Rung& rung) { return rung.terms == terms; });
   step_down(ladder, tracks, options, static_cast<std::size_t>(added - rungs.begin()), rungs);

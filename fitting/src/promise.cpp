@@ -1,5 +1,6 @@
 #include "promise.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -64,26 +65,104 @@ Tangent tangent(const Problem& problem, const Eigen::VectorXd& u) {
   return at;
 }
 
-// Chi-square when all parameters but these have done what they can, which are zero or held.
-double least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
-  Eigen::VectorXd residuals = at.residuals;
-  for (const int i : zero) residuals += at.nothing[i] * at.jacobian.col(i);
+// The least chi-square on the tangent plane, and the step to it.
+struct Least {
+  double chi2 = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd step;
+};
+
+std::vector<int> all_but(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
   std::vector<int> columns;
   for (int i = 0; i < at.nothing.size(); ++i)
     if (!zero.contains(i) && !held.contains(i)) columns.push_back(i);
+  return columns;
+}
+
+// When all parameters but these have done what they can, which are zero or held.
+Least least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
+  Eigen::VectorXd residuals = at.residuals;
+  for (const int i : zero) residuals += at.nothing[i] * at.jacobian.col(i);
+  const std::vector<int> columns = all_but(at, zero, held);
   const Eigen::MatrixXd active = at.jacobian(Eigen::all, columns);
   const Eigen::VectorXd step = active.colPivHouseholderQr().solve(-residuals);
   // Where some would be negative, one of them at least is zero: chi-square falls on a straight way
   // from any other place to here.
-  double best = std::numeric_limits<double>::infinity();
+  Least best;
   for (std::size_t c = 0; c < columns.size(); ++c) {
     const int i = columns[c];
     if (!at.positive[i] || step[static_cast<Eigen::Index>(c)] >= at.nothing[i]) continue;
     std::set<int> fewer = zero;
     fewer.insert(i);
-    best = std::min(best, least(at, fewer, held));
+    Least other = least(at, fewer, held);
+    if (other.chi2 < best.chi2) best = std::move(other);
   }
-  return std::isfinite(best) ? best : (residuals + active * step).squaredNorm();
+  if (std::isfinite(best.chi2)) return best;
+  best.chi2 = (residuals + active * step).squaredNorm();
+  best.step = Eigen::VectorXd::Zero(at.nothing.size());
+  best.step(columns) = step;
+  for (const int i : zero) best.step[i] = at.nothing[i];
+  return best;
+}
+
+// Variance of each parameter when these are zero or held, which have none; none of any where the
+// data do not tell some of the others apart.
+Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
+  const std::vector<int> columns = all_but(at, zero, held);
+  Eigen::MatrixXd active = at.jacobian(Eigen::all, columns);
+  const Eigen::VectorXd size = active.colwise().norm().cwiseMax(1e-300);
+  active = active * size.cwiseInverse().asDiagonal();
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(at.nothing.size());
+  constexpr double kApart = 1e-9;  // as in the error bars of a fit
+  auto qr = active.colPivHouseholderQr();
+  qr.setThreshold(kApart);
+  if (qr.rank() < active.cols()) return variance;
+  const Eigen::MatrixXd inverse =
+      (active.transpose() * active)
+          .ldlt()
+          .solve(Eigen::MatrixXd::Identity(active.cols(), active.cols()));
+  variance(columns) = inverse.diagonal().cwiseMax(0.0).cwiseQuotient(size.cwiseAbs2());
+  return variance;
+}
+
+// Promise::moves for losses whose indices are `added`.
+double moves(const Tangent& at, const std::set<int>& added, const std::set<int>& held) {
+  const Least without = least(at, added, held), with = least(at, {}, held);
+  const Eigen::VectorXd narrow = variances(at, added, held), wide = variances(at, {}, held);
+  double most = 0.0;
+  for (int i = 0; i < narrow.size(); ++i) {
+    if (added.contains(i) || !(narrow[i] > 0.0)) continue;
+    const double shift = with.step[i] - without.step[i];
+    const double further = std::max(0.0, wide[i] - narrow[i]);
+    most = std::max(most, (shift * shift + further) / narrow[i]);
+  }
+  return std::sqrt(most);
+}
+
+// A value within its parameter's range: where the step to it ends beyond, half the way there. A
+// loss is let act at least a little.
+double within_range(const FreeParameter& parameter, const model::ParameterInfo& info, bool loss,
+                    double now, double value) {
+  constexpr double kNext = 1e-3;  // of the given value: losses act in proportion
+  if (loss && info.logarithmic) return std::max(value, kNext * std::abs(parameter.given));
+  if (!(value > info.lower)) return 0.5 * (now + info.lower);
+  if (!(value < info.upper)) return 0.5 * (now + info.upper);
+  return value;
+}
+
+// A step's values by name.
+std::map<std::string, double> values_after(const Problem& problem, const Eigen::VectorXd& u,
+                                           const Eigen::VectorXd& step,
+                                           const std::set<int>& removed) {
+  std::map<std::string, double> values;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    if (removed.contains(i)) continue;
+    const FreeParameter& parameter = problem.free[i];
+    const double now = problem.value(i, u);
+    values[problem.name(i)] = within_range(
+        parameter, problem.predictor->parameters()[parameter.index], is_loss(problem, parameter),
+        now, now + parameter.transform.slope(u[i]) * step[i]);
+  }
+  return values;
 }
 
 std::set<int> named(const Problem& problem, const std::set<std::string>& names) {
@@ -108,12 +187,15 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
   const auto more = static_cast<int>(added.size());
   Promise promise;
   promise.rows = problem.rows();
-  promise.before = least(at, added, held);
-  promise.with = {least(at, {}, held), more};
-  for (const auto& [key, names] : others) {
-    const std::set<int> removed = named(problem, names);
-    promise.instead[key] = {least(at, removed, held), more - static_cast<int>(removed.size())};
-  }
+  promise.before = least(at, added, held).chi2;
+  const auto change = [&](const std::set<int>& removed) {
+    const Least to = least(at, removed, held);
+    return Promise::Change{to.chi2, more - static_cast<int>(removed.size()),
+                           values_after(problem, minimum.u, to.step, removed)};
+  };
+  promise.with = change({});
+  promise.moves = moves(at, added, held);
+  for (const auto& [key, names] : others) promise.instead[key] = change(named(problem, names));
   return promise;
 }
 

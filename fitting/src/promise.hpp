@@ -17,9 +17,14 @@ struct Promise {
   struct Change {
     double chi2 = 0.0;   ///< afterwards
     int parameters = 0;  ///< more of them that are fitted, or fewer
+    /// Where the tangent plane has the minimum: of the parameters that are fitted, by name.
+    std::map<std::string, double> values = {};
   };
-  double before = 0.0;            ///< chi-square without the further losses
-  Change with;                    ///< with them
+  double before = 0.0;  ///< chi-square without the further losses
+  Change with;          ///< with them
+  /// By how many of its error bars without them the parameter they move most is off: the shift and
+  /// what its variance grows by, together.
+  double moves = 0.0;
   std::map<int, Change> instead;  ///< with them and without one of the others, by its key
   int rows = 0;                   ///< measurements
 };

@@ -382,20 +382,47 @@ void fit_from_values(std::span<const data::Track> tracks,
   });
 }
 
-void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
-                   const FitOptions& options, Rung& rung) {
-  FitOptions own = options;
-  if (known.fit.arcs.size() == 1) {
-    own.start = extended_start(known, rung);
-    own.strategy = "single";
-  }
+namespace {
+
+// Fits a rung beside a known one, from these values.
+void fit_beside(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+                Rung& rung) {
   try_rung(rung, [&] {
     if (softness_is_open(rung) && !softness_is_open(known))
-      fit_softly(tracks, own, rung);
+      fit_softly(tracks, options, rung);
     else
-      take(draft_one_of_several(tracks, rung.scene, own, nullptr, known.settled), rung);
+      take(draft_one_of_several(tracks, rung.scene, options, nullptr, known.settled), rung);
     rung.fitted = usable(rung.fit);
   });
+}
+
+// Whether a rung does about as well beside a known one as was expected.
+bool as_expected(const Rung& rung, const Rung& known, const Nearby& near) {
+  constexpr double kTwice = 2.0;  // the tangent plane is not the valley
+  return rung.fitted && rung.fit.converged &&
+         rung.bic < known.bic + kVeryStrong + kTwice * std::max(0.0, near.cost);
+}
+
+}  // namespace
+
+void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
+                   const FitOptions& options, Rung& rung, const Nearby& near) {
+  FitOptions own = options;
+  if (known.fit.arcs.size() != 1) return fit_beside(tracks, known, own, rung);
+  own.strategy = "single";
+  const Rung blank = rung;
+  const Values from_known = extended_start(known, rung);
+  if (!near.values.empty()) {
+    own.start = near.values;
+    own.start.insert(from_known.begin(), from_known.end());
+    fit_beside(tracks, known, own, rung);
+    if (as_expected(rung, known, near)) return;
+  }
+  Rung again = blank;
+  own.start = from_known;
+  fit_beside(tracks, known, own, again);
+  const bool better = again.fitted && (!rung.fitted || again.bic < rung.bic);
+  if (better || !usable(rung.fit)) rung = std::move(again);
 }
 
 }  // namespace trochoid::fitting

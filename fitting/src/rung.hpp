@@ -110,8 +110,16 @@ void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung);
 
-/// Fits a rung that has a term more or less than `known`, from the solution of that alone.
+/// Where a rung's minimum is expected beside a known one's: what that one's tangent plane says.
+struct Nearby {
+  std::map<std::string, double> values;  ///< by name; empty: nothing is expected
+  double cost = 0.0;                     ///< what chi-square is to rise by
+};
+
+/// Fits a rung that differs by a term or two from `known`, from where it is expected. Where what is
+/// found there is clearly worse than that promises, or nothing is expected, from the solution of
+/// `known` itself.
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
-                   const FitOptions& options, Rung& rung);
+                   const FitOptions& options, Rung& rung, const Nearby& near = {});
 
 }  // namespace trochoid::fitting

@@ -82,6 +82,17 @@ TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
   EXPECT_THAT(sliding, testing::Each(testing::Not(testing::HasSubstr("sets in gently"))));
 }
 
+// A quadratic couple of the air, for which no evidence is strong, was not even tried, and the
+// linear one that stood for it too was 4 of its error bars off.
+TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
+  const Comparison found = comparison_of("unneeded_loss");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  const data::FitParameter* couple = found.fit.find("air_linear_N_m_s[1]");
+  ASSERT_NE(couple, nullptr);
+  constexpr double kTruth_N_m_s = 1.2930124047767674e-07, kThree = 3.0;
+  EXPECT_NEAR(couple->value, kTruth_N_m_s, kThree * couple->sigma);
+}
+
 // What comes before it is not looked at: first parts are counted from where the fit begins.
 TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
   data::Track track = track_of("slides_later");
