@@ -766,6 +766,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   if (options.profile || options.bootstrap > 0) {
     FitOptions again = options;
     again.model.clear();
+    again.rolls_at_first = chosen->rolls_at_first;
     again.start = values_of(chosen->fit);
     if (!again.start.empty()) again.strategy = "single";
     try {

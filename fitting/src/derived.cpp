@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "trochoid/model/inertia.hpp"
 
@@ -136,6 +137,24 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
                       const std::vector<double>& g) { return v[a] * g[0] / (g[1] * v[l]); },
                   {I, gravity}),
         "a I / (g l) with the given I and gravity");
+}
+
+void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
+                          const Eigen::MatrixXd& covariance, data::Fit& fit) {
+  if (!problem.rolls_at_first) return;
+  const Propagation propagate(problem, u, covariance);
+  const auto index = [&](const char* name) { return problem.predictor->index_of(name); };
+  const int theta = index("theta_rad"), phi = index("phi_rad"), w1 = index("w1_rad_s"),
+            w2 = index("w2_rad_s"), w3 = index("w3_rad_s");
+  const RollsAtFirst rim = *problem.rolls_at_first;
+  for (const auto& [name, axis] : {std::pair{"vx_m_s", 0}, {"vy_m_s", 1}})
+    add(fit, name, "m/s",
+        propagate(
+            [=, axis = axis](const Eigen::VectorXd& v, const auto&) {
+              return rim.velocity_m_s(v[theta], v[phi], v[w1], v[w2], v[w3])[axis];
+            },
+            {}),
+        "velocity of the centre; the body rolls at first, so it follows from the spin");
 }
 
 }  // namespace trochoid::fitting

@@ -11,4 +11,8 @@ namespace trochoid::fitting {
 void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
                      const Eigen::MatrixXd& covariance, const data::Scene& scene, data::Fit& fit);
 
+/// The velocity of a body that rolls when its record begins, which follows from its spin.
+void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
+                          const Eigen::MatrixXd& covariance, data::Fit& fit);
+
 }  // namespace trochoid::fitting

@@ -159,6 +159,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   tell_whether_one_friction(problem, fit);
   warn_short_rim(problem, fit);
   warn_thick_air(fit);
+  add_derived_velocity(problem, solution.u, error.covariance, fit);
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);
   warn_short_top(problem, fit);

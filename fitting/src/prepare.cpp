@@ -156,6 +156,20 @@ void take_start(const std::map<std::string, double>& start, Problem& problem) {
     }
 }
 
+// The velocity of a body that is known to roll when its record begins follows from its spin.
+void tie_to_spin(const data::Scene& scene, Problem& problem) {
+  const auto is_velocity = [&](int index) {
+    const std::string& name = problem.predictor->parameters()[index].name;
+    return name == "vx_m_s" || name == "vy_m_s";
+  };
+  const bool told = scene.fit.fixed.contains("vx_m_s") || scene.fit.fixed.contains("vy_m_s");
+  if (problem.predictor->model_name() != "sliding" || problem.arcs.size() > 1 || told ||
+      !scene.body)
+    return;
+  problem.rolls_at_first = {scene.body->radius_m, scene.body->half_thickness_m()};
+  std::erase_if(problem.free, [&](const FreeParameter& p) { return is_velocity(p.index); });
+}
+
 }  // namespace
 
 double frame_time_s(std::span<const data::Track> tracks) {
@@ -178,6 +192,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
           std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
   }
   suit_to_data(problem, scene);
+  if (options.rolls_at_first) tie_to_spin(scene, problem);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
     throw TrackError(

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -99,9 +100,33 @@ Eigen::VectorXd Problem::start() const {
   return u;
 }
 
+Eigen::Vector2d RollsAtFirst::velocity_m_s(double theta_rad, double phi_rad, double w1_rad_s,
+                                           double w2_rad_s, double w3_rad_s) const {
+  const double s = std::sin(theta_rad), c = std::cos(theta_rad);
+  const double h = std::copysign(half_thickness_m, c), z = radius_m * s + h * c;
+  const Eigen::Vector2d node(h * w2_rad_s - radius_m * w3_rad_s, -z * w1_rad_s);
+  return Eigen::Rotation2Dd(phi_rad) * node;
+}
+
+namespace {
+
+void let_roll(const RollsAtFirst& rim, const model::Predictor& predictor, Eigen::VectorXd& values) {
+  const int vx = predictor.index_of("vx_m_s"), vy = predictor.index_of("vy_m_s");
+  if (vx < 0 || vy < 0) return;
+  const auto value = [&](const char* name) { return values[predictor.index_of(name)]; };
+  const Eigen::Vector2d v =
+      rim.velocity_m_s(value("theta_rad"), value("phi_rad"), value("w1_rad_s"), value("w2_rad_s"),
+                       value("w3_rad_s"));
+  values[vx] = v.x();
+  values[vy] = v.y();
+}
+
+}  // namespace
+
 Eigen::VectorXd Problem::values(int arc, const Eigen::VectorXd& u) const {
   Eigen::VectorXd values = base[arc];
   for (const int i : columns_of(arc)) values[free[i].index] = free[i].transform.value(u[i]);
+  if (rolls_at_first) let_roll(*rolls_at_first, *predictor, values);
   return values;
 }
 

@@ -49,6 +49,8 @@ std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen,
 // What a parameter is in another rung, less what it is here. A loss that is not there is none.
 double shift_of(const data::FitParameter& here, const data::Fit& other) {
   const data::FitParameter* there = other.find(here.name);
+  const bool loss = here.name != "vx_m_s" && here.name != "vy_m_s";
+  if (there == nullptr && !loss) return 0.0;
   const double change = (there != nullptr ? there->value : 0.0) - here.value;
   return here.unit == "rad" ? std::remainder(change, 2.0 * std::numbers::pi) : change;
 }

@@ -11,6 +11,8 @@
 #include "arcs.hpp"
 #include "first_guess.hpp"
 #include "observed.hpp"
+#include "prepare.hpp"
+#include "problem.hpp"
 #include "softness.hpp"
 #include "timing.hpp"
 #include "trochoid/data/error.hpp"
@@ -153,6 +155,7 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
 
 // Fits the first two thirds, predicts the rest.
 double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptions options) {
+  options.rolls_at_first = rung.rolls_at_first;
   options.start = values_of(rung.fit);
   if (!options.start.empty()) options.strategy = "single";
   options.hold_back = kHeldBack;
@@ -288,9 +291,39 @@ void predict_held_back(std::span<const data::Track> tracks, const FitOptions& op
   }
 }
 
+namespace {
+
+// Whether a slip at the start ends within so few samples that the body may as well have rolled.
+bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung) {
+  constexpr double kFewSamples = 8.0;
+  if (!rung.fitted || !rung.fit.converged || rung.fit.arcs.size() != 1 || !softness_is_open(rung) ||
+      rung.rolls_at_first)
+    return false;
+  Values at = values_of(rung.fit);
+  const RollsAtFirst rim{rung.scene.body->radius_m, rung.scene.body->half_thickness_m()};
+  const Eigen::Vector2d rolls = rim.velocity_m_s(at["theta_rad"], at["phi_rad"], at["w1_rad_s"],
+                                                 at["w2_rad_s"], at["w3_rad_s"]);
+  const double slip_m_s = (Eigen::Vector2d(at["vx_m_s"], at["vy_m_s"]) - rolls).norm();
+  const double brake_m_s2 = at["friction"] * rung.scene.model.gravity_m_s2;
+  return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
+}
+
+// A slip at the start is left out unless there is strong evidence for it.
+void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  Rung rolls = rung;
+  rolls.rolls_at_first = true;
+  rolls.fitted = false;
+  fit_from_values(tracks, values_of(rung.fit), options, rolls);
+  if (rolls.fitted && rolls.fit.converged && rolls.bic < rung.bic + kStrong)
+    rung = std::move(rolls);
+}
+
+}  // namespace
+
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung, Reach reach) {
   FitOptions own = options;
+  if (below != nullptr) own.rolls_at_first = rung.rolls_at_first = below->rolls_at_first;
   try_rung(rung, [&] {
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
     if (extends) {
@@ -316,12 +349,14 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     }
     rung.fitted = usable(rung.fit);
   });
+  if (slips_unseen_at_first(tracks, rung)) let_roll_at_first(tracks, options, rung);
 }
 
 std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung& known,
                                 const FitOptions& options, const Rung& larger,
                                 const std::map<int, std::set<std::string>>& others) {
   FitOptions at = options;
+  at.rolls_at_first = known.rolls_at_first;
   at.start = values_of_all_arcs(known.fit);
   std::set<std::string> further;
   for (const auto& [name, value] : further_parameters(at.start, larger, kNext)) {
@@ -342,6 +377,7 @@ void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
                        const FitOptions& options, data::Fit& fit) {
   if (!(fit.whiteness_p < kWhite)) return;
   FitOptions at = options;
+  at.rolls_at_first = rung.rolls_at_first;
   at.start = values_of_all_arcs(rung.fit);
   try {
     doubt_if_drifting(tracks, rung.scene, at, fit);
@@ -351,6 +387,7 @@ void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
 
 double dilution(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options) {
   FitOptions at = options;
+  at.rolls_at_first = known.rolls_at_first;
   at.start = values_of_all_arcs(known.fit);
   try {
     return dilution(tracks, known.scene, at);
@@ -363,7 +400,9 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
                          const FitOptions& options, Rung& rung) {
   FitOptions own = options;
   own.start = first_part.values;
-  own.strategy = rung.scene.model.name == "sliding" ? kRollsFirst : "growing";
+  const bool slides = rung.scene.model.name == "sliding";
+  own.strategy = slides ? kRollsFirst : "growing";
+  own.rolls_at_first = rung.rolls_at_first = slides;
   try_rung(rung, [&] {
     take(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
     rung.fitted = usable(rung.fit);
@@ -376,6 +415,7 @@ void fit_from_values(std::span<const data::Track> tracks,
   FitOptions own = options;
   own.start = values;
   own.strategy = "single";
+  own.rolls_at_first = rung.rolls_at_first;
   try_rung(rung, [&] {
     take(draft_one_of_several(tracks, rung.scene, own), rung);
     rung.fitted = usable(rung.fit);
@@ -408,6 +448,7 @@ bool as_expected(const Rung& rung, const Rung& known, const Nearby& near) {
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
                    const FitOptions& options, Rung& rung, const Nearby& near) {
   FitOptions own = options;
+  own.rolls_at_first = rung.rolls_at_first = known.rolls_at_first;
   if (known.fit.arcs.size() != 1) return fit_beside(tracks, known, own, rung);
   own.strategy = "single";
   const Rung blank = rung;

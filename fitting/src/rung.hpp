@@ -30,6 +30,7 @@ struct Rung {
   data::Fit fit;                    ///< error bars by curvature
   std::function<data::Fit()> full;  ///< `fit` with full error bars, which cost as much as a fit
   Settled settled;
+  bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
   bool fitted = false;
   std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();

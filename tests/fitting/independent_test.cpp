@@ -82,6 +82,19 @@ TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
   EXPECT_THAT(sliding, testing::Each(testing::Not(testing::HasSubstr("sets in gently"))));
 }
 
+// What it slips by before friction holds it is not seen: a velocity of its own came out anywhere,
+// with all that goes with it, and the verdict was weak or the error bars too small.
+TEST(Independent, ABodyThatRollsAtFirstHasTheVelocityOfItsSpin) {
+  const Comparison found = comparison_of("slides_later");
+  ASSERT_EQ(found.fit.model, "sliding");
+  for (const char* name : {"vx_m_s", "vy_m_s"}) {
+    const data::FitParameter* velocity = found.fit.find(name);
+    ASSERT_NE(velocity, nullptr) << name;
+    EXPECT_EQ(velocity->status, data::ParameterStatus::derived) << name;
+    EXPECT_GT(velocity->sigma, 0.0) << name;
+  }
+}
+
 // A quadratic couple of the air, for which no evidence is strong, was not even tried, and the
 // linear one that stood for it too was 4 of its error bars off.
 TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {

@@ -27,6 +27,10 @@ struct FitOptions {
   /// (single shooting), growing (windows), multiple (multiple shooting).
   std::string strategy = "auto";
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
+  /// A sliding body rolls when the record begins: its velocity there follows from its spin. What a
+  /// slip that friction has ended by the second sample was is not seen, and what goes with it is
+  /// not known either. For one arc; of other models it says nothing new.
+  bool rolls_at_first = false;
   /// What is being done now, with every minimisation. Called from several threads.
   std::function<void(const std::string& stage)> progress;
   /// One line per stage and minimisation. Called from several threads.
