@@ -99,7 +99,8 @@ Least least(const Tangent& at, const std::set<int>& zero, const std::set<int>& h
   if (std::isfinite(best.chi2)) return best;
   best.chi2 = (residuals + active * step).squaredNorm();
   best.step = Eigen::VectorXd::Zero(at.nothing.size());
-  best.step(columns) = step;
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    best.step[columns[c]] = step[static_cast<Eigen::Index>(c)];
   for (const int i : zero) best.step[i] = at.nothing[i];
   return best;
 }
