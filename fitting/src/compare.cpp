@@ -473,19 +473,34 @@ std::optional<Rung> by_another_law(const Ladder& ladder, std::span<const data::T
   return best != nullptr && explains(*best) ? std::optional(*best) : std::nullopt;
 }
 
+// The likeliest rung from which no exchange has been made yet, of those whose evidence is as good
+// as the chosen one's, if there is one: two losses together may stand for two others, with none of
+// which alone they are exchanged.
+const Rung* as_good(const std::vector<Rung>& rungs, const Rung& chosen,
+                    const std::set<const Rung*>& exchanged) {
+  constexpr double kBareMention = 2.0;  // of BIC
+  const Rung* best = nullptr;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.fit.converged && !exchanged.contains(&rung) &&
+        rung.bic < chosen.bic + kBareMention && (best == nullptr || rung.bic < best->bic))
+      best = &rung;
+  return best;
+}
+
 // Of the known rungs the simplest that suffices, and from it on by what may do better, as long as
-// that changes which it is.
+// that changes which it is; then from others that are as good.
 const Rung* exchange_while_worth(const Ladder& ladder, std::span<const data::Track> tracks,
                                  const FitOptions& options, std::vector<Rung>& rungs) {
   const Rung* chosen = simplest_sufficient(ladder, rungs);
-  // A term found that way asks for the others anew, unless even then the model lacks something.
-  const Rung* before = nullptr;
-  for (std::size_t round = 0;
-       round < kMostRounds && chosen != before && chosen != nullptr && chosen->fit.converged;
+  std::set<const Rung*> exchanged;
+  for (std::size_t round = 0; round < kMostRounds && chosen != nullptr && chosen->fit.converged;
        ++round) {
+    // A term found that way asks for the others anew, unless even then the model lacks something.
     if (round > 0 && chosen->fit.verdict == "unexplained") break;
-    before = chosen;
-    chosen = exchange_terms(ladder, tracks, options, *chosen, rungs);
+    const Rung* from = exchanged.contains(chosen) ? as_good(rungs, *chosen, exchanged) : chosen;
+    if (from == nullptr) break;
+    exchanged.insert(from);
+    chosen = exchange_terms(ladder, tracks, options, *from, rungs);
   }
   return chosen;
 }

@@ -106,6 +106,19 @@ TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
   EXPECT_NEAR(couple->value, kTruth_N_m_s, kThree * couple->sigma);
 }
 
+// A quadratic couple of the air stood for rolling and pivoting friction, beside neither of which
+// alone it is exchanged for the other, and was reported as good at 6 of its error bars.
+TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {
+  const Comparison found = comparison_of("stands_for_two");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.model, "smooth");
+  EXPECT_FALSE(found.scene.model.air_quadratic_N_m_s2) << found.fit.recommendation;
+  // Contour friction does as well as rolling friction, and their error bars say so.
+  const data::FitParameter* pivoting = found.fit.find("pivoting_friction_m");
+  ASSERT_NE(pivoting, nullptr) << found.fit.recommendation;
+  EXPECT_NEAR(pivoting->value, 1.738388747900978e-05, 2.0 * pivoting->sigma);
+}
+
 // What comes before it is not looked at: first parts are counted from where the fit begins.
 TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
   data::Track track = track_of("slides_later");
