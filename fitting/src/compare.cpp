@@ -475,11 +475,12 @@ std::optional<Rung> by_another_law(const Ladder& ladder, std::span<const data::T
 
 // The likeliest rung from which no exchange has been made yet, of those whose evidence is as good
 // as the chosen one's, if there is one: two losses together may stand for two others, with none of
-// which alone they are exchanged.
+// which alone they are exchanged. Those of a sliding body are dear.
 const Rung* as_good(const std::vector<Rung>& rungs, const Rung& chosen,
                     const std::set<const Rung*>& exchanged) {
   constexpr double kBareMention = 2.0;  // of BIC
   const Rung* best = nullptr;
+  if (chosen.fit.model == "sliding") return best;
   for (const Rung& rung : rungs)
     if (rung.fitted && rung.fit.converged && !exchanged.contains(&rung) &&
         rung.bic < chosen.bic + kBareMention && (best == nullptr || rung.bic < best->bic))
