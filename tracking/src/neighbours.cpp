@@ -317,11 +317,19 @@ class Mending {
     double gain = 0.0;  ///< in likelihood, over what was seen before
   };
 
-  /// How likely a sighting is: by what speaks for it, and by how far it is from what is expected.
-  [[nodiscard]] double likelihood(const Sighting& seen, double off_rad,
-                                  const Expected& expected) const {
+  /// How likely it is to be so far from what is expected.
+  [[nodiscard]] double likelihood(double off_rad, const Expected& expected) const {
     const double off = off_rad / (usual_.scatter_rad() + expected.spread_rad);
-    return worth(seen) / (1.0 + off * off);
+    return 1.0 / (1.0 + off * off);
+  }
+
+  /// How much more speaks for one sighting than for another. From where the body is expected a close
+  /// look finds no longer outline of another thing: how plainly it is seen need not count.
+  [[nodiscard]] double speaks_for(const Sighting& one, const Sighting& other) const {
+    const double of_worth = worth(one) / worth(other);
+    const double of_edges = one.pose->evidence / other.pose->evidence;
+    return std::exp(shadow_speaks_more(one, other)) *
+           (closely_ ? std::max(of_worth, of_edges) : of_worth);
   }
 
   /// Looking right there cannot lead astray: less of a contradiction will do for that.
@@ -352,14 +360,15 @@ class Mending {
     if (!seen || !seen->pose) return {};
     const double now_off = off_rad(*seen, expected.seen, alike);
     if (expected.contradicts(now_off, Usual::kMost_rad)) return {};
-    const double now = likelihood(*seen, now_off, expected);
+    const double now = likelihood(now_off, expected);
     if (!before) {
       if (worth(*seen) < kUsualShare * usual_worth_) return {};
-      return {std::move(seen), now};
+      const double likely = now * worth(*seen);
+      return {std::move(seen), likely};
     }
-    const double of_shadow = std::exp(shadow_speaks_more(*seen, *before));
-    const double gain = of_shadow * now / likelihood(*before, off, expected);
-    if (gain < kBetter || of_shadow * worth(*seen) < kAsGood * worth(*before)) return {};
+    const double more = speaks_for(*seen, *before);
+    const double gain = more * now / likelihood(off, expected);
+    if (gain < kBetter || more < kAsGood) return {};
     seen->turned_rad = before->turned_rad;
     return {std::move(seen), gain};
   }
