@@ -313,6 +313,7 @@ void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& op
   Rung rolls = rung;
   rolls.rolls_at_first = true;
   rolls.fitted = false;
+  rolls.fit = {}, rolls.full = {};
   fit_from_values(tracks, values_of(rung.fit), options, rolls);
   if (rolls.fitted && rolls.fit.converged && rolls.bic < rung.bic + kStrong)
     rung = std::move(rolls);

@@ -114,7 +114,7 @@ void fit_from_values(std::span<const data::Track> tracks,
 /// Where a rung's minimum is expected beside a known one's: what that one's tangent plane says.
 struct Nearby {
   std::map<std::string, double> values;  ///< by name; empty: nothing is expected
-  double cost = 0.0;                     ///< what chi-square is to rise by
+  double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
 };
 
 /// Fits a rung that differs by a term or two from `known`, from where it is expected. Where what is

@@ -29,7 +29,8 @@ struct FitOptions {
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   /// A sliding body rolls when the record begins: its velocity there follows from its spin. What a
   /// slip that friction has ended by the second sample was is not seen, and what goes with it is
-  /// not known either. For one arc; of other models it says nothing new.
+  /// not known either. For one arc, friction that sets in at once, and a scene that says nothing of
+  /// that velocity; else nothing changes.
   bool rolls_at_first = false;
   /// What is being done now, with every minimisation. Called from several threads.
   std::function<void(const std::string& stage)> progress;
