@@ -791,6 +791,40 @@ TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
 }
 
+// A wall hardly brighter than the floor: a wide look from the very pose leads to a disc beside the
+// face, as long as that with the wall.
+TEST(OutlineFitter, ABodyThatIsSaidToBeThereIsNotSoughtElsewhere) {
+  FlatDisc disc;
+  disc.body.thickness_m = 0.008;
+  constexpr double kTheta = 0.6, kFloor = 130.0;
+  const Eigen::Vector2d centre(80.2, 70.4);
+  cv::Mat picture;
+  photograph_of_cylinder(centre, 4.0, kTheta, {kFloor, 140.0, 230.0}).convertTo(picture, CV_64F);
+  std::mt19937 random(7);
+  const cv::Mat luma = developed(picture, 3.0, random);
+  const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  data::Pose<> predicted;
+  predicted.theta_rad = kTheta;
+  predicted.centre_m = disc.camera.table_from_image(
+      centre + Eigen::Vector2d(0.2, 0.0),
+      data::height_on_floor_m(kTheta, disc.body.radius_m, disc.body.half_thickness_m()));
+  OutlineEvidence evidence{.luma = luma,
+                           .background = plate,
+                           .detection = {},
+                           .predicted = predicted,
+                           .attitude_known = true};
+  const auto sought = fitter.measure(evidence);
+  ASSERT_TRUE(sought);
+  EXPECT_GT((sought->centre_px - centre).norm(), 1.0) << "shows nothing then";
+  evidence.there = true;
+  const auto there = fitter.measure(evidence);
+  ASSERT_TRUE(there);
+  constexpr double kTolerance_rad = 0.03, kTolerance_px = 0.3;
+  EXPECT_NEAR(there->pose.theta_rad, kTheta, kTolerance_rad);
+  EXPECT_LT((there->centre_px - centre).norm(), kTolerance_px);
+}
+
 // The wall lies in the shade and the floor beside it in the shadow. A disc half a pixel off and
 // tilted more, beside a brighter wall, looks nearly like it.
 TEST(OutlineFitter, AWallInTheShadeOverADarkFloorDoesNotTiltTheDisc) {
