@@ -46,7 +46,8 @@ std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen,
   return rivals;
 }
 
-// What a parameter is in another rung, less what it is here. A loss that is not there is none.
+// What a parameter is in another rung, less what it is here. A loss that is not there is none; of
+// the velocity of the centre a rung without it says nothing.
 double shift_of(const data::FitParameter& here, const data::Fit& other) {
   const data::FitParameter* there = other.find(here.name);
   const bool loss = here.name != "vx_m_s" && here.name != "vy_m_s";
