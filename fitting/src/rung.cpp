@@ -44,6 +44,7 @@ void take(Draft draft, Rung& rung) {
   rung.fit = std::move(draft.fit);
   rung.full = std::move(draft.full);
   rung.settled = draft.settled;
+  rung.misses_first_samples = draft.misses_first_samples;
 }
 
 namespace {
@@ -406,6 +407,17 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
   own.rolls_at_first = rung.rolls_at_first = slides;
   try_rung(rung, [&] {
     take(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+void fit_slip_at_first(std::span<const data::Track> tracks, const Rung& rolls,
+                       const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  own.start = values_of(rolls.fit);
+  own.strategy = kSlipsFirst;
+  try_rung(rung, [&] {
+    take(draft_one_of_several(tracks, rung.scene, own), rung);
     rung.fitted = usable(rung.fit);
   });
 }

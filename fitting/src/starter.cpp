@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "first_guess.hpp"
 #include "trochoid/model/inertia.hpp"
 
 namespace trochoid::fitting {
@@ -24,7 +25,7 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
   };
 }
 
-Starter rim_starter(const data::Scene& scene) {
+Starter rim_starter(const data::Scene& scene, const FitOptions& options) {
   data::Body body = *scene.body;
   const model::CentralInertia inertia = model::central_inertia(body);
   const RimShape shape{body.radius_m,
@@ -33,16 +34,20 @@ Starter rim_starter(const data::Scene& scene) {
                        inertia.axial_kg_m2 / inertia.mass_kg,
                        scene.model.gravity_m_s2,
                        scene.model.name == "sliding"};
-  return [shape](const ArcData& window) { return rim_starts(window, shape); };
+  if (options.strategy != kSlipsFirst)
+    return [shape](const ArcData& window) { return rim_starts(window, shape); };
+  const Start rolls{kSlipsFirst, options.start};
+  return [shape, rolls](const ArcData& window) { return slip_starts(window, shape, rolls); };
 }
 
 }  // namespace
 
-Starter starter_for(const model::Predictor& predictor, const data::Scene& scene) {
+Starter starter_for(const model::Predictor& predictor, const data::Scene& scene,
+                    const FitOptions& options) {
   const std::string& model = predictor.model_name();
   if (model.starts_with("top")) return top_starter(predictor, scene.fit.free_pivot);
   if ((model == "rolling" || model == "sliding" || model == "smooth") && scene.body)
-    return rim_starter(scene);
+    return rim_starter(scene, options);
   if (model == "puck") {
     const double gravity_m_s2 = scene.model.gravity_m_s2;
     return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };
