@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -253,37 +254,28 @@ bool may_do_without(const Rung& rung, const Rung& smaller) {
          may_do_without(rung, with_full_bars(rung), smaller, 1.0);
 }
 
-// Parameters that a rung has and one without a term of its has not.
-std::set<std::string> parameters_of_term(const Ladder& ladder, const std::set<int>& terms,
-                                         int term) {
-  std::set<int> fewer = terms;
-  fewer.erase(term);
+// Parameters that a rung has and one with fewer terms has not.
+std::set<std::string> parameters_without(const Ladder& ladder, const std::set<int>& terms,
+                                         const std::set<int>& fewer) {
   std::set<std::string> own = parameters_of(rung_with(ladder, terms).scene);
   for (const std::string& name : parameters_of(rung_with(ladder, fewer).scene)) own.erase(name);
   return own;
 }
 
-// Those of a rung's losses that may be left out one at a time, by key, with their parameters.
-std::map<int, std::set<std::string>> that_may_go(const Ladder& ladder, const std::set<int>& terms) {
-  std::map<int, std::set<std::string>> others;
-  for (const int term : terms)
-    if (may_go(ladder, terms, term)) others[term] = parameters_of_term(ladder, terms, term);
-  return others;
-}
-
 // Sets with one term less than a rung's that may do as well.
 std::vector<Neighbour> may_suffice(const Ladder& ladder, std::span<const data::Track> tracks,
                                    const FitOptions& options, const Rung& rung) {
-  std::map<int, std::set<std::string>> others = that_may_go(ladder, rung.terms);
-  std::erase_if(others, [&](const auto& other) {
+  std::map<int, std::set<std::string>> absent;  // by the term that is left out
+  for (const int term : rung.terms) {
     std::set<int> fewer = rung.terms;
-    fewer.erase(other.first);
-    return !may_do_without(rung, rung_with(ladder, fewer));
-  });
-  if (others.empty()) return {};
-  const auto promise = promised(tracks, rung, options, rung, others);
+    fewer.erase(term);
+    if (may_go(ladder, rung.terms, term) && may_do_without(rung, rung_with(ladder, fewer)))
+      absent[term] = parameters_without(ladder, rung.terms, fewer);
+  }
+  if (absent.empty()) return {};
+  const auto promise = promised(tracks, rung, options, rung, absent);
   std::vector<Neighbour> smaller;
-  for (const auto& [term, parameters] : others) {
+  for (const auto& [term, parameters] : absent) {
     smaller.push_back({rung.terms});
     smaller.back().terms.erase(term);
     if (promise) smaller.back().near = nearby(*promise, promise->instead.at(term));
@@ -329,67 +321,111 @@ double most_evidence_against(const Rung& known) {
 
 // Whether a further term, however little speaks for it, widens the error bars noticeably by what it
 // moves other parameters by, as it is weighed there (rivals.cpp).
-bool counts_in_error_bars(const Promise& promise, const Promise::Change& change, double gained) {
+bool counts_in_error_bars(const Promise::Change& change, double gained) {
   constexpr double kNoticeably = 1.3;
   const double odds = std::exp(0.5 * gained - change.parameters);  // after AIC
-  const double variance = odds / (1.0 + odds) * promise.moves * promise.moves;
+  const double variance = odds / (1.0 + odds) * change.moves * change.moves;
   return 1.0 + variance > kNoticeably * kNoticeably;
+}
+
+// How a set of terms differs from a known rung's.
+struct Difference {
+  std::size_t added = 0, removed = 0;
+  [[nodiscard]] bool larger() const { return added == 1 && removed == 0; }
+  [[nodiscard]] bool exchanged() const { return added == 1 && removed == 1; }
+};
+Difference difference(const std::set<int>& terms, const std::set<int>& known) {
+  const auto count_of = [](const std::set<int>& these, const std::set<int>& others) {
+    return static_cast<std::size_t>(std::count_if(
+        these.begin(), these.end(), [&](int term) { return !others.contains(term); }));
+  };
+  return {count_of(terms, known), count_of(known, terms)};
 }
 
 // Whether a promised change of a known rung may come to something. One that hardly follows the
 // track has to be mended for a good part: all else would only follow the tracker's errors. Where
 // what is left hangs together, a further term may be what is missing, and all that it takes away
 // counts; what takes the place of another, or stands beside a rung that leaves noise, may do as
-// well as that.
+// well as that. So may what differs by more terms, but of that only what promises to do as well.
 bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
-                 const Promise::Change& change, bool larger) {
+                 const Promise::Change& change, const Difference& by) {
   constexpr double kGoodPart = 0.25;
   const double gained = gain(promise, change), paid = price(promise, change);
   if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
     return gained > kGoodPart * promise.before;
-  if (larger && known.fit.whiteness_p < kWhite) return gained > paid;
-  if (larger && counts_in_error_bars(promise, change, gained / dilution)) return true;
-  return paid - gained / dilution < (larger ? most_evidence_against(known) : kVeryStrong);
+  if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
+  if (by.larger() && counts_in_error_bars(change, gained / dilution)) return true;
+  const double against = paid - gained / dilution;
+  if (by.larger()) return against < most_evidence_against(known);
+  if (by.exchanged()) return against < kVeryStrong;
+  return against < (known.fit.model == "sliding" ? 0.0 : kStrong);
 }
 
-// Sets with one more term than a known rung's, and with one more in the place of another, the most
-// promising first.
+// All sets of terms, beside the last resort that a known rung has, that mean something, by a key of
+// their own.
+std::map<int, std::set<int>> all_sets(const Ladder& ladder, const std::set<int>& known) {
+  std::vector<int> open;
+  for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index)
+    if (!ladder.terms[static_cast<std::size_t>(index)].last_resort) open.push_back(index);
+  std::map<int, std::set<int>> sets;
+  for (int key = 0; key < 1 << open.size(); ++key) {
+    std::set<int> terms = known;
+    for (std::size_t bit = 0; bit < open.size(); ++bit)
+      if ((key >> bit & 1) != 0)
+        terms.insert(open[bit]);
+      else
+        terms.erase(open[bit]);
+    if (std::all_of(terms.begin(), terms.end(),
+                    [&](int term) { return means_something(ladder, terms, term); }))
+      sets[key] = std::move(terms);
+  }
+  return sets;
+}
+
+// Whether what a set promises one of its subsets promises as well.
+bool has_idle_terms(const std::map<int, std::set<int>>& sets, int key,
+                    const std::function<double(int)>& promised_bic) {
+  return std::any_of(sets.begin(), sets.end(), [&](const auto& other) {
+    return other.first != key && (other.first & key) == other.first &&
+           promised_bic(other.first) <= promised_bic(key);
+  });
+}
+
+// Sets of terms beside a known rung's that may do as well, the most promising first: one term more,
+// one in the place of another, and, of those that differ by more, a few.
 std::vector<Neighbour> worth_exchanging(const Ladder& ladder, std::span<const data::Track> tracks,
                                         const FitOptions& options, const Rung& known) {
-  const std::map<int, std::set<std::string>> others = that_may_go(ladder, known.terms);
-  const std::vector<std::set<int>> larger = with_one_more(ladder, known.terms);
-  std::vector<std::optional<Promise>> promises(larger.size());
-  in_parallel(static_cast<int>(larger.size()), options.threads, [&](int i) {
-    const auto n = static_cast<std::size_t>(i);
-    promises[n] = promised(tracks, known, options, rung_with(ladder, larger[n]), others);
-  });
-  const double diluted = dilution(tracks, known, options);
-  std::vector<std::pair<double, Neighbour>> worth;  // by what BIC is promised to change by
-  const auto consider = [&](const Promise& promise, const Promise::Change& change, bool is_larger,
-                            std::set<int> terms) {
-    if (worth_a_fit(known, diluted, promise, change, is_larger))
-      worth.emplace_back(price(promise, change) - gain(promise, change),
-                         Neighbour{std::move(terms), nearby(promise, change)});
-  };
-  for (std::size_t i = 0; i < larger.size(); ++i) {
-    const auto& promise = promises[i];
-    if (!promise) {
-      worth.emplace_back(0.0, Neighbour{larger[i]});
-      continue;
-    }
-    consider(*promise, promise->with, true, larger[i]);
-    for (const auto& [term, change] : promise->instead) {
-      if (!may_go(ladder, larger[i], term)) continue;
-      std::set<int> exchanged = larger[i];
-      exchanged.erase(term);
-      consider(*promise, change, false, std::move(exchanged));
-    }
+  constexpr std::size_t kMostFar = 4;
+  const std::map<int, std::set<int>> sets = all_sets(ladder, known.terms);
+  const std::set<int>& all = sets.rbegin()->second;
+  std::map<int, std::set<std::string>> absent;
+  for (const auto& [key, terms] : sets) absent[key] = parameters_without(ladder, all, terms);
+  const auto promise = promised(tracks, known, options, rung_with(ladder, all), absent);
+  std::vector<Neighbour> worth;
+  if (!promise) {
+    for (std::set<int>& terms : with_one_more(ladder, known.terms))
+      worth.push_back({std::move(terms)});
+    return worth;
   }
-  std::stable_sort(worth.begin(), worth.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<Neighbour> sets;
-  for (auto& [bic, neighbour] : worth) sets.push_back(std::move(neighbour));
-  return sets;
+  const double diluted = dilution(tracks, known, options);
+  const auto change = [&](int key) -> const Promise::Change& { return promise->instead.at(key); };
+  const auto bic = [&](int key) {  // beside the known one's
+    return price(*promise, change(key)) - gain(*promise, change(key));
+  };
+  std::vector<int> order;
+  for (const auto& [key, terms] : sets) order.push_back(key);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return bic(a) < bic(b); });
+  std::size_t far = 0;
+  for (const int key : order) {
+    const std::set<int>& terms = sets.at(key);
+    const Difference by = difference(terms, known.terms);
+    if (terms == known.terms || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
+    const bool near = by.larger() || by.exchanged();
+    if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
+    far += near ? 0 : 1;
+    worth.push_back({terms, nearby(*promise, change(key))});
+  }
+  return worth;
 }
 
 // Terms are added one at a time, by what is gained at once, and those of a last resort all

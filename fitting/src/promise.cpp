@@ -65,6 +65,19 @@ Tangent tangent(const Problem& problem, const Eigen::VectorXd& u) {
   return at;
 }
 
+// The same in as few rows as there are columns and one.
+Tangent condensed(Tangent at) {
+  const Eigen::Index columns = at.jacobian.cols();
+  if (at.jacobian.rows() <= columns + 1) return at;
+  Eigen::MatrixXd both(at.jacobian.rows(), columns + 1);
+  both << at.jacobian, at.residuals;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(both);
+  const Eigen::MatrixXd upper = qr.matrixQR().topRows(columns + 1).triangularView<Eigen::Upper>();
+  at.jacobian = upper.leftCols(columns);
+  at.residuals = upper.col(columns);
+  return at;
+}
+
 // The least chi-square on the tangent plane, and the step to it.
 struct Least {
   double chi2 = std::numeric_limits<double>::infinity();
@@ -78,8 +91,22 @@ std::vector<int> all_but(const Tangent& at, const std::set<int>& zero, const std
   return columns;
 }
 
+using Known = std::map<std::set<int>, Least>;  // by what is zero
+
+Least find_least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held,
+                 Known& known);
+
 // When all parameters but these have done what they can, which are zero or held.
-Least least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held) {
+const Least& least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held,
+                   Known& known) {
+  const auto found = known.find(zero);
+  if (found != known.end()) return found->second;
+  Least least = find_least(at, zero, held, known);
+  return known.emplace(zero, std::move(least)).first->second;
+}
+
+Least find_least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held,
+                 Known& known) {
   Eigen::VectorXd residuals = at.residuals;
   for (const int i : zero) residuals += at.nothing[i] * at.jacobian.col(i);
   const std::vector<int> columns = all_but(at, zero, held);
@@ -93,8 +120,8 @@ Least least(const Tangent& at, const std::set<int>& zero, const std::set<int>& h
     if (!at.positive[i] || step[static_cast<Eigen::Index>(c)] >= at.nothing[i]) continue;
     std::set<int> fewer = zero;
     fewer.insert(i);
-    Least other = least(at, fewer, held);
-    if (other.chi2 < best.chi2) best = std::move(other);
+    const Least& other = least(at, fewer, held, known);
+    if (other.chi2 < best.chi2) best = other;
   }
   if (std::isfinite(best.chi2)) return best;
   best.chi2 = (residuals + active * step).squaredNorm();
@@ -125,13 +152,14 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
   return variance;
 }
 
-// Promise::moves for losses whose indices are `added`.
-double moves(const Tangent& at, const std::set<int>& added, const std::set<int>& held) {
-  const Least without = least(at, added, held), with = least(at, {}, held);
-  const Eigen::VectorXd narrow = variances(at, added, held), wide = variances(at, {}, held);
+// Promise::Change::moves from where `before` are zero to where only `after` are.
+double moves(const Tangent& at, const std::set<int>& before, const std::set<int>& after,
+             const std::set<int>& held, Known& known) {
+  const Least without = least(at, before, held, known), with = least(at, after, held, known);
+  const Eigen::VectorXd narrow = variances(at, before, held), wide = variances(at, after, held);
   double most = 0.0;
   for (int i = 0; i < narrow.size(); ++i) {
-    if (added.contains(i) || !(narrow[i] > 0.0)) continue;
+    if (!(narrow[i] > 0.0)) continue;
     const double shift = with.step[i] - without.step[i];
     const double further = std::max(0.0, wide[i] - narrow[i]);
     most = std::max(most, (shift * shift + further) / narrow[i]);
@@ -180,7 +208,8 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
                  const std::map<int, std::set<std::string>>& others) {
   const Minimum minimum(tracks, scene, options);
   const Problem& problem = minimum.problem;
-  const Tangent at = tangent(problem, minimum.u);
+  const Tangent at = condensed(tangent(problem, minimum.u));
+  Known known;
   std::set<int> held;  // as in a fit
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
     if (problem.free[i].held) held.insert(i);
@@ -188,14 +217,16 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
   const auto more = static_cast<int>(added.size());
   Promise promise;
   promise.rows = problem.rows();
-  promise.before = least(at, added, held).chi2;
+  promise.before = least(at, added, held, known).chi2;
   const auto change = [&](const std::set<int>& removed) {
-    const Least to = least(at, removed, held);
+    const Least& to = least(at, removed, held, known);
+    const bool larger = removed.size() < added.size() &&
+                        std::includes(added.begin(), added.end(), removed.begin(), removed.end());
     return Promise::Change{to.chi2, more - static_cast<int>(removed.size()),
-                           values_after(problem, minimum.u, to.step, removed)};
+                           values_after(problem, minimum.u, to.step, removed),
+                           larger ? moves(at, added, removed, held, known) : 0.0};
   };
   promise.with = change({});
-  promise.moves = moves(at, added, held);
   for (const auto& [key, names] : others) promise.instead[key] = change(named(problem, names));
   return promise;
 }

@@ -19,20 +19,22 @@ struct Promise {
     int parameters = 0;  ///< more of them that are fitted, or fewer
     /// Where the tangent plane has the minimum: of the parameters that are fitted, by name.
     std::map<std::string, double> values = {};
+    /// Where losses are only added: by how many of its error bars without them the parameter they
+    /// move most is off, the shift and what its variance grows by together. Else 0, as where the
+    /// data do not tell the parameters apart.
+    double moves = 0.0;
   };
-  double before = 0.0;  ///< chi-square without the further losses
-  Change with;          ///< with them
-  /// By how many of its error bars without them the parameter they move most is off: the shift and
-  /// what its variance grows by, together.
-  double moves = 0.0;
-  std::map<int, Change> instead;  ///< with them and without one of the others, by its key
+  double before = 0.0;            ///< chi-square without the further losses
+  Change with;                    ///< with all of them
+  std::map<int, Change> instead;  ///< with them and without some losses, by their key
   int rows = 0;                   ///< measurements
 };
 
 /// @param options  its start holds the values at the minimum, those of one arc alone under their
 /// names there ("x_m@1"), and next to nothing of the further losses.
 /// @param further  names of their parameters.
-/// @param others   names of the parameters of each loss that may be left out, by a key of its own.
+/// @param others   names of the parameters of losses, further ones among them, that may be left out
+/// together, by a key of their own.
 /// @throws NumericalError where the model has no prediction.
 [[nodiscard]] Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
                                const FitOptions& options, const std::set<std::string>& further,

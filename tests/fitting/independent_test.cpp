@@ -118,6 +118,18 @@ TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
   EXPECT_NEAR(couple->value, kTruth_N_m_s, kThree * couple->sigma);
 }
 
+// A gap layer and rolling friction stood for the air's force and contour friction: neither of these
+// does better in the place of one of those, only both of both, and rolling friction, which does not
+// act, was reported at 11 of its error bars.
+TEST(Independent, ErrorBarsHoldWhatLossesExchangedTogetherWouldChange) {
+  const Comparison found = comparison_of("exchanged_together");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  expect_found(found.fit, {{"pivoting_friction_m", 7.185640918268124e-05}});
+  const data::FitParameter* rolling = found.fit.find("rolling_friction_m");
+  EXPECT_TRUE(rolling == nullptr || rolling->value < kSigmas * rolling->sigma)
+      << found.fit.recommendation;
+}
+
 // A quadratic couple of the air stood for rolling and pivoting friction, beside neither of which
 // alone it is exchanged for the other, and was reported as good at 6 of its error bars.
 TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {

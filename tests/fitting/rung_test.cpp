@@ -358,6 +358,20 @@ TEST_F(Promised, IsNothingOfALossThatDoesNotAct) {
   }
 }
 
+TEST_F(Promised, IsToldOfLossesThatTogetherTakeThePlaceOfOthers) {
+  const Rung known = fitted({"rolling"});
+  const auto promise = promised(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}),
+                                {{1, {"rolling_friction_m"}}, {2, {"air_force_N_s_m"}}});
+  ASSERT_TRUE(promise);
+  const Promise::Change &both = promise->instead.at(1), &one = promise->instead.at(2);
+  EXPECT_LT(both.chi2, promise->before - kVeryStrong);
+  EXPECT_EQ(both.parameters, 1);
+  EXPECT_GE(one.chi2, promise->with.chi2);
+  // How far error bars hold what is added is asked of what is added.
+  EXPECT_GT(one.moves, 0.0);
+  EXPECT_EQ(both.moves, 0.0);
+}
+
 // A camera that a prior holds is no way out: the fit of the larger model holds it too.
 TEST_F(Promised, HoldsWhatIsKnownBeforehand) {
   Rung known = rung_with({"air", "pivoting"}), larger = rung_with({"air", "pivoting", "rolling"});
@@ -383,7 +397,7 @@ TEST_F(Promised, SaysWhereTheMinimumIsThen) {
   EXPECT_GT(promise->with.values.at("pivoting_friction_m"),
             kNearer * there.at("pivoting_friction_m"));
   // What stood for the loss is off by more than its error bar.
-  EXPECT_GT(promise->moves, 1.0);
+  EXPECT_GT(promise->with.moves, 1.0);
 }
 
 TEST_F(Promised, IsUntoldWhereTheTrackIsTooShortForIt) {
