@@ -191,6 +191,11 @@ struct Neighbour {
   Nearby near = {};
 };
 
+bool is_known(const std::vector<Rung>& rungs, const std::set<int>& terms) {
+  return std::any_of(rungs.begin(), rungs.end(),
+                     [&](const Rung& rung) { return rung.terms == terms; });
+}
+
 // Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
 // of rungs[known].
 void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
@@ -199,9 +204,7 @@ void add_neighbours(const Ladder& ladder, std::span<const data::Track> tracks,
   const std::size_t first = rungs.size();
   std::vector<const Nearby*> near;
   for (const Neighbour& neighbour : wanted) {
-    if (std::any_of(rungs.begin(), rungs.end(),
-                    [&](const Rung& rung) { return rung.terms == neighbour.terms; }))
-      continue;
+    if (is_known(rungs, neighbour.terms)) continue;
     rungs.push_back(rung_with(ladder, neighbour.terms));
     near.push_back(&neighbour.near);
   }
@@ -391,10 +394,20 @@ bool has_idle_terms(const std::map<int, std::set<int>>& sets, int key,
   });
 }
 
+// Whether a further loss need not be fitted to know what it comes to. Where a body slides that is
+// dear.
+bool promises_nothing(const Rung& known, double gained, int parameters, const Difference& by) {
+  constexpr double kByChance = 1.0;  // what a parameter gains of chi-square
+  return by.larger() && known.fit.model == "sliding" && known.fit.whiteness_p >= kWhite &&
+         gained < kByChance * parameters;
+}
+
 // Sets of terms beside a known rung's that may do as well, the most promising first: one term more,
-// one in the place of another, and, of those that differ by more, a few.
+// one in the place of another, and, of those that differ by more, a few. Those that promise nothing
+// are added to the rungs as they are promised.
 std::vector<Neighbour> worth_exchanging(const Ladder& ladder, std::span<const data::Track> tracks,
-                                        const FitOptions& options, const Rung& known) {
+                                        const FitOptions& options, const Rung& known,
+                                        std::vector<Rung>& rungs) {
   constexpr std::size_t kMostFar = 4;
   const std::map<int, std::set<int>> sets = all_sets(ladder, known.terms);
   const std::set<int>& all = sets.rbegin()->second;
@@ -422,6 +435,13 @@ std::vector<Neighbour> worth_exchanging(const Ladder& ladder, std::span<const da
     if (terms == known.terms || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
     const bool near = by.larger() || by.exchanged();
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
+    const double gained = gain(*promise, change(key)) / diluted;
+    if (promises_nothing(known, gained, change(key).parameters, by)) {
+      if (is_known(rungs, terms)) continue;
+      rungs.push_back(rung_with(ladder, terms));
+      take_as_promised(known, *promise, change(key), diluted, rungs.back());
+      continue;
+    }
     far += near ? 0 : 1;
     worth.push_back({terms, nearby(*promise, change(key))});
   }
@@ -435,7 +455,7 @@ const Rung* exchange_terms(const Ladder& ladder, std::span<const data::Track> tr
                            const FitOptions& options, const Rung& known, std::vector<Rung>& rungs) {
   constexpr std::size_t kFirst = 2;
   const auto index = static_cast<std::size_t>(&known - rungs.data());
-  const std::vector<Neighbour> worth = worth_exchanging(ladder, tracks, options, known);
+  const std::vector<Neighbour> worth = worth_exchanging(ladder, tracks, options, known, rungs);
   // Where something is missing, what promises most leads on, and changes what the others promise.
   if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
     add_neighbours(ladder, tracks, options, std::span(worth).first(kFirst), index, rungs);

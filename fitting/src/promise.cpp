@@ -152,19 +152,27 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
   return variance;
 }
 
-// Promise::Change::moves from where `before` are zero to where only `after` are.
-double moves(const Tangent& at, const std::set<int>& before, const std::set<int>& after,
-             const std::set<int>& held, Known& known) {
+// What losses that are added do to the error bars of the other parameters: Promise::Change.
+struct Moved {
+  double moves = 0.0;
+  Eigen::VectorXd wider;  // at least 1
+};
+
+// From where `before` are zero to where only `after` are.
+Moved moved(const Tangent& at, const std::set<int>& before, const std::set<int>& after,
+            const std::set<int>& held, Known& known) {
   const Least without = least(at, before, held, known), with = least(at, after, held, known);
   const Eigen::VectorXd narrow = variances(at, before, held), wide = variances(at, after, held);
-  double most = 0.0;
+  Moved all{0.0, Eigen::VectorXd::Ones(narrow.size())};
   for (int i = 0; i < narrow.size(); ++i) {
     if (!(narrow[i] > 0.0)) continue;
     const double shift = with.step[i] - without.step[i];
     const double further = std::max(0.0, wide[i] - narrow[i]);
-    most = std::max(most, (shift * shift + further) / narrow[i]);
+    all.moves = std::max(all.moves, (shift * shift + further) / narrow[i]);
+    all.wider[i] = std::sqrt(1.0 + further / narrow[i]);
   }
-  return std::sqrt(most);
+  all.moves = std::sqrt(all.moves);
+  return all;
 }
 
 // A value within its parameter's range: where the step to it ends beyond, half the way there. A
@@ -222,9 +230,13 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
     const Least& to = least(at, removed, held, known);
     const bool larger = removed.size() < added.size() &&
                         std::includes(added.begin(), added.end(), removed.begin(), removed.end());
-    return Promise::Change{to.chi2, more - static_cast<int>(removed.size()),
-                           values_after(problem, minimum.u, to.step, removed),
-                           larger ? moves(at, added, removed, held, known) : 0.0};
+    Promise::Change to_there{to.chi2, more - static_cast<int>(removed.size()),
+                             values_after(problem, minimum.u, to.step, removed)};
+    if (!larger) return to_there;
+    const Moved by = moved(at, added, removed, held, known);
+    to_there.moves = by.moves;
+    for (int i = 0; i < by.wider.size(); ++i) to_there.wider[problem.name(i)] = by.wider[i];
+    return to_there;
   };
   promise.with = change({});
   for (const auto& [key, names] : others) promise.instead[key] = change(named(problem, names));

@@ -283,7 +283,7 @@ void try_rung(Rung& rung, const std::function<void()>& fit) {
 }  // namespace
 
 void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
-  if (!rung.fitted || !rung.fit.converged) return;
+  if (!rung.fitted || !rung.fit.converged || rung.as_promised) return;
   try {
     rung.held_back_rms_sigma = held_back(tracks, rung, options);
   } catch (const Error&) {
@@ -433,6 +433,25 @@ void fit_from_values(std::span<const data::Track> tracks,
     take(draft_one_of_several(tracks, rung.scene, own), rung);
     rung.fitted = usable(rung.fit);
   });
+}
+
+void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
+                      double diluted, Rung& rung) {
+  const double gained = (promise.before - change.chi2) / diluted;
+  rung.fit = known.fit;
+  rung.fit.chi2 -= gained;
+  for (data::FitParameter& parameter : rung.fit.parameters) {
+    const auto value = change.values.find(parameter.name);
+    const auto wider = change.wider.find(parameter.name);
+    if (value != change.values.end()) parameter.value = value->second;
+    if (wider != change.wider.end()) parameter.sigma *= wider->second;
+  }
+  rung.rolls_at_first = known.rolls_at_first;
+  rung.fitted = rung.as_promised = true;
+  rung.reason = "not fitted: by the derivatives beside the model without it, it would gain nothing";
+  rung.parameters = known.parameters + change.parameters;
+  rung.aicc = known.aicc + 2.0 * change.parameters - gained;
+  rung.bic = known.bic + change.parameters * std::log(promise.rows) - gained;
 }
 
 namespace {

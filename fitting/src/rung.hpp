@@ -33,7 +33,8 @@ struct Rung {
   bool misses_first_samples = false;  ///< Draft
   bool rolls_at_first = false;        ///< FitOptions::rolls_at_first
   bool fitted = false;
-  std::string reason;  ///< why there is no fit, or why it is not accepted; else empty
+  bool as_promised = false;  ///< not fitted itself, take_as_promised()
+  std::string reason;        ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
   /// What explains the longest first part of the track that a search for it, or for the model that
@@ -121,6 +122,12 @@ struct Nearby {
   std::map<std::string, double> values;  ///< by name; empty: nothing is expected
   double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
 };
+
+/// Makes a rung with a further loss that promises nothing what the promise says, without a fit,
+/// which would creep along beside the known rung's: it is told of, and error bars allow for it.
+/// @param diluted  promised gains tell so many times less (dilution()).
+void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
+                      double diluted, Rung& rung);
 
 /// Fits a rung that differs by a term or two from `known`, from where it is expected. Where what is
 /// found there is clearly worse than that promises, or nothing is expected, from the solution of

@@ -372,6 +372,27 @@ TEST_F(Promised, IsToldOfLossesThatTogetherTakeThePlaceOfOthers) {
   EXPECT_EQ(both.moves, 0.0);
 }
 
+// Beside a sliding body such a fit took most of a minute to end where it began.
+TEST_F(Promised, IsWhatIsToldOfALossThatWouldGainNothing) {
+  const Rung known = fitted({"air", "pivoting"}), with = fitted({"air", "pivoting", "rolling"});
+  Rung rung = rung_with({"air", "pivoting", "rolling"});
+  const auto promise = promised(tracks_, known, {}, rung, {});
+  ASSERT_TRUE(promise);
+  constexpr double kDiluted = 1.0, kMuchTheSame = 1.0;  // of BIC
+  take_as_promised(known, *promise, promise->with, kDiluted, rung);
+  EXPECT_TRUE(rung.fitted);
+  EXPECT_FALSE(rung.reason.empty());
+  EXPECT_EQ(rung.parameters, with.parameters);
+  EXPECT_NEAR(rung.bic - known.bic, with.bic - known.bic, kMuchTheSame);
+  for (const data::FitParameter& parameter : known.fit.parameters) {
+    const data::FitParameter &told = *rung.fit.find(parameter.name),
+                             &found = *with.fit.find(parameter.name);
+    EXPECT_GE(told.sigma, parameter.sigma) << parameter.name;
+    EXPECT_NEAR(told.value, found.value, 0.5 * found.sigma) << parameter.name;
+    EXPECT_NEAR(told.sigma, found.sigma, 0.5 * found.sigma) << parameter.name;
+  }
+}
+
 // A camera that a prior holds is no way out: the fit of the larger model holds it too.
 TEST_F(Promised, HoldsWhatIsKnownBeforehand) {
   Rung known = rung_with({"air", "pivoting"}), larger = rung_with({"air", "pivoting", "rolling"});
