@@ -106,9 +106,9 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
       Found found = grow(problem, starts[i], window, {.known = &valleys});
       if (better(found, best)) best = std::move(found);
       if (settles_it(problem, best) || exhausted(problem, best)) return best;
-      if (seen && best.unexplained < kExplained) return best;
+      if (seen && followed_closely(problem, best)) return best;
     }
-    if (best.unexplained < kExplained) return best;
+    if (followed_closely(problem, best)) return best;
   }
   return best;
 }
@@ -186,7 +186,7 @@ class WideSearch {
         dead_ends.resize(known);
         take(std::move(found));
       }
-      if (settles_it(problem_, best_) || best_.unexplained < kExplained ||
+      if (settles_it(problem_, best_) || followed_closely(problem_, best_) ||
           reached_ >= kOftenEnough || exhausted(problem_, best_))
         return true;
     }
@@ -219,7 +219,7 @@ Found search(const Problem& problem, const Starter& starter, Effort effort) {
   const bool brief = seen || !slides || effort == Effort::brief;
   if (brief) best = search_briefly(problem, starter);
   if (settles_it(problem, best) || !rim || effort == Effort::brief ||
-      best.unexplained < kExplained || exhausted(problem, best))
+      followed_closely(problem, best) || exhausted(problem, best))
     return best;
   best = WideSearch(problem, std::move(best)).run(starter, StartsFrom::all);
   if (best.solution.usable || !seen) return best;

@@ -102,11 +102,19 @@ bool exhausted(const Problem& problem, const Found& best) {
   return problem.work && *problem.work > most;
 }
 
+bool followed_closely(const Problem& problem, const Found& best) {
+  constexpr double kExplained = 1e-4;  // of the variance
+  constexpr double kDoubtful = 4.0;    // of the stated noise's variance
+  const ArcData& arc = problem.arcs[0];
+  const bool stated = !arc.filmed && !arc.sigma_unknown;
+  return best.unexplained < kExplained && (!stated || best.reduced_chi2 < kDoubtful);
+}
+
 bool surely_found(const Problem& problem, const Found& best) {
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   if (exhausted(problem, best)) return true;
-  if (seen || !slides) return best.passed || best.unexplained < kExplained;
+  if (seen || !slides) return best.passed || followed_closely(problem, best);
   return surely_explained(problem, best);
 }
 

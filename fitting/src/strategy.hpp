@@ -120,12 +120,14 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// seen): the best so far has to do, and the verdict says what it is worth.
 [[nodiscard]] bool exhausted(const Problem& problem, const Found& best);
 
+/// Whether the path is explained but for a per cent of its amplitude: a tracker's sigmas may be too
+/// small, or the model not the whole truth. Stated ones of no camera count: what is far beyond them
+/// lies in another valley.
+[[nodiscard]] bool followed_closely(const Problem& problem, const Found& best);
+
 /// Whether looking on is idle: the path is explained but for a per cent, or the gate is passed;
 /// for a sliding body's positions alone, surely explained.
 [[nodiscard]] bool surely_found(const Problem& problem, const Found& best);
-
-/// `unexplained` of a path that is explained but for a per cent of its amplitude.
-inline constexpr double kExplained = 1e-4;
 
 /// Fills in the state of a model at an instant from the data (and the parameters in `values`).
 using NodeStarter = std::function<void(double t_s, Eigen::VectorXd& values)>;

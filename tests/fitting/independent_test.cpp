@@ -118,6 +118,15 @@ TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
   EXPECT_NEAR(couple->value, kTruth_N_m_s, kThree * couple->sigma);
 }
 
+// Followed to a per cent of its path the search ended in a neighbouring valley, 14 times beyond the
+// stated noise in chi-square, and went on to bodies that slide, for more than a minute.
+TEST(Independent, APathFollowedToAPerCentMayLieInAnotherValley) {
+  const Comparison found = comparison_of("another_valley");
+  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.model, "rolling");
+  expect_found(found.fit, {{"theta_rad", 1.412934434613085}, {"w2_rad_s", 86.1398486432354}});
+}
+
 // A gap layer and rolling friction stood for the air's force and contour friction: neither of these
 // does better in the place of one of those, only both of both, and rolling friction, which does not
 // act, was reported at 11 of its error bars.
