@@ -361,7 +361,7 @@ bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
   const double against = paid - gained / dilution;
   if (by.larger()) return against < most_evidence_against(known);
   if (by.exchanged()) return against < kVeryStrong;
-  return against < (known.fit.model == "sliding" ? 0.0 : kStrong);
+  return against < kStrong;
 }
 
 // All sets of terms, beside the last resort that a known rung has, that mean something, by a key of
