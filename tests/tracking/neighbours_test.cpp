@@ -167,6 +167,27 @@ TEST_F(Neighbours, AStretchThatSatElsewhereIsFollowedBackFromWhereItEnds) {
   EXPECT_EQ(count_wrong(glimpses), 0);
 }
 
+// Past the end of a recording no frame can help, and wide looks lead back to where it was seen.
+TEST_F(Neighbours, LastFramesThatSatElsewhereAreFollowedClosely) {
+  constexpr int kFirstWrong = kFrames - 4;
+  class LedBack final : public Oracle {
+   public:
+    using Oracle::Oracle;
+    [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
+      auto seen = Oracle::find(look);
+      if (look.frame.index < kFirstWrong || look.there) return seen;
+      seen->pose->pose.phi_rad = phi_at(look.frame.t_s) + std::numbers::pi;
+      seen->pose->evidence = kEvidence;
+      return seen;
+    }
+  };
+  const LedBack oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  ASSERT_EQ(count_wrong(glimpses), kFrames - kFirstWrong);
+  mend_from_one_side(background_, oracle, glimpses);
+  EXPECT_EQ(count_wrong(glimpses), 0);
+}
+
 TEST_F(Neighbours, AStretchStaysForWhichNoLessSpeaks) {
   const auto wrong = [](int i) { return i >= 15 && i < 40; };
   const Oracle oracle([](int) { return -1.0; });

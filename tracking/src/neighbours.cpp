@@ -323,8 +323,8 @@ class Mending {
     return 1.0 / (1.0 + off * off);
   }
 
-  /// How much more speaks for one sighting than for another. From where the body is expected a close
-  /// look finds no longer outline of another thing: how plainly it is seen need not count.
+  /// How much more speaks for one sighting than for another. From where the body is expected a
+  /// close look finds no longer outline of another thing: how plainly it is seen need not count.
   [[nodiscard]] double speaks_for(const Sighting& one, const Sighting& other) const {
     const double of_worth = worth(one) / worth(other);
     const double of_edges = one.pose->evidence / other.pose->evidence;
@@ -461,6 +461,20 @@ class Branch {
     return std::pair{std::move(*expected), off};
   }
 
+  /// What is seen in frame i about where the body is expected; nothing if that is nearer to what
+  /// was seen before.
+  /// @param there nothing farther off is looked for.
+  [[nodiscard]] std::optional<Sighting> nearer(std::size_t i,
+                                               const std::pair<Sighting, double>& expected,
+                                               bool there) {
+    const auto& [where, off] = expected;
+    const Glimpse& next = as_led_[i + static_cast<std::size_t>(side_)];
+    auto seen = measure_(*glimpses_[i].frame, where, next.pose(), nullptr, there);
+    if (!seen || !seen->pose || off_rad(*seen, where, finder_.faces_look_alike()) > 0.5 * off)
+      return std::nullopt;
+    return seen;
+  }
+
   /// False where both are one again, or nothing is found, or too little speaks for it.
   [[nodiscard]] bool goes_on(std::size_t i) {
     // One frame's evidence scatters by a tenth or two: a stretch is given up at half of what it
@@ -468,11 +482,10 @@ class Branch {
     constexpr double kGiveUp = 0.7, kOne = 0.5;
     const auto expected = leaves(i);
     if (!expected || expected->second < (led_.empty() ? 1.0 : kOne) * apart_rad_) return false;
-    const Glimpse& next = as_led_[i + static_cast<std::size_t>(side_)];
-    auto seen = measure_(*glimpses_[i].frame, expected->first, next.pose());
-    if (!seen || !seen->pose ||
-        off_rad(*seen, expected->first, finder_.faces_look_alike()) > 0.5 * expected->second)
-      return false;
+    // A wide look may find again what the body was taken for; from next to it a close one does not.
+    auto seen = nearer(i, *expected, false);
+    if (!seen) seen = nearer(i, *expected, true);
+    if (!seen) return false;
     seen->turned_rad = glimpses_[i].seen->turned_rad;
     // Not how plainly: the rim of a face in the light is plainer than that of a wall in the shade.
     gain_ += speaks_more(*seen, *glimpses_[i].seen);
