@@ -630,6 +630,21 @@ bool slip_at_first(const Ladder& ladder, std::span<const data::Track> tracks,
   return true;
 }
 
+// What seems to roll first and to slide later may creep all the time, where friction sets in
+// softly: searched from the beginning, with all that usually acts.
+// @returns whether a rung was added that explains the track.
+bool creep(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
+           std::vector<Rung>& rungs) {
+  const std::set<int> terms = all_that_usually_acts(ladder, {});
+  if (terms.empty()) return false;
+  Rung creeps = rung_with(ladder, terms);
+  fit_rung(tracks, nullptr, nullptr, options_for(creeps, options), creeps);
+  if (!explains(creeps)) return false;
+  rungs.push_back(std::move(creeps));
+  step_down(ladder, tracks, options, rungs.size() - 1, rungs);
+  return true;
+}
+
 // A body that rolls first slides later: with what acts while it rolls, then with all that usually
 // acts. @returns whether a rung was added that explains the track, or follows it to its end and is
 // to go on from.
@@ -654,8 +669,8 @@ bool slide_after_rolling(const Ladder& ladder, std::span<const data::Track> trac
     // What follows the track to its end needs other losses, not another search.
     if (explains(rungs.back()))
       step_down(ladder, tracks, options, rungs.size() - 1, rungs);
-    else
-      slip_at_first(ladder, tracks, options, rungs.back(), rungs);
+    else if (!slip_at_first(ladder, tracks, options, rungs.back(), rungs))
+      creep(ladder, tracks, options, rungs);
     return true;
   }
   return false;

@@ -152,6 +152,17 @@ TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {
   EXPECT_NEAR(pivoting->value, 1.738388747900978e-05, 2.0 * pivoting->sigma);
 }
 
+// Filmed and tracked, too. Taken to roll first and to slide later under Coulomb's law, which follows
+// the track to 1.6 times its noise, its friction had been 150 error bars off.
+TEST(Independent, ABodyThatCreepsAllTheTimeIsNotTakenToRollFirst) {
+  const Comparison found = comparison_of("creeps");
+  EXPECT_EQ(found.fit.model, "sliding");
+  EXPECT_LT(found.fit.noise_scale, 1.0) << found.fit.recommendation;
+  const data::FitParameter* friction = found.fit.find("friction");
+  ASSERT_NE(friction, nullptr) << found.fit.recommendation;
+  EXPECT_NEAR(friction->value, 0.23750619856065908, kSigmas * friction->sigma);
+}
+
 // What comes before it is not looked at: first parts are counted from where the fit begins.
 TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
   data::Track track = track_of("slides_later");
