@@ -136,18 +136,12 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
 struct GivenUp {
   int samples = 0, of = 0;
   double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
-  int at_an_end = 0;  // stand out, one after another, where an arc begins or ends
   // One or two may be glitches that happen to lie near the path.
-  static constexpr int kFewest = 3;
   [[nodiscard]] bool more_than(double share) const {
+    constexpr int kFewest = 3;
     return samples >= kFewest && samples > share * of;
   }
-  // A tracker that errs for a while comes back to the path.
-  [[nodiscard]] bool an_end() const { return at_an_end >= kFewest; }
   [[nodiscard]] std::string words() const {
-    if (!(samples >= kFewest))
-      return fmt::format("the {} positions at one end of it all lie off the model's path",
-                         at_an_end);
     return fmt::format(
         "{} of its {} positions, between {:.4g} and {:.4g} s, lie too far from the model to count, "
         "although they lie on one path with the others",
@@ -155,59 +149,36 @@ struct GivenUp {
   }
 };
 
-// By how much each of an arc's positions counts, in the order of their times. Glitches, which lie
-// on no path with the others, are no reason for doubt and count in full.
-struct Counting {
-  double t_s = 0.0, weight = 1.0;
-};
-std::vector<Counting> counting(const Problem& problem, int arc, const Solution& solution) {
+GivenUp given_up(const Problem& problem, const Solution& solution) {
+  constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
   // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
   constexpr double kNothing = 1e-5;
   Problem plain = problem;
   plain.noise_scale.fill(1.0);
   for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
-  const ArcData& data = problem.arcs[arc];
-  Eigen::VectorXd residuals;
-  if (data.observable_index(model::Observable::x_m) < 0 ||
-      !evaluate(plain, arc, solution.u, residuals, nullptr))
-    return {};
-  const Eigen::MatrixX2d xy = data.positions_m();
-  const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
-  const double nothing_m =
-      kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
-  const std::vector<int> consistent = consistent_samples(data);
-  std::vector<Counting> all;
-  for (const Reading& reading : data.readings) {
-    if (reading.channel != Channel::position) continue;
-    const bool means_something =
-        off.row(reading.sample).norm() >= nothing_m &&
-        std::binary_search(consistent.begin(), consistent.end(), reading.sample);
-    all.push_back(
-        {data.t_s[reading.sample], means_something ? robust_weight(problem, arc, reading) : 1.0});
-  }
-  return all;
-}
-
-bool stands_out(const Counting& position) {
-  return position.weight < 1.0;
-}
-
-GivenUp given_up(const Problem& problem, const Solution& solution) {
-  constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
   GivenUp all;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    const std::vector<Counting> positions = counting(problem, arc, solution);
-    for (const Counting& position : positions) {
+    const ArcData& data = problem.arcs[arc];
+    Eigen::VectorXd residuals;
+    if (data.observable_index(model::Observable::x_m) < 0 ||
+        !evaluate(plain, arc, solution.u, residuals, nullptr))
+      continue;
+    const Eigen::MatrixX2d xy = data.positions_m();
+    const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
+    const double nothing_m =
+        kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    const std::vector<int> consistent = consistent_samples(data);
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != Channel::position) continue;
       ++all.of;
-      if (position.weight > kHardlyCounts) continue;
+      if (robust_weight(problem, arc, reading) > kHardlyCounts ||
+          off.row(reading.sample).norm() < nothing_m ||
+          !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
+        continue;
       ++all.samples;
-      all.first_s = std::min(all.first_s, position.t_s);
-      all.last_s = std::max(all.last_s, position.t_s);
+      all.first_s = std::min(all.first_s, data.t_s[reading.sample]);
+      all.last_s = std::max(all.last_s, data.t_s[reading.sample]);
     }
-    const auto first = std::find_if_not(positions.begin(), positions.end(), stands_out);
-    const auto last = std::find_if_not(positions.rbegin(), positions.rend(), stands_out);
-    all.at_an_end = std::max({all.at_an_end, static_cast<int>(first - positions.begin()),
-                              static_cast<int>(last - positions.rbegin())});
   }
   return all;
 }
@@ -313,7 +284,7 @@ void accept(const Problem& problem, const Solution& solution, const Uncertainty&
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
   const bool misses = worst.times > kDoubtful;
-  const bool doubtful = misses || lost.more_than(kMany) || lost.an_end();
+  const bool doubtful = misses || lost.more_than(kMany);
   const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
                                    [](const ArcData& arc) { return arc.sigma_unknown; });
   std::string words = "the model explains the track";
@@ -399,13 +370,6 @@ void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::F
       "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
       "model lacks something, and the error bars are too small",
       drift.gain);
-}
-
-bool misses_first_samples(const Problem& problem, const Solution& solution) {
-  if (problem.arcs.size() > 1) return false;
-  const std::vector<Counting> positions = counting(problem, 0, solution);
-  return positions.size() >= GivenUp::kFewest &&
-         std::all_of(positions.begin(), positions.begin() + GivenUp::kFewest, stands_out);
 }
 
 bool explains(const Problem& problem, const Solution& solution) {

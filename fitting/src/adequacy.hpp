@@ -26,8 +26,8 @@ struct Squares {
 ///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
 ///                    well (BIC): nothing in them asks for the model
 ///   doubtful         followed, but residuals are beyond 2 times those measures, or a
-///                    hundredth of the positions, three at least, given up, or the
-///                    first or last three stand out, or doubt_if_drifting() says so
+///                    hundredth of the positions, three at least, given up, or
+///                    doubt_if_drifting() says so
 ///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
@@ -43,10 +43,6 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
 /// parameters stand in for, and their error bars do not know of it. A tracker's errors go with the
 /// motion a little, too: of filmed positions more is asked.
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit);
-
-/// Whether a single arc's first positions stand out one after another, as those of a body do that
-/// slips there in a way the model does not know. A tracker that errs for a while comes back.
-[[nodiscard]] bool misses_first_samples(const Problem& problem, const Solution& solution);
 
 /// Whether a path is neither unexplained nor doubtful for its residuals.
 [[nodiscard]] bool explains(const Problem& problem, const Solution& solution);

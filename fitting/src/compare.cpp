@@ -616,33 +616,17 @@ Rung longest_rolling(const Ladder& ladder, std::span<const data::Track> tracks,
   return known;
 }
 
-// What a rung that rolls explains all of but the first samples slips there, with the same losses.
-// @returns whether a rung was added that explains the track.
-bool slip_at_first(const Ladder& ladder, std::span<const data::Track> tracks,
-                   const FitOptions& options, const Rung& rolls, std::vector<Rung>& rungs) {
-  const std::set<int> terms = with_last_resort(ladder, rolls.terms);
-  if (!rolls.fitted || !rolls.misses_first_samples || terms.empty()) return false;
-  Rung slips = rung_with(ladder, terms);
-  fit_slip_at_first(tracks, rolls, options_for(slips, options), slips);
-  if (!explains(slips)) return false;
-  rungs.push_back(std::move(slips));
-  step_down(ladder, tracks, options, rungs.size() - 1, rungs);
-  return true;
-}
-
 // What seems to roll first and to slide later may creep all the time, where friction sets in
 // softly: searched from the beginning, with all that usually acts.
-// @returns whether a rung was added that explains the track.
-bool creep(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
+void creep(const Ladder& ladder, std::span<const data::Track> tracks, const FitOptions& options,
            std::vector<Rung>& rungs) {
   const std::set<int> terms = all_that_usually_acts(ladder, {});
-  if (terms.empty()) return false;
+  if (terms.empty()) return;
   Rung creeps = rung_with(ladder, terms);
   fit_rung(tracks, nullptr, nullptr, options_for(creeps, options), creeps);
-  if (!explains(creeps)) return false;
+  if (!explains(creeps)) return;
   rungs.push_back(std::move(creeps));
   step_down(ladder, tracks, options, rungs.size() - 1, rungs);
-  return true;
 }
 
 // A body that rolls first slides later: with what acts while it rolls, then with all that usually
@@ -669,7 +653,7 @@ bool slide_after_rolling(const Ladder& ladder, std::span<const data::Track> trac
     // What follows the track to its end needs other losses, not another search.
     if (explains(rungs.back()))
       step_down(ladder, tracks, options, rungs.size() - 1, rungs);
-    else if (!slip_at_first(ladder, tracks, options, rungs.back(), rungs))
+    else
       creep(ladder, tracks, options, rungs);
     return true;
   }
@@ -692,7 +676,6 @@ bool climb_down(const Ladder& ladder, std::span<const data::Track> tracks,
     step_down(ladder, tracks, options, all, rungs);
     return true;
   }
-  if (slip_at_first(ladder, tracks, options, rungs[all], rungs)) return true;
   if (auto other = by_another_law(ladder, tracks, options, rungs[all])) {
     rungs.push_back(*std::move(other));
     step_down(ladder, tracks, options, rungs.size() - 1, rungs);
@@ -744,7 +727,6 @@ std::vector<Rung> climb(const Ladder& ladder, std::span<const data::Track> track
   // Where a search with all usual losses led nowhere, one with fewer does not either.
   const Reach reach = searched ? Reach::from_below : Reach::search;
   const std::size_t current = step_up_while_worth(ladder, tracks, options, reach, 0, rungs);
-  if (slip_at_first(ladder, tracks, options, rungs[current], rungs)) return rungs;
   if (explains(rungs[current])) {
     // What stood in for another loss while that was missing may not be needed beside it.
     step_down(ladder, tracks, options, current, rungs);

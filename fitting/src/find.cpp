@@ -334,7 +334,6 @@ Found find_arc(Problem problem, const Quest& quest) {
   if (options.strategy == "single") return grow(problem, given, all);
   if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
   if (options.strategy == kRollsFirst) return rolls_first(problem, quest);
-  if (options.strategy == kSlipsFirst) return search(problem, quest.starter);
   if (options.strategy == "integral") return from_best_start(problem, quest.starter);
   if (options.strategy == "multiple") return shoot_top(problem, given);
   if (options.strategy != "auto")

@@ -57,7 +57,6 @@ struct Draft {
   /// several threads at once.
   std::function<data::Fit()> full;
   Settled settled;
-  bool misses_first_samples = false;  ///< which stand out one after another (adequacy.hpp)
 };
 
 /// fit_one_of_several() that leaves full error bars for later.
@@ -68,7 +67,5 @@ struct Draft {
 
 /// Strategy of a sliding model whose given start is that of a body that rolls at first.
 inline constexpr const char* kRollsFirst = "rolls_first";
-/// Strategy of one whose given start is that of a body that rolls all but at first.
-inline constexpr const char* kSlipsFirst = "slips_first";
 
 }  // namespace trochoid::fitting

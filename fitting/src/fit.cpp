@@ -372,10 +372,6 @@ class OneFit {
   [[nodiscard]] Settled settled() const { return {problem_.tolerance, problem_.noise_scale}; }
   /// @pre find()
   [[nodiscard]] data::Fit described(Bars bars);
-  /// @pre find()
-  [[nodiscard]] bool misses_first_samples() const {
-    return !refused_ && fitting::misses_first_samples(problem_, solution_);
-  }
 
  private:
   std::span<const data::Track> tracks_;
@@ -411,8 +407,7 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
     problem_.partial = std::make_shared<Partial>();
   const bool start_given = !options_.start.empty() || scene_.start.theta_rad.has_value();
   const Found found = search_without_outliers(
-      problem_,
-      {starter_for(*problem_.predictor, scene_, options_), &options_, start_given, relatives});
+      problem_, {starter_for(*problem_.predictor, scene_), &options_, start_given, relatives});
   fit_.start_path = found.path;
   cut_short_ = found.cut_short;
   // Any start explains a few samples.
@@ -501,7 +496,6 @@ class CompletedFit {
   }
   void start_as(const Settled& near) { one_.start_as(near); }
   [[nodiscard]] Settled settled() const { return one_.settled(); }
-  [[nodiscard]] bool misses_first_samples() const { return one_.misses_first_samples(); }
   [[nodiscard]] data::Fit described(Bars bars) {
     data::Fit fit = one_.described(bars);
     tell_idle_terms(scene_, fit);
@@ -574,7 +568,7 @@ Draft draft_one_of_several(std::span<const data::Track> tracks, const data::Scen
             if (!*full) *full = one->described(Bars::full);
             return **full;
           },
-          one->settled(), one->misses_first_samples()};
+          one->settled()};
 }
 
 }  // namespace trochoid::fitting

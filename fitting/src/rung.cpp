@@ -44,7 +44,6 @@ void take(Draft draft, Rung& rung) {
   rung.fit = std::move(draft.fit);
   rung.full = std::move(draft.full);
   rung.settled = draft.settled;
-  rung.misses_first_samples = draft.misses_first_samples;
 }
 
 namespace {
@@ -411,17 +410,6 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
   });
 }
 
-void fit_slip_at_first(std::span<const data::Track> tracks, const Rung& rolls,
-                       const FitOptions& options, Rung& rung) {
-  FitOptions own = options;
-  own.start = values_of(rolls.fit);
-  own.strategy = kSlipsFirst;
-  try_rung(rung, [&] {
-    take(draft_one_of_several(tracks, rung.scene, own), rung);
-    rung.fitted = usable(rung.fit);
-  });
-}
-
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung) {
@@ -448,7 +436,8 @@ void take_as_promised(const Rung& known, const Promise& promise, const Promise::
   }
   rung.rolls_at_first = known.rolls_at_first;
   rung.fitted = rung.as_promised = true;
-  rung.reason = "not fitted: by the derivatives beside the model without it, it would gain nothing";
+  rung.reason =
+      "it would gain nothing by the derivatives beside the model without it, and was not fitted";
   rung.parameters = known.parameters + change.parameters;
   rung.aicc = known.aicc + 2.0 * change.parameters - gained;
   rung.bic = known.bic + change.parameters * std::log(promise.rows) - gained;

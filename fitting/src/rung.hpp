@@ -30,8 +30,7 @@ struct Rung {
   data::Fit fit;                    ///< error bars by curvature
   std::function<data::Fit()> full;  ///< `fit` with full error bars, which cost as much as a fit
   Settled settled;
-  bool misses_first_samples = false;  ///< Draft
-  bool rolls_at_first = false;        ///< FitOptions::rolls_at_first
+  bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
   bool fitted = false;
   bool as_promised = false;  ///< not fitted itself, take_as_promised()
   std::string reason;        ///< why there is no fit, or why it is not accepted; else empty
@@ -107,10 +106,6 @@ void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
 /// sets in gently lets a body creep, which would show in the first part.
 void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
                          const FitOptions& options, Rung& rung);
-
-/// Fits a sliding rung from the values of one that rolls and explains all but the first samples.
-void fit_slip_at_first(std::span<const data::Track> tracks, const Rung& rolls,
-                       const FitOptions& options, Rung& rung);
 
 /// Fits a rung from near its solution.
 void fit_from_values(std::span<const data::Track> tracks,

@@ -302,30 +302,6 @@ std::vector<Start> from_spin(const RimShape& shape, const Motion& motion) {
 
 }  // namespace
 
-std::vector<Start> slip_starts(const ArcData& window, const RimShape& shape, const Start& rolls) {
-  if (window.t_s.size() < 12) return {};
-  const Motion motion = motion_of(window);
-  const double theta = rolls.values.at("theta_rad"), phi = rolls.values.at("phi_rad");
-  const double w2 = rolls.values.at("w2_rad_s"), s = std::sin(theta), c = std::cos(theta);
-  const double h = std::copysign(shape.h, c), z = shape.R * s + h * c;
-  std::vector<Start> starts;
-  for (double slip = 0.05; slip < 2.0; slip *= 1.4)
-    for (int direction = 0; direction < 16; ++direction) {
-      const double heading = 2.0 * kPi * direction / 16;
-      const Eigen::Vector2d slides = slip * std::sqrt(shape.g * shape.R) *
-                                     Eigen::Vector2d(std::cos(heading), std::sin(heading));
-      const Eigen::Vector2d rolled = Eigen::Rotation2Dd(-phi) * (motion.velocity_m_s - slides);
-      const double w1 = -rolled.y() / z, w3 = (h * w2 - rolled.x()) / shape.R;
-      for (double friction = 0.05; friction < 0.9; friction *= 1.35) {
-        Start start = state(motion, theta, phi, w1, w2, w3, "slips_first");
-        start.values.insert(rolls.values.begin(), rolls.values.end());
-        start.values["friction"] = friction;
-        starts.push_back(std::move(start));
-      }
-    }
-  return starts;
-}
-
 std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
   if (window.t_s.size() < 12) return {};
   const Motion motion = motion_of(window);

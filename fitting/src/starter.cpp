@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "first_guess.hpp"
 #include "trochoid/model/inertia.hpp"
 
 namespace trochoid::fitting {
@@ -25,7 +24,7 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
   };
 }
 
-Starter rim_starter(const data::Scene& scene, const FitOptions& options) {
+Starter rim_starter(const data::Scene& scene) {
   data::Body body = *scene.body;
   const model::CentralInertia inertia = model::central_inertia(body);
   const RimShape shape{body.radius_m,
@@ -34,20 +33,16 @@ Starter rim_starter(const data::Scene& scene, const FitOptions& options) {
                        inertia.axial_kg_m2 / inertia.mass_kg,
                        scene.model.gravity_m_s2,
                        scene.model.name == "sliding"};
-  if (options.strategy != kSlipsFirst)
-    return [shape](const ArcData& window) { return rim_starts(window, shape); };
-  const Start rolls{kSlipsFirst, options.start};
-  return [shape, rolls](const ArcData& window) { return slip_starts(window, shape, rolls); };
+  return [shape](const ArcData& window) { return rim_starts(window, shape); };
 }
 
 }  // namespace
 
-Starter starter_for(const model::Predictor& predictor, const data::Scene& scene,
-                    const FitOptions& options) {
+Starter starter_for(const model::Predictor& predictor, const data::Scene& scene) {
   const std::string& model = predictor.model_name();
   if (model.starts_with("top")) return top_starter(predictor, scene.fit.free_pivot);
   if ((model == "rolling" || model == "sliding" || model == "smooth") && scene.body)
-    return rim_starter(scene, options);
+    return rim_starter(scene);
   if (model == "puck") {
     const double gravity_m_s2 = scene.model.gravity_m_s2;
     return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };

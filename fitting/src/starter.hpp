@@ -4,15 +4,12 @@
 
 #include "strategy.hpp"
 #include "trochoid/data/scene.hpp"
-#include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::fitting {
 
-/// Where a search without a guess starts, by the model; by the given start where that is of a body
-/// that slips only at first (kSlipsFirst).
-[[nodiscard]] Starter starter_for(const model::Predictor& predictor, const data::Scene& scene,
-                                  const FitOptions& options);
+/// Where a search without a guess starts, by the model.
+[[nodiscard]] Starter starter_for(const model::Predictor& predictor, const data::Scene& scene);
 
 /// A relative with the models it is made of.
 struct OwnedRelative {

@@ -50,14 +50,6 @@ struct RimShape {
 /// the couples balance, from the angles or from how fast the acceleration veers.
 [[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
 
-/// Starts for a body on its rim that slips for a few samples before it rolls as in `rolls`, by
-/// which its attitude is known, hardly changed by the slip, and its losses: a grid over the slip at
-/// the window's first sample and the friction. The spin and the tilting rate let the contact point
-/// slip so.
-/// @param rolls  values by name, among them theta_rad, phi_rad and w2_rad_s.
-[[nodiscard]] std::vector<Start> slip_starts(const ArcData& window, const RimShape& shape,
-                                             const Start& rolls);
-
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
 [[nodiscard]] std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2);
 

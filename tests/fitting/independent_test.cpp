@@ -95,18 +95,6 @@ TEST(Independent, ABodyThatRollsAtFirstHasTheVelocityOfItsSpin) {
   }
 }
 
-// Seen by its positions alone it rolls all but a fifteenth of a second, and a body that only rolls
-// was given for it: good, the first samples given up as the tracker's errors, and the spin when the
-// record begins 2000 error bars off.
-TEST(Independent, ABodyThatSlipsForItsFirstSamplesIsNotTakenForOneThatRolls) {
-  const Comparison found = comparison_of("slips_at_first");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
-  EXPECT_EQ(found.fit.model, "sliding");
-  expect_found(found.fit, {{"friction", 0.3791167938657872},
-                           {"w3_rad_s", 4.679153585624356},
-                           {"vx_m_s", 0.24354367735386823}});
-}
-
 // A quadratic couple of the air, for which no evidence is strong, was not even tried, and the
 // linear one that stood for it too was 4 of its error bars off.
 TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
