@@ -23,8 +23,8 @@ struct Promise {
     /// move most is off, the shift and what its variance grows by together. Else 0, as where the
     /// data do not tell the parameters apart.
     double moves = 0.0;
-    std::map<std::string, double> wider =
-        {};  ///< how many times as wide their error bars are, then
+    /// How many times as wide their error bars are then, by name.
+    std::map<std::string, double> wider = {};
   };
   double before = 0.0;            ///< chi-square without the further losses
   Change with;                    ///< with all of them

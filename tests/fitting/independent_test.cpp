@@ -145,6 +145,7 @@ TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {
 TEST(Independent, ABodyThatCreepsAllTheTimeIsNotTakenToRollFirst) {
   const Comparison found = comparison_of("creeps");
   EXPECT_EQ(found.fit.model, "sliding");
+  // The tracker's own error bars hold what is left.
   EXPECT_LT(found.fit.noise_scale, 1.0) << found.fit.recommendation;
   const data::FitParameter* friction = found.fit.find("friction");
   ASSERT_NE(friction, nullptr) << found.fit.recommendation;
