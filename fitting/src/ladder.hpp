@@ -2,6 +2,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ struct Ladder {
   std::vector<Term> terms;
   std::vector<std::string> left_out;  ///< why a term that belongs here is not tried
 };
+
+/// A set of a ladder's terms, by their indices.
+using Terms = std::set<int>;
 
 /// @param spin_seen  whether the tracks have a spin angle; a puck may turn without showing it.
 /// @throws InputError if the scene lacks what its law needs.

@@ -28,7 +28,7 @@ bool in_question(const Rung& rung, const Rung& chosen) {
 // being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
 // where residuals hang together, as a further term may then only follow the tracker's errors; but
 // those do for which BIC speaks, though not strongly, all the same.
-std::vector<Rival> rivals_of(const std::vector<Rung>& rungs, const Rung& chosen, bool too_large) {
+std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, bool too_large) {
   const bool white = chosen.fit.whiteness_p >= kWhite;
   std::vector<Rival> rivals;
   double all = 1.0;
@@ -135,7 +135,7 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
 }
 
 // A loss too small to be needed may still move the others: the one that does so most.
-void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
+void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit) {
   constexpr double kFar = 3.0;  // error bars
   const Rung* moving = nullptr;
   const data::FitParameter* moved = nullptr;
@@ -163,7 +163,7 @@ void warn_of_larger_ones(const std::vector<Rung>& rungs, const Rung& chosen, dat
 
 }  // namespace
 
-void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit) {
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit) {
   const std::vector<data::FitParameter> before = fit.parameters;
   std::vector<Rival> rivals = rivals_of(rungs, chosen, false);
   const std::vector<Rival> too_large = rivals_of(rungs, chosen, true);

@@ -1,4 +1,5 @@
 #pragma once
+#include <deque>
 #include <functional>
 #include <limits>
 #include <map>
@@ -24,7 +25,7 @@ inline constexpr double kWhite = 0.01;
 
 /// A model of the ladder and what became of it.
 struct Rung {
-  std::set<int> terms;  ///< indices into Ladder::terms
+  Terms terms;
   std::string name;
   data::Scene scene;
   data::Fit fit;                    ///< error bars by curvature
@@ -42,6 +43,9 @@ struct Rung {
   double aicc = std::numeric_limits<double>::infinity();
   double bic = std::numeric_limits<double>::infinity();
 };
+
+/// References to rungs stay valid while more are added.
+using Rungs = std::deque<Rung>;
 
 /// Whether a rung has all terms of another; also where they are the same.
 [[nodiscard]] bool has_all_terms_of(const Rung& rung, const Rung& other);
@@ -65,7 +69,7 @@ void take(Draft draft, Rung& rung);
 /// whose own error bars count too (not where residuals hang together: those terms may follow the
 /// tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
 /// What rungs with further terms that nothing asks for would change is said, and not allowed for.
-void allow_for_rivals(const std::vector<Rung>& rungs, const Rung& chosen, data::Fit& fit);
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit);
 
 /// Whether a rung's verdict is not that its path is only followed or not even that, and what is
 /// left looks like noise or hardly exceeds the track's own: then it hangs together for the tracker.

@@ -19,8 +19,7 @@ std::string listed(const std::vector<const Rung*>& rungs, double bic) {
 }
 
 // Which losses turn the mean path round, and whether others alone would do it as well.
-std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chosen,
-                                const Ladder& ladder) {
+std::string retrograde_sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
   const std::optional<double> from_s = retrograde_from_s(chosen.fit, chosen.scene);
   if (!from_s) return "";
   const auto term = [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].name; };
@@ -47,7 +46,7 @@ std::string retrograde_sentence(const std::vector<Rung>& rungs, const Rung& chos
 
 }  // namespace
 
-std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen, const Ladder& ladder) {
+std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
   if (!chosen.fit.converged)
     return fmt::format("none of the {} models tried explains the track; {} comes nearest.",
                        rungs.size(), chosen.name);

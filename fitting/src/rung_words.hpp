@@ -7,7 +7,6 @@
 namespace trochoid::fitting {
 
 /// What the comparison of all rungs says, as a sentence or two.
-[[nodiscard]] std::string sentence(const std::vector<Rung>& rungs, const Rung& chosen,
-                                   const Ladder& ladder);
+[[nodiscard]] std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder);
 
 }  // namespace trochoid::fitting

@@ -128,8 +128,8 @@ Rung rung_of(std::set<int> terms, std::vector<data::FitParameter> parameters, do
 }
 
 TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
-  const std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                                rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};
+  const Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                    rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   // Either model is right with probability one half: 0.6 off half of the time.
@@ -141,19 +141,18 @@ TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
 }
 
 TEST(Rivals, WithoutALossTakeItForNothing) {
-  const std::vector<Rung> rungs{
-      rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-      rung_of({2}, {loss("pivoting_friction_m", 3.0, 0.1)}, 100.0, 100.0)};
+  const Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+                    rung_of({2}, {loss("pivoting_friction_m", 3.0, 0.1)}, 100.0, 100.0)};
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_NEAR(fit.parameters[0].sigma, std::sqrt(0.1 * 0.1 + 0.5), 1e-12);
 }
 
 TEST(Rivals, ThatAreRuledOutOrUnexplainedOrOfAnotherLawDoNotCount) {
-  std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                          rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 111.0),
-                          rung_of({3}, {loss("rolling_friction_m", 0.3, 0.1)}, 80.0, 90.0),
-                          rung_of({4}, {loss("rolling_friction_m", 0.2, 0.1)}, 100.0, 100.0)};
+  Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+              rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 111.0),
+              rung_of({3}, {loss("rolling_friction_m", 0.3, 0.1)}, 80.0, 90.0),
+              rung_of({4}, {loss("rolling_friction_m", 0.2, 0.1)}, 100.0, 100.0)};
   rungs[2].fit.converged = false;
   rungs[3].fit.model = "sliding";
   data::Fit fit = rungs[0].fit;
@@ -164,7 +163,7 @@ TEST(Rivals, ThatAreRuledOutOrUnexplainedOrOfAnotherLawDoNotCount) {
 
 // Further terms may only follow a tracker's common errors.
 TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
-  std::vector<Rung> rungs{
+  Rungs rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               98.0, 104.0)};
@@ -181,10 +180,9 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
 // The simplest model that is not clearly worse is chosen, though one with a term more may be
 // better.
 TEST(Rivals, WithATermMoreForWhichBicSpeaksWidenTheErrorBarsThoughResidualsHangTogether) {
-  std::vector<Rung> rungs{
-      rung_of({1}, {loss("pivoting_friction_m", 2.1, 0.01)}, 100.0, 100.0),
-      rung_of({1, 2}, {loss("pivoting_friction_m", 2.0, 0.04), loss("air_N_m_s", 1.0, 0.3)}, 90.0,
-              97.0)};
+  Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 2.1, 0.01)}, 100.0, 100.0),
+              rung_of({1, 2}, {loss("pivoting_friction_m", 2.0, 0.04), loss("air_N_m_s", 1.0, 0.3)},
+                      90.0, 97.0)};
   rungs[0].fit.whiteness_p = 1e-6;
   const double weight = std::exp(1.5) / (1.0 + std::exp(1.5));
   const double expected =
@@ -197,7 +195,7 @@ TEST(Rivals, WithATermMoreForWhichBicSpeaksWidenTheErrorBarsThoughResidualsHangT
 
 // It was left out for being larger, not for being wrong.
 TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals) {
-  std::vector<Rung> rungs{
+  Rungs rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.4, 0.5), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               95.0, 101.0)};
@@ -213,7 +211,7 @@ TEST(Rivals, WithATermMoreThatBicDoesNotRuleOutWidenTheErrorBarsOfWhiteResiduals
 
 // BIC's evidence against two parameters more is very strong where they fit exactly as well.
 TEST(Rivals, ThatAreTooLargeWidenTheErrorBarsOfWhiteResidualsToo) {
-  std::vector<Rung> rungs{
+  Rungs rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 0.9, 0.2), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               102.0, 112.0)};
@@ -227,7 +225,7 @@ TEST(Rivals, ThatAreTooLargeWidenTheErrorBarsOfWhiteResidualsToo) {
 }
 
 TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold) {
-  std::vector<Rung> rungs{
+  Rungs rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1), loss("pivoting_friction_m", 2.0, 0.1)},
               100.0, 100.0),
       rung_of({1, 2},
@@ -251,7 +249,7 @@ TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold)
 
 // Full error bars are had for the chosen one alone: like is compared with like.
 TEST(Rivals, AddAsMuchToAnErrorBarThatIsWiderForOtherReasons) {
-  std::vector<Rung> rungs{
+  Rungs rungs{
       rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
       rung_of({1, 2}, {loss("rolling_friction_m", 1.1, 0.2), loss("gap_viscosity_Pa_s", 1.0, 1.0)},
               101.0, 104.0)};
@@ -269,9 +267,9 @@ TEST(Rivals, AddAsMuchToAnErrorBarThatIsWiderForOtherReasons) {
 
 // Which may be another one than the likeliest.
 TEST(Rivals, ThatMoveAParameterMostAreNamedBesideIt) {
-  std::vector<Rung> rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-                          rung_of({2}, {loss("rolling_friction_m", 1.0, 0.1)}, 98.0, 100.0),
-                          rung_of({3}, {loss("rolling_friction_m", 0.2, 0.1)}, 101.0, 103.0)};
+  Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+              rung_of({2}, {loss("rolling_friction_m", 1.0, 0.1)}, 98.0, 100.0),
+              rung_of({3}, {loss("rolling_friction_m", 0.2, 0.1)}, 101.0, 103.0)};
   rungs[1].name = "which agrees";
   rungs[2].name = "which does not";
   data::Fit fit = rungs[0].fit;
@@ -282,9 +280,8 @@ TEST(Rivals, ThatMoveAParameterMostAreNamedBesideIt) {
 
 // Where Coulomb's law does beside one loss more, nothing is said of what it does not have.
 TEST(Rivals, WithATermMoreMayDoWithoutAParameter) {
-  const std::vector<Rung> rungs{
-      rung_of({1}, {loss("slip_regularisation_m_s", 1e-3, 1e-4)}, 100.0, 100.0),
-      rung_of({1, 2}, {loss("gap_viscosity_Pa_s", 1.0, 1.0)}, 98.0, 104.0)};
+  const Rungs rungs{rung_of({1}, {loss("slip_regularisation_m_s", 1e-3, 1e-4)}, 100.0, 100.0),
+                    rung_of({1, 2}, {loss("gap_viscosity_Pa_s", 1.0, 1.0)}, 98.0, 104.0)};
   data::Fit fit = rungs[0].fit;
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_TRUE(fit.warnings.empty());
