@@ -520,6 +520,79 @@ TEST(SlidingRung, OfABodyThatRollsAtFirstIsSearchedForByCoulombsLaw) {
   }
 }
 
+// A disc of tests/independent that rolls first and slides later.
+class SlidesLater : public testing::Test {
+ protected:
+  SlidesLater() {
+    rung_.scene = data::read_scene(folder_ + "/scene.toml");
+    rung_.scene.model.name = "sliding";
+    rung_.scene.model.friction = 0.3313;
+    rung_.scene.model.rolling_friction_m = 1.27e-4;
+    rung_.scene.model.contour_friction_m = 1.85e-5;
+  }
+  // From the fit of the same model whose centre begins as fast as that, so much beside its rolling.
+  [[nodiscard]] Rung fitted(const data::Track& track, double slip_m_s) const {
+    Rung below = rung_, rung = rung_;
+    std::map<std::string, double> start = start_;
+    start["vx_m_s"] += slip_m_s;
+    fit_from_values(std::span(&track, 1), start, {}, below);
+    EXPECT_TRUE(below.fit.converged) << below.reason;
+    EXPECT_FALSE(below.rolls_at_first);
+    fit_rung(std::span(&track, 1), &below, nullptr, {}, rung);
+    EXPECT_TRUE(rung.fit.converged) << rung.reason;
+    return rung;
+  }
+
+  const std::string folder_ = TROCHOID_SOURCE_DIR "/tests/independent/cases/slides_later";
+  const std::map<std::string, double> start_{
+      {"theta_rad", 1.2785}, {"phi_rad", -2.9611}, {"w1_rad_s", -0.959},
+      {"w2_rad_s", -2.549},  {"w3_rad_s", 5.1303}, {"x_m", -0.02115},
+      {"y_m", -0.09757},     {"vx_m_s", 0.2793},   {"vy_m_s", 0.0024}};
+  Rung rung_;
+};
+
+// A slip that is over within a few samples came out anywhere, and all that goes with it.
+TEST_F(SlidesLater, RollsFromTheBeginningWhereNothingSpeaksForASlip) {
+  const Rung rung = fitted(data::read_track(folder_ + "/track.csv").tracks.front(), 0.0);
+  EXPECT_TRUE(rung.rolls_at_first);
+  EXPECT_EQ(rung.fit.find("vx_m_s")->status, data::ParameterStatus::derived);
+}
+
+// It lasts for little more than a sample, and leaves the body a millimetre elsewhere.
+TEST_F(SlidesLater, SlipsAtFirstWhereThatIsSeen) {
+  constexpr double kSlip_m_s = -0.09;
+  constexpr int kSamples = 40;
+  data::Track track = data::read_track(folder_ + "/track.csv").tracks.front();
+  track.samples.resize(kSamples);
+  std::vector<double> t_s;
+  for (const data::TrackSample& sample : track.samples) t_s.push_back(sample.t_s);
+  std::map<std::string, double> truth = start_;
+  truth["vx_m_s"] += kSlip_m_s;
+  const auto predictor = model::make_predictor(rung_.scene);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.observables.push_back(model::Observable::theta_rad);
+  request.observables.push_back(model::Observable::phi_rad);
+  const Eigen::VectorXd path =
+      predictor->predict(fitting::values_with(*predictor, truth), request).values;
+  ASSERT_EQ(path.size(), static_cast<Eigen::Index>(4 * t_s.size()));
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    const auto at = path.segment<4>(4 * static_cast<Eigen::Index>(i));
+    data::TrackSample& sample = track.samples[i];
+    const double sigma_m = std::sqrt(sample.covariance_m2(0, 0));
+    sample.centre_m =
+        at.head<2>() + sigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+    sample.theta->value_rad = at[2] + sample.theta->sigma_rad * normal(generator);
+    sample.phi->value_rad = at[3] + sample.phi->sigma_rad * normal(generator);
+  }
+  const Rung rung = fitted(track, kSlip_m_s);
+  EXPECT_FALSE(rung.rolls_at_first);
+  const data::FitParameter* speed = rung.fit.find("vx_m_s");
+  EXPECT_NEAR(speed->value, start_.at("vx_m_s") + kSlip_m_s, 4.0 * speed->sigma);
+}
+
 // Integrated more coarsely its path has its minimum elsewhere: the way there and back took most of
 // the steps.
 TEST_F(Promised, NeighboursAreIntegratedAsFinelyAsTheRungTheyStartFrom) {
