@@ -44,7 +44,7 @@ std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const 
   std::vector<const Nearby*> near;
   for (const Neighbour& neighbour : wanted) {
     if (is_known(rungs, neighbour.terms)) continue;
-    added.push_back(&rungs.emplace_back(rung_with(contest.ladder, neighbour.terms)));
+    added.push_back(&blank_rung(contest.ladder, neighbour.terms, rungs));
     near.push_back(&neighbour.near);
   }
   side_by_side(contest, added, [&](std::size_t i, Rung& rung, const FitOptions& options) {
@@ -55,7 +55,15 @@ std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const 
 
 bool is_known(const Rungs& rungs, const Terms& terms) {
   return std::any_of(rungs.begin(), rungs.end(),
-                     [&](const Rung& rung) { return rung.terms == terms; });
+                     [&](const Rung& rung) { return rung.terms == terms && !rung.as_promised; });
+}
+
+Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
+  const auto promised = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
+    return rung.terms == terms && rung.as_promised;
+  });
+  Rung& rung = promised != rungs.end() ? *promised : rungs.emplace_back();
+  return rung = rung_with(ladder, terms);
 }
 
 Nearby nearby(const Promise& promise, const Promise::Change& change) {

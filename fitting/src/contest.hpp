@@ -44,7 +44,12 @@ struct Neighbour {
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs);
 
+/// Whether there is a rung with these terms that is not only promised.
 [[nodiscard]] bool is_known(const Rungs& rungs, const Terms& terms);
+
+/// A rung with these terms, not fitted yet: a new one, or in the place of one that was only
+/// promised.
+[[nodiscard]] Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs);
 
 /// What a promise lets expect of one of its changes.
 [[nodiscard]] Nearby nearby(const Promise& promise, const Promise::Change& change);

@@ -92,14 +92,12 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   for (const int key : order) {
     const Terms& terms = sets.at(key);
     const Difference by = difference(terms, known.terms);
-    if (terms == known.terms || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
+    if (is_known(rungs, terms) || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
     const bool near = by.larger() || by.exchanged();
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
     const double gained = gain(*promise, change(key)) / diluted;
     if (promises_nothing(known, gained, change(key).parameters, by)) {
-      if (is_known(rungs, terms)) continue;
-      rungs.push_back(rung_with(ladder, terms));
-      take_as_promised(known, *promise, change(key), diluted, rungs.back());
+      take_as_promised(known, *promise, change(key), diluted, blank_rung(ladder, terms, rungs));
       continue;
     }
     far += near ? 0 : 1;

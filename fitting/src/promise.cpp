@@ -156,6 +156,7 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
 struct Moved {
   double moves = 0.0;
   Eigen::VectorXd wider;  // at least 1
+  Eigen::VectorXd sigma;  // afterwards, of all parameters
 };
 
 // From where `before` are zero to where only `after` are.
@@ -163,7 +164,7 @@ Moved moved(const Tangent& at, const std::set<int>& before, const std::set<int>&
             const std::set<int>& held, Known& known) {
   const Least without = least(at, before, held, known), with = least(at, after, held, known);
   const Eigen::VectorXd narrow = variances(at, before, held), wide = variances(at, after, held);
-  Moved all{0.0, Eigen::VectorXd::Ones(narrow.size())};
+  Moved all{0.0, Eigen::VectorXd::Ones(narrow.size()), wide.cwiseSqrt()};
   for (int i = 0; i < narrow.size(); ++i) {
     if (!(narrow[i] > 0.0)) continue;
     const double shift = with.step[i] - without.step[i];
@@ -235,7 +236,12 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
     if (!larger) return to_there;
     const Moved by = moved(at, added, removed, held, known);
     to_there.moves = by.moves;
-    for (int i = 0; i < by.wider.size(); ++i) to_there.wider[problem.name(i)] = by.wider[i];
+    for (int i = 0; i < by.wider.size(); ++i)
+      if (added.contains(i))
+        to_there.sigmas[problem.name(i)] =
+            std::abs(problem.free[i].transform.slope(minimum.u[i])) * by.sigma[i];
+      else
+        to_there.wider[problem.name(i)] = by.wider[i];
     return to_there;
   };
   promise.with = change({});

@@ -25,6 +25,8 @@ struct Promise {
     double moves = 0.0;
     /// How many times as wide their error bars are then, by name.
     std::map<std::string, double> wider = {};
+    /// Error bars of what is added, by name, in independent noise.
+    std::map<std::string, double> sigmas = {};
   };
   double before = 0.0;            ///< chi-square without the further losses
   Change with;                    ///< with all of them

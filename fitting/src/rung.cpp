@@ -434,6 +434,12 @@ void take_as_promised(const Rung& known, const Promise& promise, const Promise::
     if (value != change.values.end()) parameter.value = value->second;
     if (wider != change.wider.end()) parameter.sigma *= wider->second;
   }
+  const auto predictor = model::make_predictor(rung.scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (const auto sigma = change.sigmas.find(info.name); sigma != change.sigmas.end())
+      rung.fit.parameters.push_back({info.name, change.values.at(info.name),
+                                     sigma->second * std::sqrt(diluted), info.unit,
+                                     data::ParameterStatus::free, true, ""});
   rung.rolls_at_first = known.rolls_at_first;
   rung.fitted = rung.as_promised = true;
   rung.reason =

@@ -388,6 +388,12 @@ TEST_F(Promised, IsWhatIsToldOfALossThatWouldGainNothing) {
     EXPECT_NEAR(told.value, found.value, 0.5 * found.sigma) << parameter.name;
     EXPECT_NEAR(told.sigma, found.sigma, 0.5 * found.sigma) << parameter.name;
   }
+  // Without the loss itself others had taken it for nothing.
+  const data::FitParameter &told = *rung.fit.find("rolling_friction_m"),
+                           &found = *with.fit.find("rolling_friction_m");
+  EXPECT_EQ(told.unit, found.unit);
+  EXPECT_NEAR(told.value, found.value, 0.5 * found.sigma);
+  EXPECT_NEAR(told.sigma, found.sigma, 0.5 * found.sigma);
 }
 
 // A camera that a prior holds is no way out: the fit of the larger model holds it too.

@@ -1,0 +1,55 @@
+#include "contest.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "terms.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// A ring of tests/independent that rolls, held back by air and by pivoting friction.
+class Contested : public testing::Test {
+ protected:
+  [[nodiscard]] int term(const std::string& name) const {
+    for (std::size_t i = 0; i < ladder_.terms.size(); ++i)
+      if (ladder_.terms[i].name == name) return static_cast<int>(i);
+    ADD_FAILURE() << name;
+    return 0;
+  }
+  [[nodiscard]] Rung fitted(const Terms& terms) const {
+    Rung rung = rung_with(ladder_, terms);
+    fit_rung(tracks_, nullptr, nullptr, {}, rung);
+    EXPECT_TRUE(rung.fitted) << rung.reason;
+    return rung;
+  }
+
+  const std::string folder_ = TROCHOID_SOURCE_DIR "/tests/independent/cases/air_force";
+  const std::vector<data::Track> tracks_{data::read_track(folder_ + "/track.csv").tracks};
+  data::Scene scene_ = data::read_scene(folder_ + "/scene.toml");
+  Ladder ladder_ = ladder_of(scene_, false);
+  Contest contest_{ladder_, tracks_, {}};
+};
+
+// It had stayed what it promised beside a rung that was no longer the chosen one.
+TEST_F(Contested, ARungThatWasOnlyPromisedIsFittedBesideAnother) {
+  const int air = term("air force"), pivoting = term("pivoting friction");
+  Rungs rungs{fitted({pivoting}), fitted({air})};
+  Rung& promised = rungs.emplace_back(rung_with(ladder_, {air, pivoting}));
+  promised.fit = rungs[0].fit;
+  promised.fitted = promised.as_promised = true;
+  EXPECT_FALSE(is_known(rungs, promised.terms));
+  const Neighbour both{promised.terms};
+  const auto added = add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs);
+  ASSERT_EQ(added.size(), 1u);
+  EXPECT_EQ(added[0], &promised);
+  EXPECT_EQ(rungs.size(), 3u);
+  EXPECT_TRUE(is_known(rungs, promised.terms));
+  EXPECT_LT(promised.bic, rungs[1].bic);
+  EXPECT_TRUE(add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs).empty());
+}
+
+}  // namespace
+}  // namespace trochoid::fitting
