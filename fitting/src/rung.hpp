@@ -68,8 +68,12 @@ void take(Draft draft, Rung& rung);
 /// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
 /// whose own error bars count too (not where residuals hang together: those terms may follow the
 /// tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
-/// What rungs with further terms that nothing asks for would change is said, and not allowed for.
-void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit);
+/// Rungs with further terms against which BIC's evidence is strong, for their size, widen bars up
+/// to a bound; what one of them would change beyond that is said.
+/// @param usual  terms that act on nearly every body: rungs that add nothing else count without
+/// that bound, and within it where residuals hang together, too.
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
+                      const Terms& usual = {});
 
 /// Whether a rung's verdict is not that its path is only followed or not even that, and what is
 /// left looks like noise or hardly exceeds the track's own: then it hangs together for the tracker.

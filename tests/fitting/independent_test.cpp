@@ -32,13 +32,14 @@ Comparison comparison_of(const std::string& name) {
 }
 
 constexpr double kSigmas = 4.0;
+constexpr double kTelling = 0.25;  // of a value, with all that other losses may change
 
 void expect_found(const data::Fit& fit, const std::map<std::string, double>& truth) {
   for (const auto& [name, value] : truth) {
     const data::FitParameter* parameter = fit.find(name);
     ASSERT_NE(parameter, nullptr) << name;
     EXPECT_NEAR(parameter->value, value, kSigmas * parameter->sigma) << name;
-    EXPECT_LT(parameter->sigma, 0.2 * value) << name;
+    EXPECT_LT(parameter->sigma, kTelling * value) << name;
   }
 }
 
@@ -150,8 +151,8 @@ TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {
   EXPECT_NEAR(pivoting->value, 1.738388747900978e-05, 2.0 * pivoting->sigma);
 }
 
-// Filmed and tracked, too. Taken to roll first and to slide later under Coulomb's law, which follows
-// the track to 1.6 times its noise, its friction had been 150 error bars off.
+// Filmed and tracked, too. Taken to roll first and to slide later under Coulomb's law, which
+// follows the track to 1.6 times its noise, its friction had been 150 error bars off.
 TEST(Independent, ABodyThatCreepsAllTheTimeIsNotTakenToRollFirst) {
   const Comparison found = comparison_of("creeps");
   EXPECT_EQ(found.fit.model, "sliding");

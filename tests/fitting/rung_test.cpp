@@ -247,6 +247,55 @@ TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold)
       "+- 0.5; the 1 +- 0.25 given here is away from that by 4 times its own error bar");
 }
 
+// An air couple, of which none fitted best, and on the size of which a filmed ring's pivoting
+// friction hung: reported twice as large as it was, at 5.9 of its error bars.
+TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsAsFarAsItGoes) {
+  std::vector<data::FitParameter> with{loss("pivoting_friction_m", 5.0, 2.4),
+                                       loss("air_N_m_s", 0.0, 6.0)};
+  Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, std::move(with), 104.0, 112.0)};
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit unusual = rungs[0].fit, usual = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], unusual, {1});
+  allow_for_rivals(rungs, rungs[0], usual, {1, 2});
+  const double weight = std::exp(-2.0) / (1.0 + std::exp(-2.0));  // by AICc
+  EXPECT_NEAR(unusual.parameters[0].sigma, 0.25, 1e-12);
+  EXPECT_NEAR(usual.parameters[0].sigma, std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * 2.4 * 2.4),
+              1e-12);
+}
+
+TEST(Rivals, WithATermThatUsuallyActsCountWithinBoundsWhereResidualsHangTogether) {
+  Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, {loss("rolling_friction_m", 0.9, 0.11), loss("air_N_m_s", 0.1, 0.1)},
+                      103.0, 111.0),
+              rung_of({1, 3}, {loss("rolling_friction_m", 0.4, 0.9), loss("gap_Pa_s", 0.1, 0.1)},
+                      102.0, 106.0)};
+  rungs[0].fit.whiteness_p = 1e-6;
+  const double weight = std::exp(-1.5) / (1.0 + std::exp(-1.5));
+  data::Fit little = rungs[0].fit, much = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], little, {1, 2});
+  EXPECT_NEAR(little.parameters[0].sigma,
+              std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.11 * 0.11 + 0.1 * 0.1)), 1e-12);
+  rungs[1].fit.parameters[0].sigma = 5.0;
+  allow_for_rivals(rungs, rungs[0], much, {1, 2});
+  EXPECT_NEAR(much.parameters[0].sigma, 0.25, 1e-12);
+}
+
+// Nothing moves where none of the further loss fits best, and still it leaves another one open.
+TEST(Rivals, WithATermThatLeavesAnotherOneOpenAreTold) {
+  Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, {loss("pivoting_friction_m", 5.0, 2.4), loss("air_N_m_s", 0.0, 6.0)},
+                      104.0, 112.0)};
+  rungs[0].fit.whiteness_p = 0.5;
+  rungs[1].name = "with air";
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit);
+  ASSERT_EQ(fit.warnings.size(), 2u);
+  EXPECT_EQ(fit.warnings[1],
+            "with air is neither needed nor ruled out: with it, pivoting_friction_m would be 5 +- "
+            "2.4; the 5 +- 0.25 given here is what holds without it");
+}
+
 // Full error bars are had for the chosen one alone: like is compared with like.
 TEST(Rivals, AddAsMuchToAnErrorBarThatIsWiderForOtherReasons) {
   Rungs rungs{

@@ -28,9 +28,10 @@ struct Comparison {
 /// judged by AICc and BIC (both allow for residuals that hang together), whiteness of residuals and
 /// the prediction of the last third of the track from the first two. Recommended is the rung with
 /// the fewest parameters within 6 of the least BIC; its error bars allow for what rungs with other
-/// terms that are not ruled out make of its parameters, and for those with further terms within 6
-/// of its BIC where its residuals are white. Where the fitted ring or disc turns retrograde, the
-/// recommendation says which losses explain that and whether the track can tell.
+/// terms that are not ruled out make of its parameters, and for those with further terms where its
+/// residuals are white, in full within 6 of its BIC or where these terms act on nearly every body.
+/// Where the fitted ring or disc turns retrograde, the recommendation says which losses explain
+/// that and whether the track can tell.
 /// @throws InputError as fit() does for the model without losses; for names under [fit] that none
 ///         of the models has.
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
