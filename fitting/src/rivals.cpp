@@ -34,8 +34,7 @@ bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual
 // Those that may be right as well, or those against which there is strong evidence, but only for
 // being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
 // where residuals hang together, as a further term may then only follow the tracker's errors; but
-// those do for which BIC speaks, though not strongly, all the same, and, within bounds, those whose
-// further terms act on nearly every body.
+// those do for which BIC speaks, though not strongly, all the same.
 std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms& usual,
                              bool too_large) {
   const bool white = chosen.fit.whiteness_p >= kWhite;
@@ -45,12 +44,11 @@ std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms
     const bool larger = has_all_terms_of(rung, chosen);
     const bool acts = adds_what_is_usual(rung, chosen, usual);
     const bool trusted = white || rung.bic < chosen.bic;
-    if (!in_question(rung, chosen) || (larger && !trusted && !acts) ||
+    if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
     const double lead = larger && !too_large ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
-    rivals.push_back(
-        {&rung, std::exp(0.5 * lead), larger, larger && (!trusted || (too_large && !acts))});
+    rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});
     all += rivals.back().weight;
   }
   for (Rival& rival : rivals) rival.weight /= all;

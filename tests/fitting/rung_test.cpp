@@ -264,23 +264,6 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsAsFarAsItGoes) {
               1e-12);
 }
 
-TEST(Rivals, WithATermThatUsuallyActsCountWithinBoundsWhereResidualsHangTogether) {
-  Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
-              rung_of({1, 2}, {loss("rolling_friction_m", 0.9, 0.11), loss("air_N_m_s", 0.1, 0.1)},
-                      103.0, 111.0),
-              rung_of({1, 3}, {loss("rolling_friction_m", 0.4, 0.9), loss("gap_Pa_s", 0.1, 0.1)},
-                      102.0, 106.0)};
-  rungs[0].fit.whiteness_p = 1e-6;
-  const double weight = std::exp(-1.5) / (1.0 + std::exp(-1.5));
-  data::Fit little = rungs[0].fit, much = rungs[0].fit;
-  allow_for_rivals(rungs, rungs[0], little, {1, 2});
-  EXPECT_NEAR(little.parameters[0].sigma,
-              std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * (0.11 * 0.11 + 0.1 * 0.1)), 1e-12);
-  rungs[1].fit.parameters[0].sigma = 5.0;
-  allow_for_rivals(rungs, rungs[0], much, {1, 2});
-  EXPECT_NEAR(much.parameters[0].sigma, 0.25, 1e-12);
-}
-
 // Nothing moves where none of the further loss fits best, and still it leaves another one open.
 TEST(Rivals, WithATermThatLeavesAnotherOneOpenAreTold) {
   Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
