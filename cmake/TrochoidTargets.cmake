@@ -21,12 +21,13 @@ endif()
 # trochoid_module(NAME): library trochoid::NAME from NAME/src/*.cpp with public headers below
 # NAME/include. Sources are globbed: a file in the folder is a file of the module.
 function(trochoid_module name)
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)
   add_library(trochoid_${name} STATIC ${sources})
   add_library(trochoid::${name} ALIAS trochoid_${name})
   target_sources(trochoid_${name} PUBLIC FILE_SET HEADERS
     BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR}/include FILES ${headers})
+  target_include_directories(trochoid_${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
   target_compile_features(trochoid_${name} PUBLIC cxx_std_20)
   target_link_libraries(trochoid_${name} PRIVATE $<BUILD_INTERFACE:trochoid_warnings>)
   set_target_properties(trochoid_${name} PROPERTIES

@@ -1,9 +1,9 @@
-#include "attitude_sequence.hpp"
+#include "link/attitude_sequence.hpp"
 
 #include <Eigen/Geometry>
 
+#include "geometry/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
-#include "pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -1,9 +1,9 @@
-#include "background.hpp"
+#include "find/background.hpp"
 
 #include <gtest/gtest.h>
 
 #include "drawn_clip.hpp"
-#include "silhouette.hpp"
+#include "find/silhouette.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -1,9 +1,9 @@
-#include "cast_shadow.hpp"
+#include "find/cast_shadow.hpp"
 
 #include <gtest/gtest.h>
 
 #include "drawn_shadow.hpp"
-#include "transfer_curve.hpp"
+#include "edges/transfer_curve.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {

@@ -1,4 +1,4 @@
-#include "chroma_site.hpp"
+#include "link/chroma_site.hpp"
 
 #include <gtest/gtest.h>
 

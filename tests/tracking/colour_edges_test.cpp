@@ -1,4 +1,4 @@
-#include "colour_edges.hpp"
+#include "edges/colour_edges.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "background.hpp"
-#include "body_finder.hpp"
-#include "contour.hpp"
 #include "drawn_clip.hpp"
+#include "find/background.hpp"
+#include "find/body_finder.hpp"
+#include "geometry/contour.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
 
 namespace trochoid::tracking {

@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "cast_shadow.hpp"
-#include "pose_motion.hpp"
+#include "find/cast_shadow.hpp"
+#include "geometry/pose_motion.hpp"
 
 namespace trochoid::tracking {
 

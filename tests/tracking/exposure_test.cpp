@@ -1,12 +1,12 @@
-#include "exposure.hpp"
+#include "geometry/exposure.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "colour_window.hpp"
 #include "drawn_clip.hpp"
+#include "edges/colour_window.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
 
 namespace trochoid::tracking {

@@ -1,4 +1,4 @@
-#include "follower.hpp"
+#include "find/follower.hpp"
 
 #include <gtest/gtest.h>
 

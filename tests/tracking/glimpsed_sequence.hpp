@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "glimpse.hpp"
+#include "link/glimpse.hpp"
 
 namespace trochoid::tracking {
 

@@ -1,4 +1,4 @@
-#include "luma.hpp"
+#include "decode/luma.hpp"
 
 #include <gtest/gtest.h>
 

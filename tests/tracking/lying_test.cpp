@@ -1,4 +1,4 @@
-#include "lying.hpp"
+#include "link/lying.hpp"
 
 #include <algorithm>
 #include <memory>

@@ -1,7 +1,7 @@
-#include "neighbours.hpp"
+#include "link/neighbours.hpp"
 
+#include "geometry/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
-#include "pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -9,9 +9,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "arrow_system.hpp"
 #include "drawn_clip.hpp"
-#include "edge_stretch.hpp"
+#include "edges/edge_stretch.hpp"
+#include "pose/arrow_system.hpp"
 
 namespace trochoid::tracking {
 namespace {

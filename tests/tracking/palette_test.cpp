@@ -1,4 +1,4 @@
-#include "palette.hpp"
+#include "find/palette.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "path_outliers.hpp"
+#include "link/path_outliers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "path_scatter.hpp"
+#include "link/path_scatter.hpp"
 
 #include <gtest/gtest.h>
 

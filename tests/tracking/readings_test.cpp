@@ -1,8 +1,8 @@
-#include "readings.hpp"
+#include "link/readings.hpp"
 
+#include "geometry/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
-#include "pose_motion.hpp"
-#include "pose_start.hpp"
+#include "pose/pose_start.hpp"
 
 namespace trochoid::tracking {
 namespace {

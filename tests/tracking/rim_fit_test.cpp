@@ -1,4 +1,4 @@
-#include "rim_fit.hpp"
+#include "find/rim_fit.hpp"
 
 #include <gtest/gtest.h>
 

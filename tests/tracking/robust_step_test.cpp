@@ -1,4 +1,4 @@
-#include "robust_step.hpp"
+#include "pose/robust_step.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "shading_prior.hpp"
+#include "edges/shading_prior.hpp"
 
 #include <gtest/gtest.h>
 

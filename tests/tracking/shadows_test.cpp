@@ -1,11 +1,11 @@
-#include "shadows.hpp"
+#include "link/shadows.hpp"
 
 #include <gtest/gtest.h>
 
-#include "attitude_sequence.hpp"
 #include "drawn_shadow.hpp"
+#include "edges/transfer_curve.hpp"
 #include "glimpsed_sequence.hpp"
-#include "transfer_curve.hpp"
+#include "link/attitude_sequence.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -1,4 +1,4 @@
-#include "stretch_kernel.hpp"
+#include "edges/stretch_kernel.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "normal_table.hpp"
+#include "edges/normal_table.hpp"
 
 namespace trochoid::tracking::stretch {
 

@@ -1,4 +1,4 @@
-#include "track_assembly.hpp"
+#include "link/track_assembly.hpp"
 
 #include <gtest/gtest.h>
 

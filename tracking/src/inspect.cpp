@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "body_search.hpp"
-#include "path_motion.hpp"
-#include "recording.hpp"
+#include "find/body_search.hpp"
+#include "find/recording.hpp"
+#include "link/path_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/tracking/tracker.hpp"
 

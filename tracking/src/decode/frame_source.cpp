@@ -1,0 +1,276 @@
+#include "trochoid/tracking/frame_source.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "decode/image_sequence.hpp"
+#include "decode/libav_handles.hpp"
+#include "decode/luma.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool before(const std::optional<data::Moment>& from, const Frame& frame) {
+  return from && ((from->frame && frame.index < *from->frame) ||
+                  (from->t_s && frame.t_s < *from->t_s - 1e-9));
+}
+
+bool after(const std::optional<data::Moment>& to, const Frame& frame) {
+  return to &&
+         ((to->frame && frame.index > *to->frame) || (to->t_s && frame.t_s > *to->t_s + 1e-9));
+}
+
+/// Counter-clockwise quarter turns that make the picture upright, 0..3.
+int quarter_turns(const AVStream& stream) {
+  const auto* matrix = reinterpret_cast<const std::int32_t*>(
+      av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+  if (matrix == nullptr) return 0;
+  const double angle_deg = av_display_rotation_get(matrix);  // counter-clockwise, may be NaN
+  if (!std::isfinite(angle_deg)) return 0;
+  return ((static_cast<int>(std::lround(angle_deg / 90.0)) % 4) + 4) % 4;
+}
+
+void turn(cv::Mat& image, int quarters) {
+  if (quarters == 0 || image.empty()) return;
+  const int code[] = {0, cv::ROTATE_90_COUNTERCLOCKWISE, cv::ROTATE_180, cv::ROTATE_90_CLOCKWISE};
+  cv::Mat turned;
+  cv::rotate(image, turned, code[quarters]);
+  image = turned;
+}
+
+/// Rate at which a phone says it filmed; slow motion is stored at a lower one.
+std::optional<double> capture_rate_hz(const AVFormatContext& container) {
+  const AVDictionaryEntry* entry =
+      av_dict_get(container.metadata, "com.android.capture.fps", nullptr, 0);
+  if (entry == nullptr) return std::nullopt;
+  const double rate = std::strtod(entry->value, nullptr);
+  return rate > 0.0 ? std::optional(rate) : std::nullopt;
+}
+
+/// A file or an image sequence through libavformat and libavcodec.
+class LibavSource final : public FrameSource {
+ public:
+  LibavSource(const fs::path& path, const SourceOptions& options)
+      : name_(path.string()),
+        options_(options),
+        window_(data::parse_window(options.from, options.to)) {
+    av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
+    open_container(path);
+    open_decoder();
+    describe();
+  }
+
+  [[nodiscard]] const VideoInfo& info() const override { return info_; }
+
+  [[nodiscard]] std::optional<Frame> next() override {
+    while (!finished_) {
+      if (!decode_one()) break;
+      Frame frame{.luma = {}, .bgr = {}, .index = frames_read_++, .t_s = 0.0, .damaged = false};
+      frame.t_s = presentation_time_s(frame.index);
+      if (after(window_.to, frame)) {
+        finished_ = true;
+        return std::nullopt;
+      }
+      if (before(window_.from, frame)) continue;
+      convert(frame);
+      return frame;
+    }
+    if (!finished_) check_whole();
+    finished_ = true;
+    return std::nullopt;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError(fmt::format("{}: {}", name_, what));
+  }
+
+  void open_container(const fs::path& path) {
+    const ImageSequence sequence = find_image_sequence(path);
+    if (!sequence.is_sequence()) {
+      if (!fs::exists(path)) fail("no such file");
+      if (fs::is_regular_file(path) && fs::file_size(path) == 0) fail("the file is empty");
+    } else if (!options_.frame_rate_hz) {
+      fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
+    }
+    container_ = open_input(sequence, options_.frame_rate_hz, name_);
+    if (const int status = avformat_find_stream_info(container_.get(), nullptr); status < 0)
+      fail(fmt::format("not a readable video ({})", libav_words(status)));
+  }
+
+  void open_decoder() {
+    const AVCodec* codec = nullptr;
+    const int best = av_find_best_stream(container_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+    if (best == AVERROR_STREAM_NOT_FOUND) fail("holds no pictures (sound or text only)");
+    if (best == AVERROR_DECODER_NOT_FOUND) fail("no decoder for its video codec");
+    if (best < 0) fail(libav_words(best));
+    stream_ = container_->streams[best];
+    for (unsigned i = 0; i < container_->nb_streams; ++i)
+      if (static_cast<int>(i) != best) container_->streams[i]->discard = AVDISCARD_ALL;
+    decoder_.reset(avcodec_alloc_context3(codec));
+    avcodec_parameters_to_context(decoder_.get(), stream_->codecpar);
+    decoder_->thread_count = options_.decoder_threads;
+    decoder_->flags |= AV_CODEC_FLAG_OUTPUT_CORRUPT;  // handed out, marked damaged
+    decoder_->pkt_timebase = stream_->time_base;
+    if (options_.key_frames_only) decoder_->skip_frame = AVDISCARD_NONKEY;
+    if (const int status = avcodec_open2(decoder_.get(), codec, nullptr); status < 0)
+      fail(fmt::format("cannot decode it ({})", libav_words(status)));
+    packet_.reset(av_packet_alloc());
+    picture_.reset(av_frame_alloc());
+  }
+
+  void describe() {
+    quarters_ = quarter_turns(*stream_);
+    info_.width_px = decoder_->width;
+    info_.height_px = decoder_->height;
+    if (info_.width_px <= 0 || info_.height_px <= 0) fail("no picture size: not a readable video");
+    if (quarters_ % 2 == 1) std::swap(info_.width_px, info_.height_px);
+    const double average = av_q2d(stream_->avg_frame_rate), base = av_q2d(stream_->r_frame_rate);
+    const bool has_average = std::isfinite(average) && average > 0.0;
+    info_.frame_rate_hz = has_average ? average : (std::isfinite(base) ? base : 0.0);
+    info_.variable_rate =
+        has_average && std::isfinite(base) && std::abs(average - base) > 0.02 * base;
+    if (options_.frame_rate_hz) {
+      if (!(*options_.frame_rate_hz > 0.0)) fail("the frame rate must be positive");
+      info_.frame_rate_hz = *options_.frame_rate_hz;
+      info_.variable_rate = false;
+    }
+    info_.capture_rate_hz = capture_rate_hz(*container_);
+    info_.frames = stream_->nb_frames;
+    info_.codec = avcodec_get_name(decoder_->codec_id);
+  }
+
+  /// Next picture into picture_; false at the end of the stream.
+  bool decode_one() {
+    while (true) {
+      const int status = avcodec_receive_frame(decoder_.get(), picture_.get());
+      if (status == 0) return true;
+      if (status == AVERROR_EOF) return false;
+      if (status != AVERROR(EAGAIN)) ++decode_errors_;
+      if (!feed()) return false;
+    }
+  }
+
+  /// One more packet, or the flush at the end, into the decoder; false when flushed before.
+  bool feed() {
+    if (flushing_) return false;
+    while (true) {
+      const int status = av_read_frame(container_.get(), packet_.get());
+      if (status < 0) {
+        if (status != AVERROR_EOF) read_error_ = libav_words(status);
+        flushing_ = true;
+        avcodec_send_packet(decoder_.get(), nullptr);
+        return true;
+      }
+      const bool ours = packet_->stream_index == stream_->index;
+      const bool wanted = ours && (!options_.key_frames_only || (packet_->flags & AV_PKT_FLAG_KEY));
+      if (wanted && avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;
+      av_packet_unref(packet_.get());
+      if (wanted) return true;
+    }
+  }
+
+  /// Time since the first picture: the stamp in the file, or index / rate when overridden.
+  double presentation_time_s(std::int64_t index) {
+    if (options_.frame_rate_hz) return static_cast<double>(index) / *options_.frame_rate_hz;
+    std::int64_t stamp = picture_->best_effort_timestamp;
+    if (stamp == AV_NOPTS_VALUE) {
+      if (!(info_.frame_rate_hz > 0.0))
+        fail("carries no time stamps; give its rate (rate, or camera.frame_rate_hz)");
+      return static_cast<double>(index) / info_.frame_rate_hz;
+    }
+    if (first_stamp_ == AV_NOPTS_VALUE) first_stamp_ = stamp;
+    last_stamp_ = stamp;
+    return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
+  }
+
+  void convert(Frame& frame) {
+    if (picture_->width != decoder_->width || picture_->height != decoder_->height ||
+        picture_->width * picture_->height != info_.width_px * info_.height_px)
+      fail(fmt::format("frame {}: the picture size changes to {} x {}", frame.index,
+                       picture_->width, picture_->height));
+    frame.damaged =
+        (picture_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture_->decode_error_flags != 0;
+    frame.luma = luma_of(*picture_, scaler_);
+    if (options_.colour) frame.bgr = bgr_of(*picture_, colour_scaler_);
+    if (options_.chroma) frame.chroma = chroma_of(*picture_);
+    turn(frame.luma, quarters_);
+    turn(frame.chroma, quarters_);
+    turn(frame.bgr, quarters_);
+  }
+
+  /// A file cut short ends like a whole one; only the promised number of frames tells. Edit lists
+  /// and open groups of pictures may honestly hide a few frames, so a handful is forgiven.
+  void check_whole() const {
+    if (frames_read_ == 0) fail("holds no decodable picture");
+    if (options_.key_frames_only) return;
+    const std::int64_t missing = info_.frames - frames_read_;
+    const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
+    if (cut || (!read_error_.empty() && missing > 0))
+      fail(fmt::format(
+          "breaks off after frame {} of {}{}; copy the whole file, or stop earlier (to)",
+          frames_read_ - 1, info_.frames, read_error_.empty() ? "" : " (" + read_error_ + ")"));
+    check_length();
+  }
+
+  /// Containers that do not count frames may promise a length (Matroska); with sound beside the
+  /// pictures it may be the sound's.
+  void check_length() const {
+    const bool promised = info_.frames == 0 && container_->nb_streams == 1 &&
+                          container_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM &&
+                          container_->duration != AV_NOPTS_VALUE && !options_.frame_rate_hz &&
+                          first_stamp_ != AV_NOPTS_VALUE && info_.frame_rate_hz > 0.0;
+    if (!promised) return;
+    const double length_s = static_cast<double>(container_->duration) / AV_TIME_BASE;
+    const double read_s =
+        static_cast<double>(last_stamp_ - first_stamp_) * av_q2d(stream_->time_base);
+    const double forgiven_s = std::max(3.0 / info_.frame_rate_hz, 0.02 * length_s);
+    if (length_s - read_s > forgiven_s)
+      fail(fmt::format(
+          "breaks off at {:.3f} s of {:.3f} s; copy the whole file, or stop earlier (to)", read_s,
+          length_s));
+  }
+
+  std::string name_;
+  SourceOptions options_;
+  data::Window window_;
+  InputHandle container_;
+  DecoderHandle decoder_;
+  PacketHandle packet_;
+  PictureHandle picture_;
+  Scaler scaler_, colour_scaler_;
+  AVStream* stream_ = nullptr;
+  VideoInfo info_;
+  int quarters_ = 0;
+  std::int64_t frames_read_ = 0;
+  std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
+  std::int64_t decode_errors_ = 0;
+  std::string read_error_;
+  bool flushing_ = false, finished_ = false;
+};
+
+}  // namespace
+
+std::string sha256_of_recording(const fs::path& path) {
+  const ImageSequence sequence = find_image_sequence(path);
+  if (!sequence.is_sequence()) return data::sha256_of_file(path);
+  std::string list;
+  for (const fs::path& picture : pictures_of(sequence))
+    list += data::sha256_of_file(picture) + "\n";
+  return data::sha256_of_text(list);
+}
+
+std::unique_ptr<FrameSource> open_video(const fs::path& path, const SourceOptions& options) {
+  return std::make_unique<LibavSource>(path, options);
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,3 @@
+// For every machine.
+#define TROCHOID_STRETCH_ISA isa_baseline
+#include "edges/stretch_kernel_run.hpp"

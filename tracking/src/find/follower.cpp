@@ -1,0 +1,316 @@
+#include "find/follower.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "find/body_search.hpp"
+#include "find/silhouette.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kFaint = 0.5;  // of what usually speaks for the body
+
+cv::Rect box_around(const Eigen::Vector2d& centre_px, double half_px, const cv::Size& picture) {
+  const cv::Rect box(static_cast<int>(centre_px.x() - half_px),
+                     static_cast<int>(centre_px.y() - half_px), static_cast<int>(2 * half_px) + 1,
+                     static_cast<int>(2 * half_px) + 1);
+  return box & cv::Rect({}, picture);
+}
+
+bool inside(const Eigen::Vector2d& p, const cv::Size& picture, double margin_px) {
+  return p.x() > -margin_px && p.y() > -margin_px && p.x() < picture.width + margin_px &&
+         p.y() < picture.height + margin_px;
+}
+
+bool is_other(const Eigen::Vector2d& centre_px, const Follower::Others& others) {
+  return std::any_of(others.begin(), others.end(), [&](const auto& other) {
+    return (centre_px - other.first).norm() < 0.8 * other.second;
+  });
+}
+
+// What the angle of a mark is wrong by because it is read about the middle of the rim: a rim is cut
+// round what turns to about a hundredth of its radius, and is measured to so much. Of two opposite
+// marks one goes forward where the other goes back.
+double centring_rad(const Sighting& seen, const SpinProfile& marks) {
+  constexpr double kEccentric = 0.01, kMarkRadius = 0.7;  // of the radius of the rim
+  if (marks.two_fold()) return 0.0;
+  const double radius_px = std::max(1.0, seen.rim.semi_major_px());
+  return std::hypot(kEccentric, std::sqrt(0.5 * seen.covariance_px2.trace()) / radius_px) /
+         kMarkRadius;
+}
+
+}  // namespace
+
+Follower::Follower(const BodyFinder& finder, const Background& background,
+                   std::shared_ptr<const SpinProfile> marks)
+    : finder_(finder), background_(background), marks_(std::move(marks)), forecast_(finder) {}
+
+void Follower::start(const Frame& frame, const Sighting& seen) {
+  forecast_.start(frame.t_s, seen);
+  usual_major_px_ = seen.rim.semi_major_px();
+  usual_accepted_ = seen.accepted;
+  usual_ = seen.evidence;
+  usual_clarity_ = clarity(seen);
+  usual_evidence_ = seen.pose ? seen.pose->evidence : 0.0;
+  mean_shape_px_ = seen.rim.shape_px;
+  shape_scatter_px_ = 1.0;
+  palette_ = {};
+  palette_.learn(seen.evidence.face, background_.gain(frame.luma));
+  lost_ = strange_ = faint_ = 0;
+}
+
+void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
+  if (seen.empty()) return;
+  forecast_.start(seen.front().first, seen.front().second);
+  for (std::size_t i = 1; i < seen.size(); ++i) forecast_.add(seen[i].first, seen[i].second, true);
+}
+
+/// Evidence for a sighting compared with what is usual for this body here: about 1 when all of it
+/// is seen.
+double Follower::wholeness(const Sighting& seen) const {
+  constexpr double kLeastUsual = 0.05;
+  const double cover = seen.evidence.cover / std::max(usual_.cover, kLeastUsual);
+  const double edges = seen.evidence.edges / std::max(usual_.edges, kLeastUsual);
+  // Where the background knows nothing of the body (it never left), neither says anything.
+  if (usual_.cover < 0.3) return edges;
+  return std::min(cover, edges);
+}
+
+/// How much speaks for a sighting compared with what is usual for this body here: far less for what
+/// hides it.
+double Follower::clearness(const Sighting& seen) const {
+  constexpr double kLeastUsual = 1e-6;
+  const double of_outline = seen.accepted / std::max(usual_accepted_, kLeastUsual);
+  return seen.pose ? of_outline * seen.pose->evidence / std::max(usual_evidence_, kLeastUsual)
+                   : of_outline;
+}
+
+/// A partly hidden body and a fit gone astray look alike by their evidence; what tells them apart
+/// is that the hidden body is where it was expected. What has other colours is the body only where
+/// its outline is plainly seen, or for a few frames where it was expected: not what hides it. Nor
+/// is a body that was lost found again in what little speaks for.
+bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double reach_px) const {
+  constexpr double kWhole = 0.75, kLeast = 0.35;
+  if (seen.accepted < std::max(0.25, 0.4 * usual_accepted_)) return false;
+  const double ratio = seen.rim.semi_major_px() / usual_major_px_;
+  if (ratio < 0.7 || ratio > 1.4) return false;
+  if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
+  constexpr int kMostStrange = 3;
+  constexpr double kPlainly = 0.7;
+  const double clear = clearness(seen);
+  const bool strange = clear < kPlainly && !palette_.fits(seen.evidence.face, gain_);
+  if (strange && (lost_ > 0 || strange_ >= kMostStrange)) return false;
+  const bool may_be_what_hides_it = strange || (lost_ > 0 && clear < kFaint);
+  const double whole = may_be_what_hides_it ? std::min(kLeast, wholeness(seen)) : wholeness(seen);
+  const double surprise = forecast_.surprise_px();
+  const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
+  if (whole >= kWhole) return lost_ > 3 || apart_px(seen, predicted) < far;
+  const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * lost_;
+  return whole >= kLeast && apart_px(seen, predicted) < near;
+}
+
+/// A body that lies flat keeps its outline: when the shapes seen hardly scatter, their mean is
+/// known far better than one frame tells, and partly hidden or touching bodies are measured with
+/// it.
+void Follower::set_shape_knowledge(Look& look, Sighting& guess) const {
+  const double size = guess.rim.semi_major_px();
+  if (shape_scatter_px_ < 0.1 + 0.005 * size) {
+    guess.rim.shape_px = mean_shape_px_;
+    look.shape_sigma_px = std::max(0.02, 0.3 * shape_scatter_px_);
+  } else {
+    look.shape_sigma_px = std::clamp(1.5 * shape_surprise_px_, 0.06 + 0.002 * size, 0.3 * size);
+  }
+}
+
+std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& expected,
+                                          double reach_px) {
+  Sighting guess = expected;
+  const double size = guess.rim.semi_major_px();
+  const cv::Rect box = box_around(guess.centre_px, 1.6 * size + reach_px + 12.0, frame.luma.size());
+  if (box.width < 8 || box.height < 8) return std::nullopt;
+  background_.scaled_into(plate_, gain_, box);
+  Look look{.frame = frame, .background = plate_};
+  look.predicted = &guess;
+  look.reach_px = reach_px;
+  set_shape_knowledge(look, guess);
+  if (lost_ == 0) look.last = &forecast_.last();
+  look.motion_px = guess.centre_px - forecast_.last().centre_px;
+  auto seen = finder_.find(look);
+  if (!seen || !plausible(*seen, guess, reach_px + 0.3 * size)) return std::nullopt;
+  return seen;
+}
+
+/// The body turns so fast that predictions of its attitude mean little, or the picture speaks for
+/// this one far less than it usually does.
+bool Follower::misgiving(const Sighting& seen) const {
+  constexpr double kFast = 0.15, kLittle = 0.7;
+  if (!seen.pose) return false;
+  return forecast_.surprise_px() > kFast * usual_major_px_ ||
+         seen.pose->evidence < kLittle * usual_evidence_;
+}
+
+/// Where it should be if it goes on as before; if little of it is seen there, also where it would
+/// be had it gone on otherwise or been slowed by half (an impact), and the best of these counts.
+std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& predicted,
+                                            const Others& others) {
+  constexpr double kClearlySeen = 0.85;
+  const double largest = std::max(4.0, 0.6 * predicted.rim.semi_minor_px());
+  const double reach = std::clamp(2.0 + 3.0 * forecast_.surprise_px() + lost_, 2.5, largest);
+  std::optional<Sighting> best = look_at(frame, predicted, reach);
+  if (best && is_other(best->centre_px, others)) best.reset();
+  if (best && wholeness(*best) > kClearlySeen && best->accepted > 0.8 * usual_accepted_)
+    return best;
+  if (lost_ > 2) return best;
+  std::vector<Sighting> guesses = forecast_.alternatives(frame.t_s);
+  Sighting slowed = predicted;
+  slowed.rim.centre_px = slowed.centre_px =
+      0.5 * (forecast_.last().centre_px + predicted.centre_px);
+  if (!predicted.pose && apart_px(slowed, predicted) > 1.0) guesses.push_back(slowed);
+  const auto worth = [&](const Sighting& s) { return s.accepted * std::min(1.0, wholeness(s)); };
+  for (const Sighting& guess : guesses) {
+    auto seen = look_at(frame, guess, std::max(reach, 0.3 * guess.rim.semi_minor_px()));
+    if (seen && !is_other(seen->centre_px, others) && (!best || worth(*seen) > worth(*best) + 0.05))
+      best = std::move(seen);
+  }
+  return best;
+}
+
+/// A body found without a prediction was taken for still while the shutter was open. What turns
+/// fast is seen for what it is, and where it is, only by one who allows for its motion.
+Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const {
+  const auto earlier = forecast_.one_frame_before(found);
+  if (!earlier) return found;
+  const auto speaks = [](const Sighting& s) { return s.accepted * s.pose->evidence; };
+  Look look{.frame = frame, .background = plate_};
+  look.predicted = &found;
+  look.last = &*earlier;
+  look.motion_px = found.centre_px - earlier->centre_px;
+  auto again = finder_.find(look);
+  return again && speaks(*again) > speaks(found) ? *again : found;
+}
+
+std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
+                                             const Others& others) {
+  const double size = usual_major_px_;
+  // The longer it has been lost, the farther it may have gone; after a while, anywhere. What
+  // has been faint for as long may be what hides it, left behind in its place.
+  const int astray = std::max(lost_, faint_);
+  const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
+  // Of a body seen once the speed is not known; one that rolls goes its size in a frame or two.
+  constexpr double kUnknown = 2.0;
+  const double reach = forecast_.knows_speed() ? 0.5 * size + 0.5 * speed + 0.25 * size * astray
+                                               : kUnknown * size * (1.0 + astray);
+  const double gate = astray > 30 ? 1e9 : reach;
+  cv::Rect box = gate > 1e8 ? cv::Rect({}, frame.luma.size())
+                            : box_around(predicted.centre_px, gate + 2.2 * size, frame.luma.size());
+  if (box.width < 8 || box.height < 8) return std::nullopt;
+  background_.scaled_into(plate_, gain_, box);
+  Look look{.frame = frame, .background = plate_};
+  struct Candidate {
+    double score;
+    Detection detection;
+  };
+  std::vector<Candidate> candidates;
+  const auto consider = [&](const Silhouette& body, double favour) {
+    const Detection& d = body.detection;
+    if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) return;
+    if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others)) return;
+    const double off = std::log(d.semi_major_px / size) / 0.2;
+    candidates.push_back({favour * likeness(body, finder_) * std::exp(-0.5 * off * off), d});
+  };
+  constexpr double kInItsColours = 2.0;
+  for (const Silhouette& body : find_bodies(frame, plate_, box)) consider(body, 1.0);
+  for (const Silhouette& body : find_coloured_like(palette_, gain_, frame, plate_, box))
+    consider(body, kInItsColours);
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  constexpr std::size_t kMostTries = 3;
+  constexpr double kLeastEvidence = 0.55;
+  if (candidates.size() > kMostTries) candidates.resize(kMostTries);
+  std::optional<Sighting> best;
+  for (const Candidate& candidate : candidates) {
+    look.detection = candidate.detection;
+    auto seen = finder_.find(look);
+    if (seen) seen = as_it_moves(frame, *seen);
+    if (!seen || seen->accepted < std::min(0.5, 0.7 * usual_accepted_) ||
+        clarity(*seen) < 0.5 * usual_clarity_)
+      continue;
+    if (seen->pose && seen->pose->evidence < kLeastEvidence * usual_evidence_) continue;
+    if (wholeness(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
+        is_other(seen->centre_px, others))
+      continue;
+    if (!best || clarity(*seen) > clarity(*best)) best = std::move(seen);
+  }
+  return best;
+}
+
+void Follower::read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const {
+  if (!marks_) return;
+  const double window = lost_ > 3 ? std::numbers::pi : 0.6;
+  if (const auto turned = marks_->read(frame.luma, seen.rim, predicted_rad, window)) {
+    seen.turned_rad = turned->angle_rad;
+    seen.turned_sigma_rad = std::hypot(turned->sigma_rad, centring_rad(seen, *marks_));
+  }
+}
+
+/// Learns from a sighting how far predictions miss and what the body usually looks like.
+void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predicted) {
+  constexpr double kLearn = 0.1;
+  const bool whole = wholeness(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
+  const double shape_off = (seen.rim.shape_px - predicted.rim.shape_px).norm();
+  strange_ = palette_.fits(seen.evidence.face, gain_) ? 0 : strange_ + 1;
+  faint_ = std::max(0, clearness(seen) < kFaint ? faint_ + 1 : faint_ - 2);
+  if (whole) {
+    palette_.learn(seen.evidence.face, gain_);
+    if (lost_ == 0)
+      shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
+    usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);
+    usual_accepted_ += kLearn * (seen.accepted - usual_accepted_);
+    if (seen.pose) usual_evidence_ += kLearn * (seen.pose->evidence - usual_evidence_);
+    usual_.cover += kLearn * (seen.evidence.cover - usual_.cover);
+    usual_.edges += kLearn * (seen.evidence.edges - usual_.edges);
+    const double off = (seen.rim.shape_px - mean_shape_px_).norm();
+    shape_scatter_px_ += kLearn * (off - shape_scatter_px_);
+    mean_shape_px_ += kLearn * (seen.rim.shape_px - mean_shape_px_);
+  }
+  Sighting kept = seen;
+  if (!kept.turned_rad) kept.turned_rad = predicted.turned_rad;
+  forecast_.add(frame.t_s, kept, whole);
+  lost_ = 0;
+}
+
+std::optional<Sighting> Follower::follow(const Frame& frame, const Others& others) {
+  gain_ = background_.gain(frame.luma);
+  const Sighting predicted = forecast_.at(frame.t_s);
+  std::optional<Sighting> seen;
+  if (inside(predicted.centre_px, frame.luma.size(), 0.5 * usual_major_px_))
+    seen = look_near(frame, predicted, others);
+  if (!seen) {
+    constexpr int kAwhile = 12, kEvery = 3;
+    if (lost_ < kAwhile || lost_ % kEvery == 0) seen = look_about(frame, predicted, others);
+  } else if (misgiving(*seen) && --patience_ <= 0) {
+    constexpr double kClearlyMore = 1.05;
+    constexpr int kLongest = 16;
+    auto anywhere = look_about(frame, predicted, others);
+    const bool helps = anywhere && anywhere->pose &&
+                       anywhere->pose->evidence > kClearlyMore * seen->pose->evidence;
+    if (helps) seen = std::move(anywhere);
+    // Searches that keep finding nothing better are made ever more rarely.
+    futile_ = helps ? 0 : std::min(kLongest, 2 * futile_ + 1);
+    patience_ = futile_;
+  }
+  if (!seen) {
+    ++lost_;
+    return std::nullopt;
+  }
+  if (seen->pose && predicted.pose && finder_.faces_look_alike())
+    seen->pose->pose = nearer_face(seen->pose->pose, predicted.pose->pose, finder_.mark_rad());
+  read_marks(frame, *seen, predicted.turned_rad.value_or(0.0));
+  accept(frame, *seen, predicted);
+  return seen;
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,70 @@
+#pragma once
+#include <memory>
+#include <optional>
+
+#include "find/background.hpp"
+#include "find/body_finder.hpp"
+#include "find/forecast.hpp"
+#include "find/palette.hpp"
+#include "find/spin_profile.hpp"
+
+namespace trochoid::tracking {
+
+/// Follows one body from frame to frame, in either direction of time: predicts, measures, and when
+/// the prediction fails looks about with the background's help. What it cannot measure it leaves
+/// out; it never answers with the prediction.
+class Follower {
+ public:
+  /// Places other bodies are known to be in a frame (centre and radius), not to be taken for ours.
+  using Others = std::vector<std::pair<Eigen::Vector2d, double>>;
+
+  Follower(const BodyFinder& finder, const Background& background,
+           std::shared_ptr<const SpinProfile> marks);
+
+  /// What it has followed is known better now: goes on from the last sightings of these.
+  /// @param seen by time, from the oldest.
+  void resume(const std::vector<std::pair<double, Sighting>>& seen);
+  /// Starts from a measured sighting.
+  void start(const Frame& frame, const Sighting& seen);
+  /// The body in the next frame (earlier or later than the last), if it is seen there.
+  [[nodiscard]] std::optional<Sighting> follow(const Frame& frame, const Others& others = {});
+
+ private:
+  [[nodiscard]] std::optional<Sighting> look_near(const Frame& frame, const Sighting& predicted,
+                                                  const Others& others);
+  [[nodiscard]] std::optional<Sighting> look_at(const Frame& frame, const Sighting& expected,
+                                                double reach_px);
+  [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
+                                                   const Others& others);
+  [[nodiscard]] Sighting as_it_moves(const Frame& frame, const Sighting& found) const;
+  [[nodiscard]] double wholeness(const Sighting& seen) const;
+  [[nodiscard]] double clearness(const Sighting& seen) const;
+  [[nodiscard]] bool misgiving(const Sighting& seen) const;
+  [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
+                               double reach_px) const;
+  void set_shape_knowledge(Look& look, Sighting& guess) const;
+  void read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const;
+  void accept(const Frame& frame, Sighting& seen, const Sighting& predicted);
+
+  const BodyFinder& finder_;
+  const Background& background_;
+  std::shared_ptr<const SpinProfile> marks_;
+  Forecast forecast_;
+  Plate plate_;  ///< background at the brightness of the frame, valid near the body
+  double gain_ = 1.0;
+  double shape_surprise_px_ = 0.3;
+  Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();  ///< running mean of whole sightings
+  double shape_scatter_px_ = 1.0;                            ///< running deviation from it
+  double usual_major_px_ = 0.0;
+  double usual_accepted_ = 0.0;
+  Evidence usual_{};             ///< running mean over whole sightings
+  double usual_clarity_ = 0.0;   ///< of the seed
+  double usual_evidence_ = 0.0;  ///< of the pose, running mean
+  Palette palette_;              ///< of whole sightings
+  int lost_ = 0;
+  int strange_ = 0;  ///< frames in a row in which what is followed has other colours
+  int faint_ = 0;    ///< frames in which little spoke for it, less those in which much did
+  int futile_ = 0, patience_ = 0;  ///< frames to wait before searching in spite of a sighting
+};
+
+}  // namespace trochoid::tracking

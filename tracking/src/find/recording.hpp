@@ -1,0 +1,54 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "find/background.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tracking {
+
+/// A recording as the tracker reads it: a window that moves over it once, whose frames are held in
+/// memory so that bodies can be sought there in any order and followed backwards. How much is held
+/// does not depend on the recording's length.
+class Recording {
+ public:
+  /// Opens the recording; its window is empty until the first advance().
+  /// @param held_bytes pictures in a window, but never fewer than twice Background::kSamples.
+  /// @throws InputError as open_video does.
+  Recording(const std::filesystem::path& path, const SourceOptions& options,
+            std::size_t held_bytes);
+
+  [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
+  [[nodiscard]] const std::vector<Frame>& window() const { return window_; }
+  /// How many windows there were, the present one included.
+  [[nodiscard]] int windows() const { return windows_; }
+  /// Lets all but the last `keep` frames of the window go and reads on until it is full again.
+  /// `each`, if given, sees every new frame as it comes.
+  /// @return false if nothing followed: the window is then as it was.
+  /// @throws InputError if the first window holds no frame, and as FrameSource::next does.
+  bool advance(std::size_t keep, const std::function<void(const Frame&)>& each = {});
+  /// Pictures for the background: from the window and, where that is not all, from the windows
+  /// before it and the frames of the file that decode alone.
+  [[nodiscard]] BackgroundSamples samples();
+  /// No samples will be asked for any more: what was kept for them goes.
+  void stop_sampling();
+
+ private:
+  void remember_window();
+  void read_ahead();
+
+  std::filesystem::path path_;
+  SourceOptions options_;
+  std::size_t held_bytes_;
+  std::unique_ptr<FrameSource> source_;
+  std::vector<Frame> window_;
+  int windows_ = 0;
+  bool ended_ = false;
+  std::vector<Frame> elsewhere_;  ///< pictures of other parts of the recording
+  bool looked_ahead_ = false, sampled_ = true;
+};
+
+}  // namespace trochoid::tracking

@@ -1,3 +1,0 @@
-// For machines with AVX2 and FMA; compiled with those flags, see tracking/CMakeLists.txt.
-#define TROCHOID_STRETCH_ISA isa_avx2
-#include "stretch_kernel_run.hpp"

@@ -1,3 +1,0 @@
-// For every machine.
-#define TROCHOID_STRETCH_ISA isa_baseline
-#include "stretch_kernel_run.hpp"

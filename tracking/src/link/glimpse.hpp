@@ -1,0 +1,80 @@
+#pragma once
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "edges/shading_prior.hpp"
+#include "find/background.hpp"
+#include "find/body_finder.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tracking {
+
+/// One body in one of consecutive frames; nothing where it was not seen.
+struct Glimpse {
+  const Frame* frame = nullptr;
+  std::optional<Sighting> seen{};
+
+  [[nodiscard]] bool posed() const { return seen && seen->pose; }
+  [[nodiscard]] const data::Pose<>& pose() const { return seen->pose->pose; }
+};
+
+/// How much more speaks for one fit to a picture than for another, as a logarithm: its edges, and
+/// its shadow, where both cover about the same of the picture.
+[[nodiscard]] double speaks_more(const Sighting& one, const Sighting& other);
+/// The same of its shadow alone.
+[[nodiscard]] double shadow_speaks_more(const Sighting& one, const Sighting& other);
+
+/// Measures a body about a guess in one frame.
+class Measuring {
+ public:
+  Measuring(const Background& background, const BodyFinder& finder)
+      : background_(background), finder_(finder) {}
+
+  /// @param near its pose one frame earlier or later, if known: how far it smears.
+  /// @param shading light beside its outline in other frames, if known.
+  /// @param there it is right there: nothing farther off is looked for.
+  [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
+                                                   const std::optional<data::Pose<>>& near,
+                                                   const ShadingMemory* shading = nullptr,
+                                                   bool there = false);
+
+  /// The floor around the body in some pose, where it is seen about `seen`.
+  [[nodiscard]] std::optional<FloorDarkening> floor_around(const Frame& frame, const Sighting& seen,
+                                                           const data::Pose<>& pose);
+  /// How well its shadow agrees with that; 0 without a lamp.
+  [[nodiscard]] double shadow(const Frame& frame, const Sighting& seen, const data::Pose<>& pose);
+
+ private:
+  /// Brings the background around a sighting to the brightness of the frame; false if that is out
+  /// of the picture.
+  bool prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii);
+  /// Under the lamp, which is known.
+  [[nodiscard]] double agreement(const std::optional<FloorDarkening>& floor) const;
+
+  const Background& background_;
+  const BodyFinder& finder_;
+  Plate plate_;
+};
+
+/// Runs work(measuring, i) for i of 0..count on two cores.
+void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
+                   const std::function<void(Measuring&, std::size_t)>& work);
+
+/// What the frames around frame i show of the picture: the light beside the outline, and how sharp
+/// it is.
+struct Surroundings {
+  ShadingMemory shading;
+  double blur_px;
+};
+[[nodiscard]] Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i);
+
+/// Allows for the centre being this far off as well, in the picture and on the floor.
+void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen);
+/// The same for its tilt.
+void allow_for_tilt(double off_rad, Sighting& seen);
+/// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
+[[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
+
+}  // namespace trochoid::tracking

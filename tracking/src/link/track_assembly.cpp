@@ -1,0 +1,213 @@
+#include "link/track_assembly.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "link/path_scatter.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Keeps an angle continuous, from within half a turn of zero on: of all angle + k period the one
+/// nearest to where the last two lead.
+class Unwrapper {
+ public:
+  explicit Unwrapper(double period) : period_(period) {}
+
+  double operator()(double angle, double t_s) {
+    if (count_ > 0) {
+      const double expected = last_ + (count_ > 1 ? rate_ * (t_s - last_t_) : 0.0);
+      angle += period_ * std::round((expected - angle) / period_);
+      if (t_s > last_t_) rate_ = (angle - last_) / (t_s - last_t_);
+    } else {
+      angle -= 2.0 * kPi * std::ceil((angle - kPi) / (2.0 * kPi));
+    }
+    last_ = angle;
+    last_t_ = t_s;
+    ++count_;
+    return angle;
+  }
+
+ private:
+  double period_, last_ = 0.0, last_t_ = 0.0, rate_ = 0.0;
+  int count_ = 0;
+};
+
+double quality_of(const Sighting& seen) {
+  const double spread = seen.rms_px / (0.3 + 0.02 * seen.rim.semi_minor_px());
+  constexpr double kDoubtful = 0.4;
+  return std::clamp(1.2 * seen.accepted / (1.0 + 0.25 * spread * spread), 0.0,
+                    seen.attitude_doubtful ? kDoubtful : 1.0);
+}
+
+/// Whether the body lies: only then does the picture of its face turn as the body spins. One that
+/// tilts gets narrower, and shows its wall and the lamp's shading in place of marks.
+bool lies(const BodyPath& path) {
+  constexpr double kAsRound = 0.1;
+  std::vector<double> roundness;
+  for (const auto& [index, at] : path.frames)
+    roundness.push_back(at.seen.rim.semi_minor_px() / at.seen.rim.semi_major_px());
+  return data::quantile(roundness, 0.9) - data::quantile(roundness, 0.1) < kAsRound;
+}
+
+void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
+  if (!rule.camera) return;
+  const Eigen::Vector3d p = rule.camera->table_from_image(seen.centre_px, rule.height_m);
+  const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
+  const Eigen::Matrix2d m_per_px = px_per_m.inverse();
+  sample.centre_m = p.head<2>();
+  sample.covariance_m2 = m_per_px * seen.covariance_px2 * m_per_px.transpose();
+}
+
+/// @param mark_rad angle of the mark in the body: turned over about the axis of its mark, a body
+/// with the same mark on both faces shows the spin pi - psi - 2 mark.
+void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold,
+                      double mark_rad) {
+  double theta = pose.pose.theta_rad, phi = pose.pose.phi_rad, psi = pose.pose.psi_rad;
+  if (fold && theta > 0.5 * kPi) theta = kPi - theta, phi += kPi, psi = kPi - psi - 2.0 * mark_rad;
+  if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {theta, pose.sigma_theta_rad};
+  if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {phi, pose.sigma_phi_rad};
+  if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
+}
+
+/// Seen face on, nothing tells which way the axis leans: then the turn of the face about the
+/// vertical is known, precession and spin together, and neither of them alone.
+bool turns_face_on(const BodyPath& path) {
+  constexpr double kVague_rad = 0.1;
+  std::vector<double> sigmas_rad;
+  for (const auto& [index, at] : path.frames)
+    if (at.seen.pose && at.seen.pose->sigma_psi_rad)
+      sigmas_rad.push_back(at.seen.pose->sigma_phi_rad);
+  return !sigmas_rad.empty() && data::quantile(std::move(sigmas_rad), 0.5) > kVague_rad;
+}
+
+/// @param measured as the picture gave it: the spin's error holds the precession's of that pose.
+void join_turns(const PoseMeasurement& measured, data::TrackSample& sample) {
+  if (sample.psi) {
+    const double theta = measured.pose.theta_rad;
+    const double of_phi =
+        std::isfinite(measured.sigma_phi_rad) ? std::cos(theta) * measured.sigma_phi_rad : 0.0;
+    // A lean that is not there moves a mark on its ellipse by so much.
+    const double of_lean = 0.25 * theta * theta;
+    const double own2 = *measured.sigma_psi_rad * *measured.sigma_psi_rad - of_phi * of_phi;
+    sample.psi = {sample.psi->value_rad + measured.pose.phi_rad,
+                  std::hypot(std::sqrt(std::max(own2, 0.0)), of_lean)};
+  }
+  sample.phi.reset();
+}
+
+/// Inflation of the covariances, smoothed over neighbours in time: one frame's own says as much
+/// about the frame, partly hidden maybe, as about luck.
+std::vector<double> smoothed_inflations(const BodyPath& path) {
+  constexpr std::size_t kReach = 10;
+  constexpr double kUsualScatter = 0.7;  // of the logarithm; more is the frame's own
+  std::vector<double> logs;
+  for (const auto& [index, at] : path.frames)
+    logs.push_back(at.seen.pose ? std::log(at.seen.pose->inflation) : 0.0);
+  std::vector<double> smoothed;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const std::size_t from = i - std::min(i, kReach), to = std::min(logs.size(), i + kReach + 1);
+    double sum = 0.0;
+    for (std::size_t k = from; k < to; ++k) sum += logs[k];
+    const double around = sum / static_cast<double>(to - from);
+    smoothed.push_back(std::exp(std::max(around, logs[i] - kUsualScatter)));
+  }
+  return smoothed;
+}
+
+/// What one picture says of its errors, the path may contradict.
+void allow_for_scatter(data::Track& track) {
+  const std::vector<double> centre = unclaimed_scatter(track, Measured::centre);
+  for (std::size_t i = 0; i < centre.size(); ++i) track.samples[i].covariance_m2 *= centre[i];
+  for (const auto& [what, angle] : {std::pair{Measured::theta, &data::TrackSample::theta},
+                                    {Measured::phi, &data::TrackSample::phi},
+                                    {Measured::psi, &data::TrackSample::psi}}) {
+    const std::vector<double> scatter = unclaimed_scatter(track, what);
+    for (std::size_t i = 0; i < scatter.size(); ++i)
+      if (auto& seen = track.samples[i].*angle) seen->sigma_rad *= std::sqrt(scatter[i]);
+  }
+}
+
+/// All of a path is seen in one reading or in another: frames do not scatter by that, and what they
+/// do scatter by is beside it.
+void allow_for_other_readings(const BodyPath& path, data::Track& track) {
+  const auto grow = [](std::optional<data::MeasuredAngle>& angle, double by_rad) {
+    if (angle) angle->sigma_rad = std::hypot(angle->sigma_rad, by_rad);
+  };
+  auto sample = track.samples.begin();
+  for (const auto& [index, at] : path.frames) {
+    data::TrackSample& of_frame = *sample++;
+    if (!at.seen.pose) continue;
+    const PoseSpread spread = spread_over_readings(path.readings, at.seen);
+    const double theta = at.seen.pose->pose.theta_rad;
+    of_frame.covariance_m2 += spread.m2;
+    grow(of_frame.theta, std::sqrt(spread.theta_rad2));
+    constexpr double kLeastSine = 1e-6;
+    const double turn = std::sqrt(spread.across_rad2) / std::max(kLeastSine, std::sin(theta));
+    grow(of_frame.phi, turn);
+    // Spin is counted from the node line: what precession is wrong by, it takes back.
+    if (of_frame.phi) grow(of_frame.psi, std::cos(theta) * turn);
+  }
+}
+
+}  // namespace
+
+double usual_radius_px(const BodyPath& path) {
+  std::vector<double> sizes;
+  for (const auto& [index, at] : path.frames)
+    if (at.seen.accepted > 0.7) sizes.push_back(at.seen.rim.semi_major_px());
+  if (sizes.empty())
+    for (const auto& [index, at] : path.frames) sizes.push_back(at.seen.rim.semi_major_px());
+  if (sizes.empty()) return 0.0;
+  return data::upper_median(std::move(sizes));
+}
+
+data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+                           const AssemblyOptions& options) {
+  data::Track track{.object = object, .samples = {}};
+  Unwrapper phi(2.0 * kPi);
+  Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
+  const std::vector<double> inflations = smoothed_inflations(path);
+  auto inflation = inflations.begin();
+  const bool face_on = options.on_pin && turns_face_on(path);
+  const bool turns_as_it_spins = path.marks && lies(path);
+  for (const auto& [index, at] : path.frames) {
+    const Sighting& seen = at.seen;
+    data::TrackSample sample;
+    sample.frame = index;
+    sample.t_s =
+        at.t_s + options.readout_s *
+                     std::clamp(seen.centre_px.y() / std::max(1, options.height_px - 1), 0.0, 1.0);
+    sample.centre_px = seen.centre_px;
+    sample.quality = quality_of(seen);
+    const double usual = *inflation++;
+    if (seen.pose) {
+      PoseMeasurement pose = *seen.pose;
+      pose.inflate(usual);
+      sample.centre_m = pose.pose.centre_m.head<2>();
+      sample.covariance_m2 = pose.covariance_m2;
+      angles_from_pose(sample, pose, options.fold, options.mark_rad);
+      if (face_on) join_turns(*seen.pose, sample);
+    } else {
+      metres_from_rim(sample, seen, rule);
+      // The image's y points down, the table's up: turning right on the screen is a negative spin.
+      if (turns_as_it_spins && seen.turned_rad)
+        sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),
+                      seen.turned_sigma_rad};
+    }
+    if (sample.phi) sample.phi->value_rad = phi(sample.phi->value_rad, sample.t_s);
+    if (sample.psi) sample.psi->value_rad = psi(sample.psi->value_rad, sample.t_s);
+    track.samples.push_back(std::move(sample));
+  }
+  allow_for_scatter(track);
+  allow_for_other_readings(path, track);
+  return track;
+}
+
+}  // namespace trochoid::tracking

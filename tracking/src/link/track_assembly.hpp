@@ -1,0 +1,53 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "find/body_finder.hpp"
+#include "find/spin_profile.hpp"
+#include "link/readings.hpp"
+#include "trochoid/data/camera.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+
+namespace trochoid::tracking {
+
+/// All sightings of one body, by frame index.
+struct BodyPath {
+  struct At {
+    double t_s = 0.0;
+    Sighting seen;
+  };
+  using Frames = std::map<std::int64_t, At>;
+  Frames frames;
+  std::shared_ptr<const SpinProfile> marks;
+  std::optional<Lamp> lamp{};  ///< as its shadows last showed it
+  /// Plate::chroma_site_px as its edges show it, where they do.
+  std::optional<Eigen::Vector2d> chroma_site_px{};
+  ReadingTallies readings{};  ///< of all its frames
+};
+
+/// How pixels become metres in a track measured by rims alone.
+struct MetreRule {
+  std::optional<data::Camera> camera;  ///< of the floor plane
+  double height_m = 0.0;               ///< of the measured rim above the floor
+};
+
+struct AssemblyOptions {
+  bool fold = false;       ///< faces look alike: report min(theta, pi - theta)
+  bool on_pin = false;     ///< held at its own middle: turns about the vertical where seen face on
+  double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
+  double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
+  int height_px = 1;
+};
+
+/// Track samples of a path: metres and their covariance, unwrapped and folded angles, times of the
+/// sample's own row.
+[[nodiscard]] data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+                                         const AssemblyOptions& options);
+
+/// Median of the rim's semi-major axis over the path [px]: what the known radius is compared with.
+[[nodiscard]] double usual_radius_px(const BodyPath& path);
+
+}  // namespace trochoid::tracking

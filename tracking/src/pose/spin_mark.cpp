@@ -1,0 +1,235 @@
+#include "pose/spin_mark.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "geometry/outline_samples.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr int kRings = 12, kSpokes = 256;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kSpoke_rad = kTurn / kSpokes;
+
+// Cosine and sine of every spoke.
+struct Spokes {
+  std::array<float, kSpokes> cosine, sine;
+  Spokes() {
+    for (size_t i = 0; i < kSpokes; ++i) {
+      const double angle = kSpoke_rad * static_cast<double>(i);
+      cosine[i] = static_cast<float>(std::cos(angle));
+      sine[i] = static_cast<float>(std::sin(angle));
+    }
+  }
+};
+const Spokes& spokes() {
+  static const Spokes table;
+  return table;
+}
+
+using Face = Eigen::Matrix<float, kRings, kSpokes, Eigen::RowMajor>;
+
+// Marks of the face that is seen, and the band of radii they and their surroundings take.
+struct Band {
+  std::vector<data::SpinMark> marks;
+  bool upper = true;
+  double from_m = 0.0, to_m = 0.0;
+
+  [[nodiscard]] double radius_m(int ring) const {
+    return from_m + (to_m - from_m) * (ring + 0.5) / kRings;
+  }
+};
+
+Band band_of(const data::Body& body, bool upper) {
+  constexpr double kAround = 1.6;  // of the mark's size: its own surroundings
+  Band band;
+  band.upper = upper;
+  band.from_m = body.radius_m;
+  for (const data::SpinMark& mark : body.marks) {
+    if (!(upper ? mark.on_upper_face : mark.on_lower_face)) continue;
+    band.marks.push_back(mark);
+    band.from_m = std::min(band.from_m, mark.distance_m - kAround * mark.size_m);
+    band.to_m = std::max(band.to_m, mark.distance_m + kAround * mark.size_m);
+  }
+  band.from_m = std::max({band.from_m, 1.1 * body.inner_radius_m, 0.1 * body.radius_m});
+  band.to_m = std::min(band.to_m, 0.93 * body.radius_m);  // the blur of the rim stays out
+  return band;
+}
+
+float sample(const cv::Mat& image, const Eigen::Vector2d& p) {
+  const double x = std::clamp(p.x(), 0.0, image.cols - 1.001);
+  const double y = std::clamp(p.y(), 0.0, image.rows - 1.001);
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const auto fx = static_cast<float>(x - ix), fy = static_cast<float>(y - iy);
+  const std::uint8_t *above = image.ptr(iy) + ix, *below = image.ptr(iy + 1) + ix;
+  return (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) +
+         fy * ((1 - fx) * below[0] + fx * below[1]);
+}
+
+Face unroll(const cv::Mat& luma, const Band& band, const data::Body& body,
+            const data::Camera& camera, const data::Pose<>& pose) {
+  const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+  const Eigen::Vector3d centre =
+      pose.centre_m + (band.upper ? 1.0 : -1.0) * body.half_thickness_m() * axis;
+  const Eigen::Vector3d along = node_line(pose), across = axis.cross(along);
+  Face face;
+  for (int i = 0; i < kSpokes; ++i) {
+    const auto k = static_cast<size_t>(i);
+    const Eigen::Vector3d out = static_cast<double>(spokes().cosine[k]) * along +
+                                static_cast<double>(spokes().sine[k]) * across;
+    for (int ring = 0; ring < kRings; ++ring)
+      face(ring, i) =
+          sample(luma, camera.image_from_table<double>(centre + band.radius_m(ring) * out));
+  }
+  return face;
+}
+
+// How much of each sample the marks cover at psi = 0, blurred by `blur_m`.
+Face coverage(const Band& band, double blur_m) {
+  constexpr double kFar = 5.0;  // blurs from the mark there is none of it
+  Face cover = Face::Zero();
+  for (const data::SpinMark& mark : band.marks)
+    for (int i = 0; i < kSpokes; ++i) {
+      const double cosine = std::cos(kSpoke_rad * i - mark.angle_rad);
+      for (int ring = 0; ring < kRings; ++ring) {
+        const double radius = band.radius_m(ring);
+        const double apart2 = radius * radius + mark.distance_m * mark.distance_m -
+                              2.0 * radius * mark.distance_m * cosine;
+        const double far = mark.size_m + kFar * blur_m;
+        if (apart2 > far * far) continue;
+        const double beyond = std::sqrt(std::max(0.0, apart2)) - mark.size_m;
+        cover(ring, i) +=
+            static_cast<float>(0.5 * std::erfc(beyond / (std::numbers::sqrt2 * blur_m)));
+      }
+    }
+  return cover;
+}
+
+// Takes out what light does to a plain face: a level per ring, and a slope across the face.
+void level(const Band& band, Face& face) {
+  Eigen::Matrix2f normal = Eigen::Matrix2f::Zero();
+  Eigen::Vector2f right = Eigen::Vector2f::Zero();
+  for (int ring = 0; ring < kRings; ++ring) {
+    face.row(ring).array() -= face.row(ring).mean();
+    const auto radius = static_cast<float>(band.radius_m(ring));
+    for (int i = 0; i < kSpokes; ++i) {
+      const auto k = static_cast<size_t>(i);
+      const Eigen::Vector2f slope(radius * spokes().cosine[k], radius * spokes().sine[k]);
+      normal += slope * slope.transpose();
+      right += face(ring, i) * slope;
+    }
+  }
+  const Eigen::Vector2f slope = normal.inverse() * right;
+  for (int ring = 0; ring < kRings; ++ring) {
+    const auto radius = static_cast<float>(band.radius_m(ring));
+    for (int i = 0; i < kSpokes; ++i) {
+      const auto k = static_cast<size_t>(i);
+      face(ring, i) -= radius * (slope[0] * spokes().cosine[k] + slope[1] * spokes().sine[k]);
+    }
+  }
+}
+
+// Sample areas differ from ring to ring; so do their weights.
+void weigh(const Band& band, Face& face) {
+  for (int ring = 0; ring < kRings; ++ring)
+    face.row(ring) *= static_cast<float>(std::sqrt(band.radius_m(ring) / band.to_m));
+}
+
+std::vector<float> correlations(const Face& face, const Face& marks) {
+  std::vector<float> sums(kSpokes, 0.0F);
+  std::array<float, 2 * kSpokes> twice;  // a turn and the next: no index wraps
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (size_t i = 0; i < twice.size(); ++i) twice[i] = face(ring, static_cast<int>(i % kSpokes));
+    for (size_t i = 0; i < kSpokes; ++i) {
+      const float m = marks(ring, static_cast<int>(i));
+      for (size_t s = 0; s < kSpokes; ++s) sums[s] += m * twice[i + s];
+    }
+  }
+  return sums;
+}
+
+double turn_power(const Face& marks) {
+  double power = 0.0;
+  for (int ring = 0; ring < kRings; ++ring)
+    for (int i = 0; i < kSpokes; ++i) {
+      const double slope =
+          (marks(ring, (i + 1) % kSpokes) - marks(ring, (i + kSpokes - 1) % kSpokes)) /
+          (2.0 * kSpoke_rad);
+      power += slope * slope;
+    }
+  return power;
+}
+
+// The largest value, and the largest one that is not on its flank.
+struct Peak {
+  int at = 0;
+  float height = 0.0F, second = 0.0F;
+};
+
+Peak find_peak(const std::vector<float>& sums, int flank) {
+  Peak peak;
+  for (int s = 0; s < kSpokes; ++s)
+    if (const float v = std::abs(sums[static_cast<size_t>(s)]); v > peak.height)
+      peak.at = s, peak.height = v;
+  for (int s = 0; s < kSpokes; ++s) {
+    const int off = std::abs(s - peak.at);
+    if (std::min(off, kSpokes - off) > flank)
+      peak.second = std::max(peak.second, std::abs(sums[static_cast<size_t>(s)]));
+  }
+  return peak;
+}
+
+}  // namespace
+
+std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& body,
+                                      const data::Camera& camera, const data::Pose<>& pose) {
+  constexpr double kBlurPx = 0.8, kLeastPx = 3.0;
+  constexpr double kStandsOut = 1.5, kLeastLikeness = 0.5, kGrazing = 0.15;
+  const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+  const double facing = axis.dot(direction_to(camera, pose.centre_m));
+  const Band band = band_of(body, facing > 0.0);
+  if (band.marks.empty() || !(band.to_m > band.from_m) || std::abs(facing) < kGrazing)
+    return std::nullopt;
+  const double px_per_m = camera.jacobian_px_per_m(pose.centre_m).norm() / std::sqrt(2.0);
+  if ((band.to_m - band.from_m) * px_per_m * std::abs(facing) < kLeastPx) return std::nullopt;
+  Face face = unroll(luma, band, body, camera, pose);
+  Face marks = coverage(band, kBlurPx / px_per_m);
+  for (Face* f : {&face, &marks}) {
+    level(band, *f);
+    weigh(band, *f);
+  }
+  const std::vector<float> sums = correlations(face, marks);
+  double widest = 0.0;
+  for (const data::SpinMark& mark : band.marks)
+    widest = std::max(widest, mark.size_m / std::max(mark.distance_m, mark.size_m));
+  const Peak peak = find_peak(sums, static_cast<int>(2.2 * widest / kSpoke_rad) + 2);
+  const double power = marks.squaredNorm(), all = face.squaredNorm();
+  const double likeness = peak.height / std::sqrt(std::max(power * all, 1e-12));
+  if (peak.height < kStandsOut * peak.second || likeness < kLeastLikeness) return std::nullopt;
+  const auto value = [&](int s) {
+    return static_cast<double>(std::abs(sums[static_cast<size_t>((s + kSpokes) % kSpokes)]));
+  };
+  const double before = value(peak.at - 1), after = value(peak.at + 1);
+  const double bend = before - 2.0 * peak.height + after;
+  const double fine = bend < 0.0 ? 0.5 * (before - after) / bend : 0.0;
+  MarkReading reading;
+  reading.psi_rad = kSpoke_rad * (peak.at + fine);
+  // What the marks do not explain, per sample; several samples share a pixel.
+  const double contrast = peak.height / power;
+  const double unlike = std::max(all - contrast * contrast * power, 0.0) / (kRings * kSpokes);
+  const double area_px2 = std::numbers::pi * (band.to_m * band.to_m - band.from_m * band.from_m) *
+                          px_per_m * px_per_m * std::abs(facing);
+  const double per_pixel = std::max(1.0, kRings * kSpokes / area_px2);
+  reading.sigma_rad =
+      std::sqrt((unlike + 0.1) * per_pixel / (contrast * contrast * turn_power(marks)));
+  reading.radius_px = 0.5 * (band.from_m + band.to_m) * px_per_m;
+  return reading;
+}
+
+}  // namespace trochoid::tracking
