@@ -1,4 +1,4 @@
-#include "fit_trials.hpp"
+#include "study/fit_trials.hpp"
 
 #include <gtest/gtest.h>
 

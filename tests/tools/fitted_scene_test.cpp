@@ -1,4 +1,4 @@
-#include "fitted_scene.hpp"
+#include "common/fitted_scene.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "prediction.hpp"
+#include "common/prediction.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #ifdef TROCHOID_HAS_TRACKING
-#include "render_picture.hpp"
+#include "draw/render_picture.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "report_parts.hpp"
+#include "report/parts.hpp"
 
 namespace trochoid::tools {
 namespace {

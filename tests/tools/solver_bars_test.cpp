@@ -1,4 +1,4 @@
-#include "solver_bars.hpp"
+#include "study/solver_bars.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "track_options.hpp"
+#include "common/track_options.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "tracking_scores.hpp"
+#include "study/tracking_scores.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <filesystem>
 
 #include "commands.hpp"
-#include "interruption.hpp"
-#include "progress.hpp"
+#include "common/interruption.hpp"
+#include "common/progress.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
 

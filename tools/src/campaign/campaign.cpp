@@ -1,0 +1,212 @@
+#include "campaign/campaign.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "common/child_process.hpp"
+#include "report/run_folder.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+fs::path record_path(const Campaign& campaign, const CampaignItem& item) {
+  return campaign.folder / "records" / (item.name + ".json");
+}
+fs::path folder_of(const Campaign& campaign, const std::string& name) {
+  return campaign.folder / (name + ".trochoid");
+}
+
+std::vector<fs::path> inputs_of(const CampaignItem& item) {
+  std::vector<fs::path> inputs{item.video};
+  for (const fs::path& file : {item.scene, item.camera})
+    if (!file.empty()) inputs.push_back(file);
+  try {
+    const std::string camera = item.scene.empty() ? "" : data::read_scene(item.scene).camera.file;
+    if (!camera.empty() && item.camera.empty()) inputs.emplace_back(camera);
+  } catch (const InputError&) {  // the run will say what is wrong with the scene
+  }
+  return inputs;
+}
+
+std::vector<std::string> command_of(const Campaign& campaign, const CampaignItem& item) {
+  std::vector<std::string> command{"trochoid",
+                                   "-q",
+                                   "run",
+                                   item.video.string(),
+                                   "--json",
+                                   "-o",
+                                   folder_of(campaign, item.name).string()};
+  if (!item.scene.empty()) command.insert(command.end(), {"--scene", item.scene.string()});
+  if (!item.camera.empty()) command.insert(command.end(), {"--camera", item.camera.string()});
+  command.insert(command.end(), item.options.begin(), item.options.end());
+  return command;
+}
+
+/// Size and time stand for the content: reading a thousand recordings again to see that nothing has
+/// changed would take as long as copying them.
+std::string key_of(const Campaign& campaign, const CampaignItem& item) {
+  std::string key =
+      fmt::format("{} {}", TROCHOID_VERSION, fmt::join(command_of(campaign, item), " "));
+  for (const fs::path& file : inputs_of(item)) {
+    std::error_code code;
+    const auto size = fs::is_directory(file, code) ? 0 : fs::file_size(file, code);
+    const auto time = fs::last_write_time(file, code);
+    key += code ? " missing" : fmt::format(" {}@{}", size, time.time_since_epoch().count());
+  }
+  return key;
+}
+
+Json json_of(const CampaignRecord& record) {
+  Json inputs = Json::object();
+  for (const auto& [file, sha256] : record.inputs) inputs[file] = sha256;
+  return {
+      {"name", record.name},       {"done", record.done},       {"exit_status", record.exit_status},
+      {"message", record.message}, {"grade", record.grade},     {"verdict", record.verdict},
+      {"seconds", record.seconds}, {"peak_mb", record.peak_mb}, {"version", record.version},
+      {"command", record.command}, {"inputs", inputs},          {"key", record.key}};
+}
+
+CampaignRecord record_of(const Json& json) {
+  CampaignRecord record;
+  json.at("name").get_to(record.name);
+  json.at("done").get_to(record.done);
+  json.at("exit_status").get_to(record.exit_status);
+  json.at("message").get_to(record.message);
+  json.at("grade").get_to(record.grade);
+  json.at("verdict").get_to(record.verdict);
+  json.at("seconds").get_to(record.seconds);
+  json.at("peak_mb").get_to(record.peak_mb);
+  json.at("version").get_to(record.version);
+  json.at("command").get_to(record.command);
+  json.at("key").get_to(record.key);
+  for (const auto& [file, sha256] : json.at("inputs").items())
+    record.inputs.emplace_back(file, sha256.get<std::string>());
+  return record;
+}
+
+Json read_json(const fs::path& path) {
+  std::ifstream file(path);
+  return Json::parse(file, nullptr, /*allow_exceptions=*/false);
+}
+
+std::string last_line(const std::string& text) {
+  const std::size_t end = text.find_last_not_of(" \n");
+  if (end == std::string::npos) return {};
+  const std::size_t start = text.find_last_of("\n\r", end);
+  return text.substr(start == std::string::npos ? 0 : start + 1, end - (start + 1) + 1);
+}
+
+void read_answer(const fs::path& file, CampaignRecord& record) {
+  const Json answer = read_json(file);
+  if (!answer.is_object()) return;
+  record.grade = answer.value("grade", "");
+  record.verdict = answer.value("verdict", "");
+}
+
+// Also of a run that failed: they tell whether its cause was mended. Empty for what cannot be read.
+std::vector<std::pair<std::string, std::string>> checksums(const CampaignItem& item) {
+  std::vector<std::pair<std::string, std::string>> sums;
+  for (const fs::path& file : inputs_of(item)) {
+    sums.emplace_back(file.string(), "");
+    try {
+      sums.back().second = tracking::sha256_of_recording(file);
+    } catch (const InputError&) {  // the run has said so
+    }
+  }
+  return sums;
+}
+
+}  // namespace
+
+void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items) {
+  std::string first;
+  int wrong = 0;
+  for (const CampaignItem* item : items) try {
+      std::vector<std::string> words = command_of(campaign, *item);
+      words.erase(words.begin(), std::find(words.begin(), words.end(), "run") + 1);
+      check_run(words);
+    } catch (const InputError& error) {
+      if (wrong++ == 0) first = fmt::format("{}: {}", item->declared, error.what());
+    }
+  if (wrong > 1)
+    first += fmt::format(" ({} more recording{} cannot be run either)", wrong - 1,
+                         wrong == 2 ? "" : "s");
+  if (wrong > 0) throw InputError(first);
+}
+
+std::optional<CampaignRecord> current_record(const Campaign& campaign, const CampaignItem& item) {
+  const Json json = read_json(record_path(campaign, item));
+  if (!json.is_object()) return std::nullopt;
+  try {
+    CampaignRecord record = record_of(json);
+    const bool kept = !record.done || fs::exists(folder_of(campaign, item.name) / kRunFile);
+    if (kept && record.key == key_of(campaign, item)) return record;
+  } catch (const Json::exception&) {  // not ours, or an older version's: as if never run
+  }
+  return std::nullopt;
+}
+
+CampaignRecord run_item(const Campaign& campaign, const CampaignItem& item) {
+  CampaignRecord record;
+  record.name = item.name;
+  record.version = TROCHOID_VERSION;
+  record.command = command_of(campaign, item);
+  record.key = key_of(campaign, item);
+  std::vector<std::string> arguments = record.command;
+  arguments.front() = own_path();
+  data::PendingFile answer(record_path(campaign, item));
+  const ChildRun run = run_child(arguments, answer.path());
+  record.exit_status = run.exit_status;
+  record.seconds = run.seconds;
+  record.peak_mb = run.peak_mb;
+  record.done = run.exit_status == 0 || run.exit_status == 3;
+  record.inputs = checksums(item);
+  if (record.done) read_answer(answer.path(), record);
+  if (record.exit_status != 0 && record.message.empty())
+    record.message = last_line(run.error_output);
+  if (record.exit_status < 0 && record.message.empty()) record.message = "the process was killed";
+  data::write_text(json_of(record).dump(1) + "\n", record_path(campaign, item));
+  return record;
+}
+
+std::vector<CampaignLine> collect(const Campaign& campaign) {
+  std::vector<CampaignLine> lines;
+  for (const CampaignItem& item : campaign.items) {
+    CampaignLine line;
+    line.record.name = item.name;
+    if (auto record = current_record(campaign, item)) {
+      line.record = std::move(*record);
+      line.known = true;
+    }
+    const fs::path folder = folder_of(campaign, item.name);
+    const fs::path fit = folder / (item.video.stem().string() + ".fit.json");
+    if (line.record.done) {
+      const Json run = read_json(folder / kRunFile);
+      if (run.is_object()) {
+        line.frames = run.value("frames", std::int64_t{0});
+        line.found = run.value("found", std::int64_t{0});
+      }
+      std::error_code code;
+      try {
+        if (fs::exists(fit, code)) line.fit = data::read_fit(fit);
+      } catch (const InputError& error) {  // one damaged file is no reason to lose the summary
+        line.record.message = error.what();
+      }
+    }
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,361 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "commands.hpp"
+#include "common/json_summary.hpp"
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "common/validators.hpp"
+#include "draw/canvas.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/tracking/calibration.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::vector<fs::path> inputs;
+  std::string pattern = "9x6", dictionary = "4X4_50", floor;
+  double square_mm = 0.0, marker_mm = 0.0, floor_height_mm = 0.0, radius_mm = 0.0;
+  fs::path floor_points, circle_points, output, picture;
+  bool json = false;
+};
+
+tracking::BoardPattern pattern_of(const Options& options) {
+  tracking::BoardPattern pattern;
+  char rest = 0;
+  if (std::sscanf(options.pattern.c_str(), "%dx%d%c", &pattern.columns, &pattern.rows, &rest) != 2)
+    throw InputError(fmt::format("--pattern {}: write columns x rows, e.g. 9x6", options.pattern));
+  pattern.square_m = 1e-3 * options.square_mm;
+  if (options.marker_mm > 0.0) pattern.marker_m = 1e-3 * options.marker_mm;
+  pattern.dictionary = options.dictionary;
+  return pattern;
+}
+
+// Pictures with the board found in them, all of one size.
+struct Views {
+  std::vector<tracking::BoardView> found;
+  std::vector<cv::Mat> pictures;  ///< of `found`
+  cv::Size size;
+  int looked_at = 0;
+
+  void look(const cv::Mat& luma, const std::string& name, const tracking::BoardPattern& pattern) {
+    if (looked_at++ == 0) size = luma.size();
+    if (luma.size() != size)
+      throw InputError(
+          fmt::format("{} is {} x {}, the pictures before it {} x {}; one camera has "
+                      "one size",
+                      name, luma.cols, luma.rows, size.width, size.height));
+    if (auto view = tracking::find_board(luma, pattern, name)) {
+      found.push_back(std::move(*view));
+      pictures.push_back(luma);
+    }
+  }
+};
+
+// A video shows the board in hundreds of frames: two per second are looked at, and of those found
+// only the ones where it has moved.
+void look_through_video(const fs::path& path, const tracking::BoardPattern& pattern, Views& views) {
+  constexpr double kEvery_s = 0.5, kMoved = 0.03;
+  constexpr std::size_t kMost = 40;
+  const auto source = tracking::open_video(path);
+  double next_s = 0.0;
+  while (auto frame = source->next()) {
+    if (frame->t_s < next_s) continue;
+    next_s = frame->t_s + kEvery_s;
+    const std::size_t before = views.found.size();
+    views.look(frame->luma, fmt::format("{} frame {}", path.string(), frame->index), pattern);
+    if (views.found.size() < 2 || views.found.size() == before) continue;
+    const auto &a = views.found[before - 1].image_px, &b = views.found[before].image_px;
+    double moved = 0.0;
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+      moved += (a[i] - b[i]).norm() / static_cast<double>(std::min(a.size(), b.size()));
+    if (moved < kMoved * frame->luma.cols) views.found.pop_back(), views.pictures.pop_back();
+    if (views.found.size() >= kMost) break;
+  }
+}
+
+Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
+  Views views;
+  Progress progress("calibrate", "files");
+  std::int64_t done = 0;
+  for (const fs::path& path : options.inputs) {
+    if (!fs::exists(path)) throw InputError(fmt::format("{}: no such file", path.string()));
+    if (fs::is_directory(path))
+      throw InputError(fmt::format("{}: is a folder; give its pictures, e.g. {}", path.string(),
+                                   (path / "*.png").string()));
+    const cv::Mat picture = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+    if (!picture.empty())
+      views.look(picture, path.string(), pattern);
+    else
+      look_through_video(path, pattern, views);
+    progress.update(++done, static_cast<std::int64_t>(options.inputs.size()));
+  }
+  if (views.found.size() < 3) {
+    const bool in_all = static_cast<int>(views.found.size()) == views.looked_at;
+    throw InputError(
+        fmt::format("the board ({} of {:g} mm) is whole in {} of {} pictures; three are needed{}",
+                    options.pattern, options.square_mm, views.found.size(), views.looked_at,
+                    in_all             ? ", tilted in different directions"
+                    : pattern.marker_m ? ". Is --pattern the number of squares?"
+                                       : ". Is --pattern the number of inner corners?"));
+  }
+  return views;
+}
+
+std::string told(const tracking::LeftOut& out, const std::string& name) {
+  const std::size_t corners = out.corners_px.size();
+  if (corners > 0)
+    return fmt::format("{}: {} contradict{} the rest and {} left out, at ({:.0f}, {:.0f}) px{}",
+                       name, corners == 1 ? "a corner" : fmt::format("{} corners", corners),
+                       corners == 1 ? "s" : "", corners == 1 ? "is" : "are", out.corners_px[0].x(),
+                       out.corners_px[0].y(), corners > 1 ? " and more" : "");
+  return fmt::format(
+      "{}: contradicts the other pictures{} and is left out; is it the same board, flat and sharp?",
+      name, std::isfinite(out.rms_px) ? fmt::format(" (rms {:.2f} px)", out.rms_px) : "");
+}
+
+// What contradicts the rest is told, and wrong corners are gone from their views.
+void set_aside(const tracking::Calibration& result, Views& views) {
+  for (const tracking::LeftOut& out : result.left_out) {
+    tracking::BoardView& view = views.found[out.view];
+    note(told(out, view.name));
+    for (const Eigen::Vector2d& corner : out.corners_px) {
+      const auto at = std::find(view.image_px.begin(), view.image_px.end(), corner);
+      view.board_m.erase(view.board_m.begin() + (at - view.image_px.begin()));
+      view.image_px.erase(at);
+    }
+  }
+}
+
+bool is_left_out(const tracking::Calibration& result, std::size_t view) {
+  return std::any_of(result.left_out.begin(), result.left_out.end(), [view](const auto& out) {
+    return out.view == view && out.corners_px.empty();
+  });
+}
+
+std::size_t worst_view(const tracking::Calibration& result) {
+  std::size_t worst = 0;
+  double worst_px = -1.0;
+  for (std::size_t i = 0; i < result.view_rms_px.size(); ++i)
+    if (!is_left_out(result, i) && result.view_rms_px[i] > worst_px)
+      worst = i, worst_px = result.view_rms_px[i];
+  return worst;
+}
+
+std::size_t floor_view(const Options& options, const Views& views) {
+  if (options.floor.empty()) return 0;
+  for (std::size_t i = 0; i < views.found.size(); ++i) {
+    const std::string& name = views.found[i].name;
+    const fs::path wanted = fs::path(options.floor).lexically_normal();
+    if (fs::path(name).lexically_normal() == wanted || fs::path(name).filename() == wanted)
+      return i;
+  }
+  throw InputError(
+      fmt::format("--floor {}: none of the pictures with a board has this name", options.floor));
+}
+
+std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const char* y,
+                                    Eigen::Index fewest) {
+  const data::Table table = data::read_table(path);
+  for (const char* column : {x, y})
+    if (!table.has(column))
+      throw InputError(fmt::format("{}: there is no column {}", path.string(), column));
+  const Eigen::VectorXd u = table.column(x), v = table.column(y);
+  if (u.size() < fewest)
+    throw InputError(fmt::format("{}: {} point{}; at least {} are needed", path.string(), u.size(),
+                                 u.size() == 1 ? "" : "s", fewest));
+  if (!u.allFinite() || !v.allFinite())
+    throw InputError(fmt::format("{}: a point lacks its {} or {}", path.string(), x, y));
+  std::vector<Eigen::Vector2d> out;
+  for (Eigen::Index i = 0; i < u.size(); ++i) out.emplace_back(u[i], v[i]);
+  return out;
+}
+
+tracking::FloorPoints floor_points(const Options& options) {
+  constexpr Eigen::Index kFewest = 4;
+  return {points(options.floor_points, "x_m", "y_m", kFewest),
+          points(options.floor_points, "x_px", "y_px", kFewest)};
+}
+
+std::vector<Eigen::Vector2d> circle_points(const Options& options) {
+  constexpr Eigen::Index kFewest = 6;
+  return points(options.circle_points, "x_px", "y_px", kFewest);
+}
+
+// The table frame from whatever says where the floor is; a sentence about it.
+std::string place_floor(const Options& options, const Views& views, data::Camera& camera) {
+  const double height_m = 1e-3 * options.floor_height_mm;
+  if (!options.floor_points.empty()) {
+    const tracking::FloorPoints floor = floor_points(options);
+    const double rms = tracking::set_floor(camera, floor, height_m);
+    return fmt::format("floor from {} points, rms {:.3f} px", floor.table_m.size(), rms);
+  }
+  if (!options.circle_points.empty()) {
+    const double rms = tracking::set_floor_from_circle(camera, circle_points(options),
+                                                       1e-3 * options.radius_mm, height_m);
+    return fmt::format("floor from a circle, rms {:.3f} px", rms);
+  }
+  const tracking::BoardView& view = views.found[floor_view(options, views)];
+  const double rms = tracking::set_floor(camera, {view.board_m, view.image_px}, height_m);
+  return fmt::format(
+      "floor: the board in {}, rms {:.3f} px{}", view.name, rms,
+      options.floor.empty() ? " (the first picture; choose another with --floor)" : "");
+}
+
+// The corners found and, twenty times enlarged, how far the camera puts them elsewhere.
+void draw_check(const Options& options, const Views& views, data::Camera camera) {
+  constexpr double kEnlarged = 20.0;
+  const std::size_t shown = floor_view(options, views);
+  const tracking::BoardView& view = views.found[shown];
+  (void)tracking::set_floor(camera, {view.board_m, view.image_px}, 0.0);
+  cv::Mat picture;
+  cv::cvtColor(views.pictures[shown], picture, cv::COLOR_GRAY2BGR);
+  const cv::Scalar blue(178, 114, 0), vermillion(0, 94, 213);
+  for (std::size_t i = 0; i < view.image_px.size(); ++i) {
+    const Eigen::Vector2d at = view.image_px[i];
+    const Eigen::Vector2d there =
+        camera.image_from_table<double>({view.board_m[i].x(), view.board_m[i].y(), 0.0});
+    const Eigen::Vector2d tip = at + kEnlarged * (there - at);
+    cv::circle(picture, cv::Point2d(at.x(), at.y()), 4, blue, 1, cv::LINE_AA);
+    cv::line(picture, cv::Point2d(at.x(), at.y()), cv::Point2d(tip.x(), tip.y()), vermillion, 2,
+             cv::LINE_AA);
+  }
+  cv::putText(picture, "residuals x 20", {12, picture.rows - 14}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
+              vermillion, 1, cv::LINE_AA);
+  write_picture(picture, options.picture);
+}
+
+void tell(const Options& options, const Views& views, const tracking::Calibration& result,
+          const std::string& floor) {
+  const std::size_t worst = worst_view(result);
+  const double worst_px = result.view_rms_px[worst];
+  const std::string& worst_name = views.found[worst].name;
+  std::vector<std::string> left_out;
+  for (std::size_t i = 0; i < views.found.size(); ++i)
+    if (is_left_out(result, i)) left_out.push_back(views.found[i].name);
+  const data::Camera& c = result.camera;
+  const Eigen::Vector3d at = c.position_m();
+  if (options.json)
+    return print_json({{"camera", options.output.string()},
+                       {"views", views.found.size()},
+                       {"pictures", views.looked_at},
+                       {"rms_px", result.rms_px},
+                       {"worst_view", worst_name},
+                       {"worst_rms_px", worst_px},
+                       {"left_out", left_out},
+                       {"sigma_focal_px", result.sigma_focal_px},
+                       {"sigma_centre_px", result.sigma_centre_px},
+                       {"floor", floor},
+                       {"camera_m", {at.x(), at.y(), at.z()}}});
+  fmt::print(
+      "{}: board found in {} of {} pictures{}, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
+      options.output.string(), views.found.size(), views.looked_at,
+      left_out.empty() ? "" : fmt::format(", {} left out", left_out.size()), result.rms_px,
+      worst_px, worst_name);
+  fmt::print(
+      "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
+      "{:.4f}, k2 {:.4f}\n",
+      c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
+      result.sigma_k1, c.distortion[1]);
+  fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
+}
+
+// Before the pictures, which take time to look at.
+void check_points(const Options& options) {
+  if (!options.floor_points.empty()) (void)floor_points(options);
+  if (options.circle_points.empty()) return;
+  (void)circle_points(options);
+  if (!(options.radius_mm > 0.0))
+    throw InputError("--circle-points needs --radius-mm, the radius of the circle");
+}
+
+void check_outputs(const Options& options) {
+  std::vector<fs::path> inputs = options.inputs;
+  inputs.push_back(options.floor_points);
+  inputs.push_back(options.circle_points);
+  check_output(options.picture, inputs);
+  inputs.push_back(options.picture);
+  check_output(options.output, inputs);
+}
+
+void run(const Options& options) {
+  check_outputs(options);
+  check_points(options);
+  const tracking::BoardPattern pattern = pattern_of(options);
+  Views views = look_at_inputs(options, pattern);
+  tracking::Calibration result = tracking::calibrate(views.found, views.size);
+  set_aside(result, views);
+  const std::string floor = place_floor(options, views, result.camera);
+  if (!options.picture.empty()) draw_check(options, views, result.camera);
+  data::write_camera(result.camera, options.output);
+  tell(options, views, result, floor);
+  constexpr double kPoor_px = 1.0;
+  if (result.rms_px > kPoor_px)
+    throw NotGood(
+        fmt::format("reprojection rms {:.2f} px is poor: a bent board, motion blur or "
+                    "wrong corners",
+                    result.rms_px));
+  const bool on_board = options.floor_points.empty() && options.circle_points.empty();
+  if (on_board && is_left_out(result, floor_view(options, views)))
+    throw NotGood(
+        fmt::format("{}: contradicts the other pictures, and the floor is taken from it; name "
+                    "another with --floor",
+                    views.found[floor_view(options, views)].name));
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("calibrate", "Find a camera from pictures of a board, and the floor");
+  command->add_option("inputs", options->inputs, "Pictures of the board, or a video of it")
+      ->required();
+  command->add_option("--pattern", options->pattern,
+                      "Inner corners of a chessboard, squares of a ChArUco board [9x6]");
+  command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
+      ->required()
+      ->check(positive_number());
+  command
+      ->add_option("--marker-mm", options->marker_mm,
+                   "Side of a marker [mm]: the board is a ChArUco board")
+      ->check(positive_number());
+  command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]")
+      ->needs("--marker-mm");
+  command->add_option("--floor", options->floor,
+                      "Picture in which the board lies on the floor [the first]");
+  command->add_option("--floor-height-mm", options->floor_height_mm,
+                      "Height of that board, of the points or of the circle above the floor [0]");
+  command
+      ->add_option("--floor-points", options->floor_points,
+                   "CSV with x_px, y_px, x_m, y_m of four or more points of the floor")
+      ->excludes("--floor");
+  command
+      ->add_option("--circle-points", options->circle_points,
+                   "CSV with x_px, y_px of points on the rim of a body at rest on its face")
+      ->excludes("--floor")
+      ->excludes("--floor-points");
+  command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
+      ->check(positive_number())
+      ->needs("--circle-points");
+  command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
+  command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
+  add_json_flag(*command, options->json);
+  command->footer(
+      "Example: trochoid calibrate board/*.png --pattern 9x6 --square-mm 20 -o camera.json");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

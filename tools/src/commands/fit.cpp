@@ -1,0 +1,229 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "commands.hpp"
+#include "common/fit_job.hpp"
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "common/provenance.hpp"
+#include "common/scene_library.hpp"
+#include "common/validators.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+// trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
+namespace trochoid::tools {
+namespace {
+
+struct FitCommand {
+  std::vector<std::string> tracks;
+  std::string scene, output;
+  std::optional<int> object;
+  bool compare = false, json = false;
+  fitting::FitOptions options;
+};
+
+// Value and error to the error's second digit.
+std::string with_error(double value, double sigma) {
+  if (!(sigma > 0.0) || !std::isfinite(sigma)) return fmt::format("{:.6g}", value);
+  const int digits =
+      std::max(0, static_cast<int>(std::floor(std::log10(std::max(std::abs(value), sigma)))) -
+                      static_cast<int>(std::floor(std::log10(sigma))) + 2);
+  return fmt::format("{:.{}g} +- {:.2g}", value, std::min(digits, 15), sigma);
+}
+
+const char* word(data::ParameterStatus status) {
+  switch (status) {
+    case data::ParameterStatus::fixed:
+      return "fixed";
+    case data::ParameterStatus::derived:
+      return "derived";
+    case data::ParameterStatus::prior:
+      return "prior";
+    default:
+      return "fitted";
+  }
+}
+
+void print_notes(const data::Fit& fit) {
+  for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
+}
+
+void print_comparison(const std::vector<data::ModelScore>& models) {
+  if (models.empty()) return;
+  fmt::print("  {:>10}{:>12}{:>12}{:>12}   model\n", "AICc", "BIC", "held back", "parameters");
+  for (const data::ModelScore& m : models) {
+    const std::string held_back = std::isnan(m.held_back_rms_sigma)
+                                      ? "-"
+                                      : fmt::format("{:.2f} sigma", m.held_back_rms_sigma);
+    if (std::isnan(m.bic))
+      fmt::print("  {:>10}{:>12}{:>12}{:>12}   {}: not fitted: {}\n", "-", "-", "-", "-", m.model,
+                 m.reason);
+    else
+      fmt::print("{} {:>10.2f}{:>12.2f}{:>12}{:>12}   {}{}\n", m.recommended ? "*" : " ", m.aicc,
+                 m.bic, held_back, m.parameters, m.model,
+                 m.reason.empty() ? "" : ": not accepted: " + m.reason);
+  }
+}
+
+void print(const data::Fit& fit) {
+  fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
+  // Where no start led anywhere, there is nothing to count.
+  if (fit.parameters.empty()) return print_notes(fit);
+  if (fit.converged) fmt::print("  {}: {}\n", fit.verdict, fit.verdict_words);
+  for (const data::FitParameter& p : fit.parameters)
+    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
+               word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
+  fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3g}, whiteness p {:.2g}\n",
+             fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
+  fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
+             fit.covariance_names.size(), fit.integration_error_sigma);
+  for (const data::Profile& p : fit.profiles)
+    fmt::print("  profile of {:<22} {:<9} 95 % {:.6g} .. {:.6g}\n", p.parameter, p.verdict,
+               p.lower_95, p.upper_95);
+  for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
+    fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
+               b.lower_95, b.upper_95);
+  print_comparison(fit.comparison);
+  if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
+  print_notes(fit);
+}
+
+// No unit can be told from numbers alone, but these are no laboratory's.
+void tell_odd_units(const std::string& path, const data::Track& track) {
+  constexpr double kWide_m = 20.0, kSparse_s = 1.0;
+  if (track.samples.size() < 2) return;
+  Eigen::AlignedBox2d box;
+  for (const data::TrackSample& sample : track.samples)
+    if (sample.has_metres()) box.extend(sample.centre_m);
+  if (!box.isEmpty() && box.diagonal().norm() > kWide_m)
+    note(fmt::format("{}: the path is {:.3g} m across; are x_m, y_m in metres?", path,
+                     box.diagonal().norm()));
+  const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
+                        static_cast<double>(track.samples.size() - 1);
+  if (step_s > kSparse_s)
+    note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
+}
+
+std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
+  std::vector<data::Track> tracks;
+  std::map<std::string, std::string> by_checksum;
+  for (const std::string& path : command.tracks) {
+    const data::TrackFile file = data::read_track(path);
+    const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(path), path);
+    if (!fresh)
+      throw InputError(
+          fmt::format("{}: is the same track as {}; a recording counts once", path, same->second));
+    add_checksum(provenance.inputs, path);
+    if (!file.source_sha256.empty()) provenance.inputs[file.source] = file.source_sha256;
+    for (const data::Track& track : file.tracks)
+      if (!command.object || track.object == *command.object) {
+        tell_odd_units(path, track);
+        tracks.push_back(track);
+      }
+  }
+  if (tracks.empty())
+    throw InputError(fmt::format("--object {}: no track has it", command.object.value_or(0)));
+  return tracks;
+}
+
+data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& tracks,
+                 const data::Scene& scene) {
+  fitting::FitOptions options = command.options;
+  Progress progress("fit");
+  if (talk() == Talk::verbose)
+    options.log = detail;
+  else
+    options.progress = [&progress](const std::string& stage) { progress.update(stage); };
+  try {
+    return in_scene(command.scene,
+                    [&] { return fit_job(tracks, scene, options, command.compare); });
+  } catch (const TrackError& error) {
+    throw InputError(fmt::format("{}: {}", fmt::join(command.tracks, ", "), error.what()));
+  }
+}
+
+/// What could explain a track that the fit does not.
+std::string advice(const data::Fit& fit, const data::Scene& scene,
+                   const fitting::FitOptions& options) {
+  if (fit.outcome != "unexplained") return "";
+  std::string words;
+  const bool pivot_assumed = fit.model.starts_with("top") && !scene.support.pivot_m &&
+                             !scene.fit.free_pivot && !options.free_pivot;
+  if (pivot_assumed) words += "; the pivot was taken to be at x = y = 0, --free-pivot fits it";
+  if (fit.comparison.empty()) words += "; --compare tries what the model lacks";
+  return words;
+}
+
+void run(const FitCommand& command) {
+  std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
+  inputs.emplace_back(command.scene);
+  check_output(command.output, inputs);
+  static_cast<void>(data::parse_window(command.options.from, command.options.to));
+  data::Fit provenance;
+  const std::vector<data::Track> tracks = read_tracks(command, provenance);
+  data::Scene scene;
+  if (!command.scene.empty()) {
+    scene = load_scene(command.scene);
+    if (std::filesystem::exists(command.scene)) add_checksum(provenance.inputs, command.scene);
+  } else if (command.options.model.empty()) {
+    throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
+  }
+  data::Fit fit = fitted(command, tracks, scene);
+  fit.inputs = provenance.inputs;
+  if (!command.output.empty()) data::write_fit(fit, command.output);
+  if (command.json)
+    fmt::print("{}", data::fit_text(fit, "fit"));
+  else
+    print(fit);
+  if (!fit.converged)
+    throw NotGood(
+        fmt::format("the fit is not good: {}{}", fit.reason, advice(fit, scene, command.options)));
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app) {
+  auto command = std::make_shared<FitCommand>();
+  auto* fit = app.add_subcommand("fit", "Fit model parameters to one or more tracks of a body");
+  fit->add_option("track", command->tracks,
+                  "Track CSV files (docs/formats.md); t_s,x_m,y_m will do")
+      ->required();
+  fit->add_option("--scene,-s", command->scene,
+                  "Scene file, or a bundled scene's name: body, model, priors");
+  fit->add_option("--model,-m", command->options.model,
+                  "Model to fit, or auto: compare, as where the scene names none; overrides the "
+                  "scene's")
+      ->check(fitted_model());
+  fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
+  fit->add_option("--object", command->object, "Fit this object of the track only")
+      ->check(whole_number());
+  fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
+  fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
+  fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
+  fit->add_flag("--compare", command->compare,
+                "Try the models that make sense for the scene; fit the simplest that suffices");
+  fit->add_flag("--profile", command->options.profile,
+                "Profile likelihood of the body's and the table's parameters");
+  fit->add_option("--bootstrap", command->options.bootstrap,
+                  "Fits to residuals resampled in blocks, for the shape of the error bars; 0: none")
+      ->check(whole_number_within(0, 100000));
+  fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
+      ->check(whole_number());
+  fit->add_option("--seed", command->options.seed, "Seed of everything random")->check(seed());
+  fit->add_flag("--json", command->json, "Print the fit as its file holds it (JSON)");
+  fit->footer("Example: trochoid fit ring.track.csv --scene ring.toml -o ring.fit.json");
+  fit->callback([command] { run(*command); });
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,455 @@
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <utility>
+
+#include "commands.hpp"
+#include "common/json_summary.hpp"
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "common/scene_library.hpp"
+#include "common/validators.hpp"
+#include "draw/render_picture.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/model/simulate.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string scene;
+  fs::path output, camera;
+  double rate_hz = 0.0, until_s = 0.0;
+  int width_px = 640, height_px = 480, quality = 14;
+  double body = -1.0, floor = -1.0;  // brightness, instead of the style's colours
+  bool no_shadow = false, lossless = false, json = false;
+  RenderStyle style;
+};
+
+// Poses of a run at any time, between samples by cubics through four of them.
+class Motion {
+ public:
+  Motion(const model::Trajectory& run, double rate_hz) : model_(run.model), rate_hz_(rate_hz) {
+    for (const char* name : {"x_m", "y_m", "z_m", "theta_rad", "phi_rad", "psi_rad"}) {
+      const auto at = std::find(run.columns.begin(), run.columns.end(), name);
+      if (at == run.columns.end())
+        throw InputError(fmt::format(
+            "render: model {} has no column {}; render needs a body that moves in space", run.model,
+            name));
+      columns_.emplace_back(run.values.col(at - run.columns.begin()));
+    }
+  }
+  [[nodiscard]] const std::string& model() const { return model_; }
+  [[nodiscard]] double end_s() const {
+    return static_cast<double>(columns_.front().size() - 1) / rate_hz_;
+  }
+  [[nodiscard]] data::Pose<> at(double t_s) const {
+    const auto last = columns_.front().size() - 1;
+    const double place = t_s * rate_hz_;
+    const auto i = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(place)) - 1, 0,
+                                            std::max<Eigen::Index>(0, last - 3));
+    const double u = std::min(place, static_cast<double>(last)) - static_cast<double>(i);
+    const auto value = [&](std::size_t column) {
+      const Eigen::VectorXd& v = columns_[column];
+      if (last < 3) return v[std::clamp<Eigen::Index>(std::lround(place), 0, last)];
+      double sum = 0.0;
+      for (int k = 0; k < 4; ++k) {  // Lagrange
+        double basis = 1.0;
+        for (int m = 0; m < 4; ++m)
+          if (m != k) basis *= (u - m) / (k - m);
+        sum += basis * v[i + k];
+      }
+      return sum;
+    };
+    data::Pose<> pose;
+    pose.centre_m = {value(0), value(1), value(2)};
+    pose.theta_rad = value(3);
+    pose.phi_rad = value(4);
+    pose.psi_rad = value(5);
+    return pose;
+  }
+
+ private:
+  std::string model_;
+  double rate_hz_;
+  std::vector<Eigen::VectorXd> columns_;
+};
+
+// A camera straight above that shows the whole path with room for the body.
+data::Camera camera_over(const Motion& motion, const data::Body& body, int width_px,
+                         int height_px) {
+  constexpr double kHeight_radii = 25.0, kMargin_radii = 1.8;
+  constexpr int kLooks = 200;
+  Eigen::Vector2d low = motion.at(0.0).centre_m.head<2>(), high = low;
+  for (int i = 0; i <= kLooks; ++i) {
+    const Eigen::Vector2d p = motion.at(motion.end_s() * i / kLooks).centre_m.head<2>();
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  const Eigen::Vector2d size =
+      high - low + Eigen::Vector2d::Constant(2.0 * kMargin_radii * body.radius_m);
+  const double scale = std::min(width_px / size.x(), height_px / size.y());
+  const Eigen::Vector2d middle = 0.5 * (low + high);
+  const double height = std::max(kHeight_radii * body.radius_m, 2.0 * size.maxCoeff());
+  data::Camera camera = data::Camera::overhead(width_px, height_px, scale, height);
+  camera.camera_from_table_m -=
+      camera.camera_from_table * Eigen::Vector3d(middle.x(), middle.y(), 0.0);
+  return camera;
+}
+
+data::Camera camera_of(const Options& options, const data::Scene& scene, const Motion& motion) {
+  if (!options.camera.empty()) return data::read_camera(options.camera);
+  if (!scene.camera.file.empty()) return data::read_camera(scene.camera.file);
+  if (scene.camera.scale_px_per_m && scene.camera.height_m)
+    return data::Camera::overhead(options.width_px, options.height_px, *scene.camera.scale_px_per_m,
+                                  *scene.camera.height_m);
+  if (scene.camera.scale_px_per_m)
+    return data::Camera::from_scale(options.width_px, options.height_px,
+                                    *scene.camera.scale_px_per_m);
+  return camera_over(motion, *scene.body, options.width_px, options.height_px);
+}
+
+/// A folder for what another process writes. Once it is gone, by its end or by Ctrl-C, a process
+/// that was only just starting can leave nothing behind.
+class Workshop {
+ public:
+  explicit Workshop(const fs::path& target) : folder_(data::pending_neighbour(target)) {
+    std::error_code code;
+    if (fs::create_directory(folder_, code)) return;
+    data::discard_pending(folder_);
+    throw InputError(fmt::format("{}: cannot be written: {}", target.string(), code.message()));
+  }
+  ~Workshop() { data::discard_pending(folder_); }
+  Workshop(const Workshop&) = delete;
+  Workshop& operator=(const Workshop&) = delete;
+  [[nodiscard]] fs::path file(const fs::path& name) const { return folder_ / name; }
+
+ private:
+  fs::path folder_;
+};
+
+// Frames to an encoder process; libavcodec's own would tie us to one version of its options.
+class Encoder {
+ public:
+  /// Writes into `file`; messages name `target`, which it is to become.
+  Encoder(const fs::path& file, const fs::path& target, const data::Camera& camera, double rate_hz,
+          int quality, bool lossless)
+      : target_(target.string()), log_(file.string() + ".log") {
+    const std::string coding = lossless
+                                   ? "-c:v ffv1 -pix_fmt bgr0"
+                                   : fmt::format("-c:v libx264 -crf {} -pix_fmt yuv420p", quality);
+    const std::string command = fmt::format(
+        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt bgr24 -s {}x{} -r {:.9g} -i - {} {} "
+        "2>{}",
+        camera.width_px, camera.height_px, rate_hz, coding, shell_quoted(file.string()),
+        shell_quoted(log_.string()));
+    std::signal(SIGPIPE, SIG_IGN);  // a missing encoder is told by write()
+    pipe_ = popen(command.c_str(), "w");
+    if (pipe_ == nullptr) fail();
+  }
+  ~Encoder() { close(); }
+  Encoder(const Encoder&) = delete;
+  Encoder& operator=(const Encoder&) = delete;
+  void write(const cv::Mat& picture) {
+    const std::size_t size = picture.total() * picture.elemSize();
+    if (std::fwrite(picture.data, 1, size, pipe_) != size) fail();
+  }
+  void finish() {
+    if (close() != 0) fail();
+  }
+
+ private:
+  int close() {
+    FILE* pipe = std::exchange(pipe_, nullptr);
+    return pipe != nullptr ? pclose(pipe) : 0;
+  }
+  /// With what the encoder itself has to say, which it has said when it has ended.
+  [[noreturn]] void fail() {
+    close();
+    std::ifstream log(log_);
+    std::string words;
+    std::getline(log, words);
+    throw InputError(fmt::format(
+        "{}: cannot be encoded: {}", target_,
+        words.empty() ? "ffmpeg does not say why; is the disk full?" : "ffmpeg: " + words));
+  }
+  std::string target_;
+  fs::path log_;
+  FILE* pipe_ = nullptr;
+};
+
+std::string truth_row(int frame, double t_s, const data::Pose<>& pose, const data::Camera& camera) {
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(pose.phi_rad, Eigen::Vector3d::UnitZ()) *
+                             Eigen::AngleAxisd(pose.theta_rad, Eigen::Vector3d::UnitX()) *
+                             Eigen::AngleAxisd(pose.psi_rad, Eigen::Vector3d::UnitZ()));
+  const Eigen::Vector2d p = camera.image_from_table<double>(pose.centre_m);
+  const double inside =
+      p.x() > 0.0 && p.y() > 0.0 && p.x() < camera.width_px - 1.0 && p.y() < camera.height_px - 1.0
+          ? 1.0
+          : 0.0;
+  return fmt::format(
+      "{},{:.9f},{:.9f},{:.9f},{:.9f},{:.5f},{:.5f},{:.9f},{:.9f},{:.9f},{:.9f},{:.8f},{:.8f},"
+      "{:.8f},{:.0f}\n",
+      frame, t_s, pose.centre_m.x(), pose.centre_m.y(), pose.centre_m.z(), p.x(), p.y(), q.w(),
+      q.x(), q.y(), q.z(), pose.theta_rad, pose.phi_rad, pose.psi_rad, inside);
+}
+
+nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& model) {
+  const data::Body& body = *scene.body;
+  nlohmann::ordered_json json;
+  const bool ring = body.inner_radius_m > 0.0;
+  json["type"] = ring ? "ring" : "disc";
+  json[ring ? "R_outer_m" : "R_m"] = body.radius_m;
+  if (ring) json["R_inner_m"] = body.inner_radius_m;
+  json[ring ? "height_m" : "thickness_m"] = body.thickness_m;
+  if (body.mass_kg) json["mass_kg"] = *body.mass_kg;
+  if (body.l_m) json["com_to_pivot_m"] = *body.l_m;
+  if (const auto& p = scene.support.pivot_m) json["pivot_m"] = {p->x(), p->y(), p->z()};
+  if (body.axle_radius_m > 0.0) {
+    json["axle_radius_m"] = body.axle_radius_m;
+    json["axle_above_upper_face_m"] = body.axle_above_m;
+  }
+  json["convention"] =
+      "body z = symmetry axis; quaternion w,x,y,z maps body to world; world z up, floor z=0; "
+      "R = Rz(phi) Rx(theta) Rz(psi), theta = angle of axis from vertical";
+  json["markers"] = nlohmann::ordered_json::array();
+  for (const data::SpinMark& mark : body.marks) {
+    std::vector<int> faces;
+    if (mark.on_upper_face) faces.push_back(1);
+    if (mark.on_lower_face) faces.push_back(-1);
+    json["markers"].push_back({{"kind", "dot"},
+                               {"r_m", mark.distance_m},
+                               {"radius_m", mark.size_m},
+                               {"angle_deg", mark.angle_rad * 180.0 / std::numbers::pi},
+                               {"faces", faces}});
+  }
+  json["dynamics"] = {
+      {"model", model}, {"g", scene.model.gravity_m_s2}, {"scene_toml", data::to_toml(scene)}};
+  return json;
+}
+
+// FOLDER/video.mp4 with truth.csv, camera.json, object.json; or clip.mp4 with clip.truth.csv, ...
+struct Targets {
+  fs::path video, truth, camera, object;
+};
+Targets targets_of(const fs::path& output, bool lossless) {
+  const std::string ending = lossless ? ".mkv" : ".mp4";
+  const std::string given = output.extension().string();
+  if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
+    throw InputError(fmt::format("{}: name {}", output.string(),
+                                 lossless ? "a folder or, as it is to be lossless, a .mkv file"
+                                          : "a folder, an .mp4 or an .mkv file"));
+  if (output.extension().empty())
+    return {output / ("video" + ending), output / "truth.csv", output / "camera.json",
+            output / "object.json"};
+  const auto beside = [&](const char* name) {
+    fs::path path = output;
+    return path.replace_extension(name);
+  };
+  return {output, beside(".truth.csv"), beside(".camera.json"), beside(".object.json")};
+}
+
+void check_targets(const Options& options, const Targets& targets) {
+  const bool folder = options.output.extension().empty();
+  if (folder) check_folder(options.output);
+  if (folder && !fs::exists(options.output)) return;
+  for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
+    check_output(file, {options.scene, options.camera});
+}
+
+RenderStyle style_of(const Options& options) {
+  RenderStyle style = options.style;
+  style.shadow = !options.no_shadow;
+  if (options.body >= 0.0) style.body.setConstant(static_cast<float>(options.body));
+  if (options.floor >= 0.0) style.floor.setConstant(static_cast<float>(options.floor));
+  return style;
+}
+
+// Containers keep times as whole ticks: frames that come faster share one, or are slowed down.
+void check_rate(const std::string& scene, double rate_hz, const fs::path& video) {
+  constexpr double kSlowest_Hz = 1e-3, kMp4Ticks_Hz = 1e6, kMatroskaTicks_Hz = 1e3;
+  const std::string ending = video.extension().string();
+  const double fastest_Hz = ending == ".mkv" ? kMatroskaTicks_Hz : kMp4Ticks_Hz;
+  if (rate_hz < kSlowest_Hz || rate_hz > fastest_Hz)
+    throw InputError(fmt::format(
+        "{}: run.rate_hz (--rate) = {:g} frames per second do not go into an {} file; from {:g} to "
+        "{:g} do",
+        scene, rate_hz, ending, kSlowest_Hz, fastest_Hz));
+}
+
+// The scene with what the options set in it; run.rate_hz is the video's.
+data::Scene scene_to_draw(const Options& options, const Targets& targets) {
+  data::Scene scene = load_scene(options.scene);
+  if (!scene.body || !(scene.body->radius_m > 0.0))
+    throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
+  if (options.rate_hz > 0.0) scene.run.rate_hz = options.rate_hz;
+  if (options.until_s > 0.0) scene.run.until_s = options.until_s;
+  constexpr double kMostFrames = 1e6;  // hours of drawing
+  check_rate(options.scene, scene.run.rate_hz, targets.video);
+  check_length(options.scene, scene.run.until_s, scene.run.rate_hz, kMostFrames, "frames");
+  return scene;
+}
+
+Motion simulated(const std::string& scene_name, data::Scene scene) {
+  constexpr int kPerFrame = 16;  // samples of the motion per frame
+  scene.run.rate_hz *= kPerFrame;
+  const model::Trajectory run = in_scene(scene_name, [&] { return model::simulate(scene); });
+  tell_idle_keys(scene_name, scene);
+  return {run, scene.run.rate_hz};
+}
+
+data::Camera recording_camera(const Options& options, const data::Scene& scene,
+                              const Motion& motion) {
+  data::Camera camera = camera_of(options, scene, motion);
+  if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
+    throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
+                                 camera.width_px, camera.height_px));
+  camera.frame_rate_hz = scene.run.rate_hz;
+  camera.exposure_fraction = options.style.exposure_fraction;
+  if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
+  return camera;
+}
+
+// Poses spread over the time the shutter is open around t_s.
+std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double rate_hz,
+                                        const RenderStyle& style) {
+  std::vector<data::Pose<>> poses;
+  for (int i = 0; i < style.times; ++i)
+    poses.push_back(
+        motion.at(t_s + ((i + 0.5) / style.times - 0.5) * style.exposure_fraction / rate_hz));
+  return poses;
+}
+
+// Draws every frame. @returns the table of the truth.
+std::string draw(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
+                 const RenderStyle& style, int frames, Encoder& encoder) {
+  const double rate_hz = scene.run.rate_hz;
+  const PictureRenderer renderer(*scene.body, camera, style);
+  std::string truth =
+      "frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac\n";
+  Progress progress("render");
+  for (int frame = 0; frame < frames; ++frame) {
+    const double t_s = frame / rate_hz;
+    const double brightness = 1.0 + style.flicker * std::sin(2.0 * std::numbers::pi * 100.0 * t_s);
+    const auto poses = exposed_poses(motion, t_s, rate_hz, style);
+    encoder.write(renderer.picture(renderer.light(poses), frame, brightness));
+    truth += truth_row(frame, t_s, motion.at(t_s), camera);
+    progress.update(frame + 1, frames);
+  }
+  return truth;
+}
+
+void tell(const Options& options, const Targets& targets, const data::Camera& camera, int frames) {
+  if (options.json)
+    return print_json({{"video", targets.video.string()},
+                       {"truth", targets.truth.string()},
+                       {"camera", targets.camera.string()},
+                       {"object", targets.object.string()},
+                       {"frames", frames},
+                       {"frame_rate_hz", *camera.frame_rate_hz},
+                       {"width_px", camera.width_px},
+                       {"height_px", camera.height_px}});
+  fmt::print("{}: {} frames of {} x {} at {:.6g} Hz, truth in {}\n", targets.video.string(), frames,
+             camera.width_px, camera.height_px, *camera.frame_rate_hz, targets.truth.string());
+}
+
+void run(const Options& options) {
+  const Targets targets = targets_of(options.output, options.lossless);
+  check_targets(options, targets);
+  const data::Scene scene = scene_to_draw(options, targets);
+  const Motion motion = simulated(options.scene, scene);
+  const data::Camera camera = recording_camera(options, scene, motion);
+  const double rate_hz = scene.run.rate_hz;
+  const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
+
+  if (options.output.extension().empty()) make_folder(options.output);
+  data::PendingFile video(targets.video);
+  const Workshop workshop(targets.video);
+  const fs::path encoded = workshop.file(targets.video.filename());
+  Encoder encoder(encoded, targets.video, camera, rate_hz, options.quality, options.lossless);
+  const std::string truth = draw(motion, scene, camera, style_of(options), frames, encoder);
+  encoder.finish();
+  check_written_video(encoded, frames, targets.video);
+  fs::rename(encoded, video.path());
+  data::write_text(truth, targets.truth);
+  data::write_camera(camera, targets.camera);
+  data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);
+  video.commit();
+  tell(options, targets, camera, frames);
+}
+
+void add_look_options(CLI::App& command, Options& options) {
+  RenderStyle& style = options.style;
+  command.add_option("--body", options.body, "Brightness of the body, 0..1")
+      ->check(number_within(0.0, 1.0));
+  command.add_option("--floor", options.floor, "Brightness of the floor, 0..1")
+      ->check(number_within(0.0, 1.0));
+  command.add_option("--texture", style.texture, "Of the floor, relative [0.05]")
+      ->check(number_within(0.0, 1.0));
+  command.add_option("--gloss", style.gloss, "Highlights on the body [0.1]")
+      ->check(number_within(0.0, 10.0));
+  command.add_flag("--no-shadow", options.no_shadow, "The body casts no shadow");
+  command.add_option("--blur", style.blur_px, "Of the lens, standard deviation [px, 0.5]")
+      ->check(number_within(0.0, 20.0));
+  command.add_option("--noise", style.noise_levels, "Standard deviation [8-bit levels, 1]")
+      ->check(number_within(0.0, 100.0));
+  command.add_option("--exposure", style.exposure_fraction, "Share of the frame interval [0.25]")
+      ->check(number_within(0.0, 1.0));
+  command.add_option("--flicker", style.flicker, "Relative amplitude at 100 Hz [0]")
+      ->check(number_within(0.0, 0.9));
+  command.add_option("--samples", style.samples, "Rays across a pixel on an edge [8]")
+      ->check(whole_number_within(1, 64));
+  command.add_option("--times", style.times, "Pictures averaged over the exposure [5]")
+      ->check(whole_number_within(1, 64));
+  command.add_option("--seed", style.seed, "Of texture and noise [1]")->check(seed());
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("render", "Make a recording of a simulated scene, with its truth");
+  command
+      ->add_option("--scene", options->scene, "Scene file (TOML), or the name of a bundled scene")
+      ->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "Clip to write (.mp4, .mkv), or a folder for video.mp4, truth.csv, camera.json "
+                   "and object.json")
+      ->required();
+  CLI::Option* camera = command->add_option("--camera", options->camera,
+                                            "Camera file [the scene's, else from above]");
+  command->add_option("--width", options->width_px, "Of the picture [px, 640]")
+      ->check(whole_number_within(32, 8192))
+      ->excludes(camera);
+  command->add_option("--height", options->height_px, "Of the picture [px, 480]")
+      ->check(whole_number_within(32, 8192))
+      ->excludes(camera);
+  command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
+      ->check(frame_rate());
+  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
+  command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
+      ->check(whole_number_within(0, 51));
+  command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)")
+      ->excludes("--crf");
+  add_look_options(*command, *options);
+  add_json_flag(*command, options->json);
+  command->footer(
+      "Example: trochoid render --scene disc_rolling -o planned.mp4 --blur 1 --noise 2");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

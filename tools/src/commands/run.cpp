@@ -1,0 +1,381 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "commands.hpp"
+#include "common/json_summary.hpp"
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "common/provenance.hpp"
+#include "common/scene_library.hpp"
+#include "common/track_options.hpp"
+#include "common/validators.hpp"
+#include "draw/overlay.hpp"
+#include "report/parts.hpp"
+#include "report/report.hpp"
+#include "report/run_folder.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
+#include "trochoid/fitting/compare.hpp"
+#include "trochoid/fitting/fit.hpp"
+#include "trochoid/tracking/tracker.hpp"
+
+// trochoid run: recording in, folder with track, fit, overlay and report out. Each stage calls what
+// its own command calls; nothing is computed here.
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string video, scene, camera, output, model, from, to, at;
+  tracking::Effort effort = tracking::Effort::normal;
+  int objects = 0;
+  double rate_hz = 0.0, slow = 0.0;
+  std::uint64_t seed = 1;
+  bool free_pivot = false, json = false;
+};
+
+/// What the stages hand to each other.
+struct Run {
+  data::Scene scene;
+  std::optional<data::Camera> camera;
+  tracking::TrackResult tracked;
+  std::optional<data::Fit> fit;
+  std::string no_fit_reason;
+  OverlayFrames overlay;
+  nlohmann::ordered_json times;
+
+  template <class Stage>
+  void timed(const char* name, const Stage& stage) {
+    const auto start = Clock::now();
+    stage();
+    times[std::string(name) + "_s"] = std::chrono::duration<double>(Clock::now() - start).count();
+  }
+};
+
+fs::path folder_of(const Options& options) {
+  if (!options.output.empty()) return options.output;
+  return fs::path(options.video).stem().string() + ".trochoid";
+}
+
+std::string stem_of(const Options& options) {
+  return fs::path(options.video).stem().string();
+}
+
+Run prepared(const Options& options) {
+  Run run;
+  if (!options.scene.empty()) run.scene = data::read_scene(options.scene);
+  if (!options.model.empty()) run.scene.model.name = options.model;
+  if (options.objects > 0) run.scene.tracking.objects = options.objects;
+  if (!options.at.empty()) run.scene.tracking.at_px = parse_point(options.at);
+  if (options.rate_hz > 0.0) run.scene.camera.frame_rate_hz = options.rate_hz;
+  if (!options.camera.empty()) {
+    run.camera = data::read_camera(options.camera);
+    run.scene.camera.scale_px_per_m.reset();
+    run.scene.camera.height_m.reset();
+  } else if (!run.scene.camera.file.empty()) {
+    run.camera = data::read_camera(run.scene.camera.file);
+  }
+  return run;
+}
+
+void track(Run& run, const Options& options) {
+  Progress progress("track");
+  tracking::TrackOptions how;
+  how.objects = run.scene.tracking.objects;
+  how.from = options.from;
+  how.to = options.to;
+  how.effort = options.effort;
+  how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
+  run.tracked = tracking::track_video(options.video, run.scene, run.camera, how);
+  run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
+}
+
+bool has_metres(const data::TrackFile& file) {
+  for (const data::Track& track : file.tracks)
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.has_metres()) return true;
+  return false;
+}
+
+fitting::FitOptions fit_options(const Options& options, Progress& progress) {
+  fitting::FitOptions how;
+  how.free_pivot = options.free_pivot;
+  how.seed = options.seed;
+  if (options.effort == tracking::Effort::exact) {
+    how.profile = true;
+    how.bootstrap = 200;
+  }
+  how.progress = [&progress](const std::string& stage) { progress.update(stage); };
+  return how;
+}
+
+// A scene that names its model must be able to feed it; one that does not is fitted if it can be.
+void fit(Run& run, const Options& options) {
+  if (!has_metres(run.tracked.file)) {
+    run.no_fit_reason =
+        "there is no scale; give the body's radius, a scale or a camera file in a scene";
+    return;
+  }
+  const bool named = run.scene.model.name != "auto";
+  Progress progress("fit");
+  fitting::FitOptions how = fit_options(options, progress);
+  try {
+    // The quick way takes the model the support suggests, the others compare what could apply.
+    if (named || options.effort == tracking::Effort::quick) {
+      run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
+      if (!named && !run.fit->converged)
+        run.fit->warnings.emplace_back(
+            "a quick run fits one model, without losses the scene does not list; without --effort "
+            "quick the models that make sense are compared");
+    } else {
+      fitting::Comparison comparison = fitting::compare(run.tracked.file.tracks, run.scene, how);
+      run.fit = std::move(comparison.fit);
+      run.scene = std::move(comparison.scene);
+    }
+  } catch (const InputError& error) {
+    if (named) throw;
+    run.no_fit_reason = error.what();
+  }
+}
+
+// The scene as the folder keeps it: model settled, camera beside it.
+data::Scene kept_scene(const Run& run) {
+  data::Scene kept = run.scene;
+  if (run.fit && !run.fit->scene_toml.empty())
+    kept = data::parse_scene(run.fit->scene_toml, "the fit's scene");
+  if (run.fit && kept.model.name == "auto") kept.model.name = run.fit->model;
+  kept.camera.file = run.camera ? "camera.json" : "";
+  return kept;
+}
+
+void write_data(Run& run, const Options& options, const fs::path& folder) {
+  const std::string stem = stem_of(options);
+  const data::Scene kept = kept_scene(run);
+  data::write_text(data::to_toml(kept), folder / "scene.toml");
+  if (run.camera) data::write_camera(*run.camera, folder / "camera.json");
+  data::write_track(run.tracked.file, folder / (stem + ".track.csv"));
+  if (!run.fit) return;
+  run.fit->scene_toml = data::to_toml(kept);
+  run.fit->versions["trochoid"] = TROCHOID_VERSION;
+  run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(folder / (stem + ".track.csv"));
+  run.fit->inputs[run.tracked.file.source] = run.tracked.file.source_sha256;
+  if (!options.scene.empty()) add_checksum(run.fit->inputs, options.scene);
+  if (run.camera) add_checksum(run.fit->inputs, folder / "camera.json");
+  data::write_fit(*run.fit, folder / (stem + ".fit.json"));
+}
+
+// Shows the part where something was tracked: a clip may be much longer than its motion.
+OverlayOptions overlay_options(const Run& run, const Options& options) {
+  constexpr double kMostlyTracked = 0.7;
+  constexpr std::int64_t kLeadFrames = 20;
+  OverlayOptions how{.from = options.from, .to = options.to, .slow = options.slow};
+  std::int64_t first = std::numeric_limits<std::int64_t>::max(), last = 0;
+  for (const data::Track& track : run.tracked.file.tracks) {
+    if (track.samples.empty() || track.samples.front().frame < 0) return how;
+    first = std::min(first, track.samples.front().frame);
+    last = std::max(last, track.samples.back().frame);
+  }
+  const auto frames = static_cast<double>(run.tracked.summary.frames);
+  if (static_cast<double>(last - first + 1) > kMostlyTracked * frames) return how;
+  if (how.from.empty())
+    how.from = fmt::format("f{}", std::max<std::int64_t>(0, first - kLeadFrames));
+  if (how.to.empty()) how.to = fmt::format("f{}", last + kLeadFrames);
+  return how;
+}
+
+void show(Run& run, const Options& options, const fs::path& folder) {
+  OverlayInput input;
+  input.video = options.video;
+  input.tracks = run.tracked.file;
+  input.fit = run.fit;
+  input.scene = run.scene;
+  input.scene->camera.file.clear();
+  input.camera = run.camera;
+  const OverlayOptions how = overlay_options(run, options);
+  write_still(input, how, folder / "path.png");
+  write_residual_picture(input, folder / "residuals.png");
+  run.overlay = write_overlay(input, how, folder / "overlay.mp4");
+}
+
+std::string command_line(const Options& options) {
+  std::string line = "trochoid run " + shell_quoted(options.video);
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) line += fmt::format(" {} {}", name, shell_quoted(value));
+  };
+  add("--scene", options.scene);
+  add("--camera", options.camera);
+  add("--model", options.model);
+  add("--at", options.at);
+  add("--from", options.from);
+  add("--to", options.to);
+  if (options.objects > 0) add("--objects", std::to_string(options.objects));
+  if (options.rate_hz > 0.0) add("--rate", fmt::format("{:g}", options.rate_hz));
+  if (options.effort != tracking::Effort::normal) add("--effort", effort_name(options.effort));
+  if (options.free_pivot) line += " --free-pivot";
+  if (options.slow > 0.0) add("--slow", fmt::format("{:g}", options.slow));
+  if (options.seed != 1) add("--seed", std::to_string(options.seed));
+  return line;
+}
+
+void write_run_file(const Run& run, const Options& options, const fs::path& folder) {
+  nlohmann::ordered_json file;
+  file["trochoid"] = TROCHOID_VERSION;
+  const fs::path video = fs::absolute(options.video).lexically_normal();
+  file["video"] = (video.parent_path().filename() / video.filename()).string();
+  file["command"] = command_line(options);
+  file["frames"] = run.tracked.summary.frames;
+  file["found"] = run.tracked.summary.found;
+  file["lost"] = run.tracked.summary.lost;
+  file["doubtful"] = run.tracked.summary.doubtful;
+  file["damaged"] = run.tracked.summary.damaged;
+  file["no_fit_reason"] = run.no_fit_reason;
+  file["overlay"] = {{"frame_rate_hz", run.overlay.frame_rate_hz},
+                     {"slowed", run.overlay.slowed},
+                     {"t_s", run.overlay.t_s}};
+  data::write_text(file.dump(1) + "\n", folder / kRunFile);
+}
+
+void write_times(const Run& run, const Options& options, const fs::path& folder) {
+  data::write_text(run.times.dump(1) + "\n", folder / (stem_of(options) + ".timing.json"));
+}
+
+/// A short answer for people on stdout, or the same as JSON.
+void tell(const Run& run, const Verdict& verdict, const Options& options) {
+  const fs::path folder = folder_of(options);
+  if (options.json) {
+    nlohmann::ordered_json summary{{"folder", folder.string()},
+                                   {"report", (folder / "report.html").string()},
+                                   {"verdict", verdict.sentence},
+                                   {"grade", verdict.grade},
+                                   {"frames", run.tracked.summary.frames},
+                                   {"found", run.tracked.summary.found},
+                                   {"times", run.times}};
+    if (run.fit) {
+      summary["model"] = run.fit->model;
+      summary["converged"] = run.fit->converged;
+      summary["fit"] = (folder / (stem_of(options) + ".fit.json")).string();
+    }
+    print_json(summary);
+    return;
+  }
+  fmt::print("{}: {}\n", verdict.word, verdict.sentence);
+  if (run.fit)
+    for (const data::FitParameter& p : run.fit->parameters)
+      if (p.status != data::ParameterStatus::fixed && p.name.find('@') == std::string::npos)
+        fmt::print("  {:<26} {} {}{}\n", p.name,
+                   p.identifiable ? value_words(p.value, p.sigma) : "not seen by the data",
+                   p.identifiable ? p.unit : "",
+                   p.status == data::ParameterStatus::free      ? ""
+                   : p.status == data::ParameterStatus::derived ? "   (derived)"
+                                                                : "   (from the prior)");
+  for (const std::string& remark : verdict.remarks) fmt::print("  note: {}\n", remark);
+  fmt::print("Open {}\n", (folder / "report.html").string());
+  fmt::print("also {}, {}{}\n", (folder / "overlay.mp4").string(), (folder / "path.png").string(),
+             run.fit ? ", " + (folder / "residuals.png").string() : "");
+}
+
+/// All files of the folder.
+Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
+  write_data(run, options, folder);
+  run.timed("overlay", [&] { show(run, options, folder); });
+  write_run_file(run, options, folder);
+  write_times(run, options, folder);
+  Verdict verdict;
+  run.timed("report", [&] {
+    const ReportInput input = read_run_folder(folder);
+    verdict = judge(gather(input));
+    data::write_text(make_report(input), folder / "report.html");
+    data::write_text(make_path_svg(input), folder / "path.svg");
+  });
+  write_times(run, options, folder);
+  return verdict;
+}
+
+void run(const Options& options) {
+  Run run = prepared(options);
+  PendingFolder pending(folder_of(options));
+  run.timed("track", [&] { track(run, options); });
+  run.timed("fit", [&] { in_scene(options.scene, [&] { fit(run, options); }); });
+  const Verdict verdict =
+      pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
+  pending.commit();
+  tell(run, verdict, options);
+  check_found(run.tracked.file, run.scene.tracking.objects);
+  if (run.fit && !run.fit->converged)
+    throw NotGood(fmt::format("the fit is not good: {}", run.fit->reason));
+}
+
+std::shared_ptr<Options> add_options(CLI::App& command) {
+  auto options = std::make_shared<Options>();
+  command.add_option("video", options->video, "Recording")->required();
+  command.add_option("--scene", options->scene,
+                     "Scene TOML: body, camera, model (docs/formats.md)");
+  command.add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
+  command.add_option("-o,--output", options->output,
+                     "Folder to make (default: VIDEO's name with .trochoid)");
+  command
+      .add_option("--model", options->model,
+                  "Model to fit, or auto: compare; overrides the scene's")
+      ->check(fitted_model());
+  command
+      .add_option("--objects", options->objects,
+                  "Number of moving bodies, all of the size the scene gives")
+      ->check(whole_number_within(1, 64));
+  add_at(command, options->at);
+  command.add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
+  command.add_option("--to", options->to, "Last moment: seconds or a frame");
+  command
+      .add_option("--rate", options->rate_hz,
+                  "True frame rate [Hz]: of slow motion, or of an image folder or series")
+      ->check(frame_rate());
+  add_effort(
+      command, options->effort,
+      "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
+      "likelihoods and bootstrap");
+  command.add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
+  command
+      .add_option("--slow", options->slow,
+                  "Overlay plays this many times slower (default: at most 60 frames/s)")
+      ->check(number_within(0.01, 1000.0));
+  command.add_option("--seed", options->seed, "Seed of everything random")->check(seed());
+  add_json_flag(command, options->json);
+  return options;
+}
+
+}  // namespace
+
+void check_run(const std::vector<std::string>& words) {
+  CLI::App command;
+  const auto options = add_options(command);
+  try {
+    command.parse(std::vector<std::string>(words.rbegin(),
+                                           words.rend()));  // from the back, as CLI11 wants them
+  } catch (const CLI::ParseError& error) {
+    throw InputError(error.what());
+  }
+  const bool numbered = options->video.find('%') != std::string::npos;  // img/%04d.png
+  if (!numbered && !fs::exists(options->video))
+    throw InputError(fmt::format("{}: no such file", options->video));
+  (void)data::parse_window(options->from, options->to);
+  (void)prepared(*options);
+}
+
+void add_run_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "run", "Track, fit, overlay and report: a recording in, a folder with everything out");
+  const auto options = add_options(*command);
+  command->footer(
+      "Example:\n  trochoid run ring.mp4 --scene ring.toml\nwrites ring.trochoid/; open "
+      "ring.trochoid/report.html");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

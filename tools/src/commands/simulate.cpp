@@ -1,0 +1,230 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "commands.hpp"
+#include "common/fitted_scene.hpp"
+#include "common/json_summary.hpp"
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "common/scene_library.hpp"
+#include "common/thesis_quantities.hpp"
+#include "common/trajectory_table.hpp"
+#include "common/validators.hpp"
+#include "draw/animation.hpp"
+#include "draw/trajectory_plots.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/model/simulate.hpp"
+#include "trochoid/model/steady.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string scene;
+  fs::path fit, output, plots, animation;
+  std::size_t arc = 0;
+  std::optional<double> until_s, rate_hz, tolerance;
+  std::string model, integrator;
+  bool list = false, steady = false, thesis = false, json = false;
+};
+
+void apply_overrides(const Options& options, data::Scene& scene) {
+  if (options.until_s) scene.run.until_s = *options.until_s;
+  if (options.rate_hz) scene.run.rate_hz = *options.rate_hz;
+  if (options.tolerance) scene.run.tolerance = *options.tolerance;
+  if (!options.model.empty()) scene.model.name = options.model;
+  if (!options.integrator.empty()) scene.run.integrator = options.integrator;
+}
+
+void list_scenes(bool as_json) {
+  if (as_json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::object();
+    for (const BundledScene& scene : bundled_scenes()) list[scene.name] = scene.summary();
+    return print_json({{"scenes", list}});
+  }
+  for (const BundledScene& scene : bundled_scenes())
+    fmt::print("{:<28} {}\n", scene.name, scene.summary());
+}
+
+nlohmann::ordered_json steady_json(const std::vector<model::SteadyMotion>& motions) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const model::SteadyMotion& motion : motions)
+    list.push_back({{"floor", model::name(motion.floor)},
+                    {"motion", model::name(motion.kind)},
+                    {"theta_rad", motion.theta_rad},
+                    {"dphi_rad_s", motion.precession_rad_s},
+                    {"w3_rad_s", motion.w3_rad_s},
+                    {"circle_radius_m", motion.circle_radius_m},
+                    {"normal_force_N", motion.normal_force_N},
+                    {"friction_demand", motion.friction_demand},
+                    {"nutation2_1_s2", motion.nutation2_1_s2}});
+  return list;
+}
+
+void print_steady(const data::Scene& scene, bool as_json) {
+  if (!scene.body) throw InputError("--steady needs a [body] in the scene");
+  std::vector<double> tilts_rad;
+  for (int degrees = 10; degrees <= 80; degrees += 10)
+    tilts_rad.push_back(degrees * std::numbers::pi / 180.0);
+  const std::vector<model::SteadyMotion> motions =
+      model::steady_catalogue(*scene.body, scene.model.gravity_m_s2, tilts_rad);
+  if (as_json) return print_json({{"steady", steady_json(motions)}});
+  fmt::print("{:<7} {:<17} {:>9} {:>14} {:>10} {:>11} {:>9} {:>8} {:>16}  {}\n", "floor", "motion",
+             "tilt_deg", "dphi_rad_s", "w3_rad_s", "radius_m", "N_N", "demand", "nutation_rad_s",
+             "stability");
+  for (const model::SteadyMotion& motion : motions) {
+    const double nu2 = motion.nutation2_1_s2;
+    const std::string nutation =
+        std::isnan(nu2) ? "-" : fmt::format("{:.4f}", std::sqrt(std::abs(nu2)));
+    fmt::print("{:<7} {:<17} {:>9.1f} {:>14.4f} {:>10.4f} {:>11.5g} {:>9.4g} {:>8.4f} {:>16}  {}\n",
+               model::name(motion.floor), model::name(motion.kind),
+               motion.theta_rad * 180.0 / std::numbers::pi, motion.precession_rad_s,
+               motion.w3_rad_s, motion.circle_radius_m, motion.normal_force_N,
+               motion.friction_demand, nutation,
+               std::isnan(nu2)   ? "rests on a line or a face"
+               : motion.stable() ? "stable"
+                                 : "unstable, grows at this rate");
+  }
+}
+
+/// "ring" of ring.toml and ring.fit.json, the name of a bundled scene.
+std::string stem_of(const Options& options) {
+  if (!options.fit.empty()) return options.fit.stem().stem().string();
+  const fs::path named(options.scene);
+  return named.extension() == ".toml" ? named.stem().string() : options.scene;
+}
+
+void tell(const Options& options, const model::Trajectory& run, const fs::path& output,
+          const std::vector<std::string>& pictures) {
+  const std::string outcome(model::sentence(run.outcome));
+  if (options.json)
+    return print_json({{"trajectory", output.string()},
+                       {"rows", run.values.rows()},
+                       {"status", model::name(run.outcome)},
+                       {"outcome", outcome},
+                       {"model", run.model},
+                       {"integrator", run.integrator},
+                       {"error_estimate_m", run.error_estimate_m},
+                       {"pictures", pictures}});
+  fmt::print("{}: {} rows. {}\n", output.string(), run.values.rows(), outcome);
+  note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
+                   run.integrator, run.integrator_reason, run.error_estimate_m));
+  for (const std::string& picture : pictures) fmt::print("{}\n", picture);
+}
+
+bool broke_off(const model::Trajectory& run) {
+  using model::Outcome;
+  return run.outcome == Outcome::step_limit || run.outcome == Outcome::tolerance_not_reachable ||
+         run.outcome == Outcome::out_of_domain;
+}
+
+void check_rows(const std::string& scene, const data::RunSettings& run) {
+  constexpr double kMost = 1e7;  // a few GB
+  check_length(scene, run.until_s, run.rate_hz, kMost, "rows");
+  constexpr double kRounding = 1e-9;
+  if (run.until_s * run.rate_hz < 1.0 - kRounding)
+    throw InputError(fmt::format(
+        "{}: {:g} s at {:g} Hz leave no row but the start; raise run.rate_hz (--rate) to {:.3g}",
+        scene, run.until_s, run.rate_hz, 1.0 / run.until_s));
+}
+
+void simulate_scene(const Options& options) {
+  const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
+  const std::string stem = stem_of(options);
+  const fs::path output =
+      options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
+  for (const fs::path& file : {output, options.animation}) check_output(file, {named});
+  if (!options.plots.empty()) check_folder(options.plots);
+#ifdef TROCHOID_HAS_TRACKING
+  if (!options.animation.empty()) check_animation_name(options.animation);
+#endif
+  data::Scene scene = options.fit.empty() ? load_scene(options.scene)
+                                          : fitted_scene(data::read_fit(options.fit), options.arc);
+  apply_overrides(options, scene);
+  if (options.steady) return print_steady(scene, options.json);
+  check_rows(named.string(), scene.run);
+  const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
+  if (run.values.rows() == 0)
+    throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
+                                 options.scene, model::sentence(run.outcome)));
+  if (options.fit.empty()) tell_idle_keys(options.scene, scene);
+  data::Table table = trajectory_table(run);
+  if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
+  data::write_table(table, output);
+  std::vector<std::string> pictures;
+  if (!options.plots.empty())
+    for (const fs::path& plot : write_trajectory_plots(table, stem, options.plots))
+      pictures.push_back(plot.string());
+#ifdef TROCHOID_HAS_TRACKING
+  if (!options.animation.empty()) {
+    write_animation(table, options.animation);
+    pictures.push_back(options.animation.string());
+  }
+#endif
+  tell(options, run, output, pictures);
+  if (broke_off(run))
+    throw NotGood(fmt::format("the run broke off at t = {:g} s: {}", run.end_s,
+                              model::sentence(run.outcome)));
+}
+
+void run(const Options& options) {
+  if (options.list) return list_scenes(options.json);
+  if (options.scene.empty() == options.fit.empty())
+    throw InputError(
+        "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
+        "a fit with --fit FILE");
+  simulate_scene(options);
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("simulate", "Run a scene's model and write its trajectory");
+  command->add_option("--scene", options->scene,
+                      "Scene file (TOML), or the name of a bundled scene");
+  command->add_option(
+      "--fit", options->fit,
+      "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
+  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0")
+      ->check(whole_number())
+      ->needs("--fit");
+  command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
+  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
+  command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(positive_number());
+  command->add_option("--tolerance", options->tolerance, "Integration tolerance")
+      ->check(number_within(1e-15, 0.1));
+  command->add_option("--model", options->model, "Model, instead of the scene's");
+  command->add_option("--integrator", options->integrator,
+                      "auto, dop853, taylor, cvode-adams, cvode-bdf or arkode");
+  command->add_flag("--thesis", options->thesis,
+                    "Add body rates, angular momentum, wrapped angles and running integrals");
+  command->add_option("--plots", options->plots,
+                      "Draw angles, rates, path and energy into this folder");
+#ifdef TROCHOID_HAS_TRACKING
+  command->add_option("--animate", options->animation,
+                      "Write a clip of the path being drawn (.mp4)");
+#endif
+  command
+      ->add_flag("--steady", options->steady,
+                 "List the steady motions of the scene's body instead of running it")
+      ->excludes("--output")
+      ->excludes("--plots");
+  command->add_flag("--list", options->list, "List the bundled scenes");
+  add_json_flag(*command, options->json);
+  command->footer("Example: trochoid simulate --scene thesis-base -o base.csv --plots plots/");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,58 @@
+#include "common/child_process.hpp"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+
+namespace trochoid::tools {
+
+ChildRun run_child(const std::vector<std::string>& arguments, const std::filesystem::path& output) {
+  ChildRun run;
+  std::vector<char*> argv;
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  std::array<int, 2> pipe_ends{};
+  if (pipe2(pipe_ends.data(), O_CLOEXEC) != 0) return run;
+  const auto start = std::chrono::steady_clock::now();
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) _exit(127);  // it ended before it could be asked for a signal
+    const int nothing = open("/dev/null", O_RDWR);
+    const int written = open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    dup2(nothing, STDIN_FILENO);
+    dup2(written, STDOUT_FILENO);
+    dup2(pipe_ends[1], STDERR_FILENO);
+    execvp(argv[0], argv.data());
+    _exit(127);
+  }
+  close(pipe_ends[1]);
+  if (child > 0) {
+    std::array<char, 4096> buffer{};
+    for (ssize_t n = 0; (n = read(pipe_ends[0], buffer.data(), buffer.size())) > 0;)
+      run.error_output.append(buffer.data(), static_cast<std::size_t>(n));
+    int status = 0;
+    rusage usage{};
+    wait4(child, &status, 0, &usage);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    run.seconds = elapsed.count();
+    run.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    run.started = run.exit_status != 127;
+    run.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
+  }
+  close(pipe_ends[0]);
+  return run;
+}
+
+std::string own_path() {
+  return std::filesystem::read_symlink("/proc/self/exe").string();
+}
+
+}  // namespace trochoid::tools

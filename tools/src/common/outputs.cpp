@@ -1,0 +1,117 @@
+#include "common/outputs.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#ifdef TROCHOID_HAS_TRACKING
+#include "trochoid/tracking/frame_source.hpp"
+#endif
+
+namespace trochoid::tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path plain(const fs::path& path) {
+  std::error_code ignored;
+  return fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+}
+
+// A scene is read with the camera it names. What is wrong with it is told when it is read.
+fs::path camera_of(const fs::path& input) {
+  if (input.extension() != ".toml") return {};
+  try {
+    return data::read_scene(input).camera.file;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void check_apart(const fs::path& output, const fs::path& input) {
+  if (input.empty()) return;
+  std::error_code ignored;
+  if (fs::equivalent(output, input, ignored))
+    throw InputError(fmt::format(
+        "{}: is read or written by this command already; name another output", output.string()));
+  if (plain(output) == plain(input))
+    throw InputError(fmt::format("{}: is named for two outputs; name two files", output.string()));
+}
+
+}  // namespace
+
+void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
+  if (output.empty()) return;
+  data::check_writable(output);
+  for (const fs::path& input : inputs) {
+    check_apart(output, input);
+    check_apart(output, camera_of(input));
+  }
+}
+
+void check_folder(const fs::path& folder) {
+  std::error_code ignored;  // what cannot be looked at is not there
+  const std::string ending = folder.extension().string();
+  const bool is_folder = fs::is_directory(folder, ignored);
+  const bool named_as_file =
+      ending == ".svg" || ending == ".png" || ending == ".pdf" || ending == ".csv";
+  if (!is_folder && (fs::exists(folder, ignored) || named_as_file))
+    throw InputError(fmt::format("{}: names a file; give a folder", folder.string()));
+  fs::path nearest = fs::absolute(folder, ignored);
+  while (!fs::exists(nearest, ignored) && nearest.has_relative_path())
+    nearest = nearest.parent_path();
+  const char* wrong = !fs::is_directory(nearest, ignored)           ? "is a file"
+                      : ::access(nearest.c_str(), W_OK | X_OK) != 0 ? "does not allow it"
+                                                                    : nullptr;
+  if (wrong != nullptr)
+    throw InputError(fmt::format("{}: cannot be {}, {} {}", folder.string(),
+                                 is_folder ? "written into" : "made", nearest.string(), wrong));
+}
+
+void make_folder(const fs::path& folder) {
+  check_folder(folder);
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code)
+    throw InputError(fmt::format("{}: cannot be made: {}", folder.string(), code.message()));
+}
+
+void check_length(const std::string& scene, double until_s, double rate_hz, double most,
+                  const std::string& rows) {
+  const double count = until_s * rate_hz;
+  if (count > most)
+    throw InputError(fmt::format(
+        "{}: {:g} s at {:g} Hz make {:.2g} {}, more than {:g}; lower run.rate_hz (--rate) or "
+        "run.until_s (--until)",
+        scene, until_s, rate_hz, count, rows, most));
+}
+
+#ifdef TROCHOID_HAS_TRACKING
+void check_written_video(const fs::path& written, std::int64_t frames, const fs::path& target) {
+  std::int64_t promised = -1;
+  try {
+    const auto source = tracking::open_video(written);
+    promised = source->info().frames;
+    if (promised == 0)  // a container that does not count: Matroska
+      while (source->next()) ++promised;
+  } catch (const InputError&) {  // told below, with the name the user knows
+  }
+  if (promised != frames)
+    throw InputError(
+        fmt::format("{}: cannot be written whole: {} (is the disk full?)", target.string(),
+                    promised < 0 ? "what the encoder left holds no video"
+                                 : fmt::format("{} of {} pictures are in it", promised, frames)));
+}
+#endif
+
+std::string shell_quoted(const std::string& word) {
+  const bool plain = word.find_first_of(" \t\n\"'\\$`!*?[](){}<>|&;#~") == std::string::npos;
+  if (plain) return word;
+  std::string result = "'";
+  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
+}  // namespace trochoid::tools

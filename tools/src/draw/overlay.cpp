@@ -1,0 +1,234 @@
+#include "draw/overlay.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "common/outputs.hpp"
+#include "common/progress.hpp"
+#include "draw/overlay_drawing.hpp"
+#include "draw/residual_strip.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/tracking/frame_source.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+constexpr int kGoodWidthPx = 960;  // below this lines are coarse against the body
+constexpr double kMostEnlarged = 3.0;
+constexpr int kLargestWidthPx = 1920;
+constexpr double kScreenRateHz = 60.0;
+constexpr int kTrailFrames = 60;
+const cv::Scalar kBand(34, 34, 34);
+
+double enlargement_of(const tracking::VideoInfo& info) {
+  if (info.width_px > kLargestWidthPx) return static_cast<double>(kLargestWidthPx) / info.width_px;
+  return std::clamp(static_cast<double>(kGoodWidthPx) / info.width_px, 1.0, kMostEnlarged);
+}
+
+double text_size_px(int width_px) {
+  return std::clamp(width_px / 72.0, 9.0, 16.0);
+}
+
+Stroke future_stroke() {
+  return {.colour = palette::predicted, .width_px = 1, .halo_px = 1, .halo_alpha = 0.25};
+}
+
+tracking::SourceOptions source_options(const OverlayInput& input, const OverlayOptions& options) {
+  tracking::SourceOptions source;
+  source.colour = true;
+  source.from = options.from;
+  source.to = options.to;
+  if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
+  return source;
+}
+
+/// Draws the pictures of an overlay one after the other; strokes of the past are kept between
+/// calls.
+class OverlayPainter {
+ public:
+  OverlayPainter(const OverlayContent& content, const tracking::VideoInfo& info, double slowed);
+  [[nodiscard]] cv::Size size() const { return {view_.size().width, height_px_}; }
+  [[nodiscard]] cv::Mat paint(const tracking::Frame& frame, double t_s);
+
+ private:
+  void draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const;
+  void draw_predicted(cv::Mat& picture, const ObjectPaths& paths, double t_s) const;
+  void draw_observed(cv::Mat& picture, std::size_t object, double t_s);
+  void draw_now(cv::Mat& picture, const ObjectPaths& paths, const tracking::Frame& frame,
+                double t_s) const;
+  void mark_missing(cv::Mat& picture) const;
+
+  const OverlayContent& content_;
+  Enlargement view_;
+  double text_px_, slowed_, trail_s_;
+  int header_px_, height_px_;
+  ResidualStrip strip_;
+  Ink whole_prediction_, past_points_;
+  std::vector<std::size_t> drawn_;  ///< observed points already in past_points_, per object
+};
+
+OverlayPainter::OverlayPainter(const OverlayContent& content, const tracking::VideoInfo& info,
+                               double slowed)
+    : content_(content),
+      view_{{0, 0, info.width_px, info.height_px}, enlargement_of(info)},
+      text_px_(text_size_px(view_.size().width)),
+      slowed_(slowed),
+      trail_s_(kTrailFrames / std::max(1.0, info.frame_rate_hz)),
+      header_px_(2 * static_cast<int>(std::lround(1.3 * text_px_))),
+      height_px_(0),
+      strip_(content, content.first_s(), content.last_s(), view_.size().width, text_px_),
+      whole_prediction_(view_.size()),
+      past_points_(view_.size()),
+      drawn_(content.objects().size(), 0) {
+  height_px_ = header_px_ + view_.size().height + strip_.height_px();
+  for (const ObjectPaths& paths : content_.objects())
+    for (const PredictedLine& line : paths.predicted)
+      whole_prediction_.polyline(thinned(line.px, view_, 1.0), future_stroke(), 0.55);
+}
+
+cv::Mat OverlayPainter::paint(const tracking::Frame& frame, double t_s) {
+  cv::Mat page(height_px_, view_.size().width, CV_8UC3, kBand);
+  cv::Mat picture = view_.picture(frame.bgr);
+  whole_prediction_.lay_on(picture, future_stroke());
+  for (std::size_t i = 0; i < content_.objects().size(); ++i) {
+    draw_predicted(picture, content_.objects()[i], t_s);
+    draw_observed(picture, i, t_s);
+    draw_now(picture, content_.objects()[i], frame, t_s);
+  }
+  draw_scale_bar(picture, content_.scale_px_per_m(), view_.factor, text_px_);
+  if (!content_.detected(frame.index, t_s)) mark_missing(picture);
+  picture.copyTo(page.rowRange(header_px_, header_px_ + picture.rows));
+  draw_header(page.rowRange(0, header_px_), frame, t_s);
+  strip_.draw(page.rowRange(header_px_ + picture.rows, height_px_), t_s);
+  return page;
+}
+
+void OverlayPainter::draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const {
+  const double base = 0.5 * band.rows + 0.5 * text_px_;
+  std::string words = fmt::format("t = {:.4f} s   frame {}", t_s, frame.index);
+  if (slowed_ > 1.001) words += fmt::format("   {:.3g} x slower", slowed_);
+  draw_text(band, words, {1.2 * text_px_, base}, text_px_, palette::white);
+  draw_legend(band, content_, {band.cols - 1.2 * text_px_, base}, text_px_);
+}
+
+// The predicted path of the last moments, brighter towards now.
+void OverlayPainter::draw_predicted(cv::Mat& picture, const ObjectPaths& paths, double t_s) const {
+  const Stroke stroke = predicted_stroke();
+  Ink ink(picture.size());
+  for (const PredictedLine& line : paths.predicted) {
+    const auto first = std::lower_bound(line.t_s.begin(), line.t_s.end(), t_s - trail_s_);
+    const auto last = std::upper_bound(line.t_s.begin(), line.t_s.end(), t_s);
+    for (auto at = first; at != last; ++at) {
+      const auto i = static_cast<std::size_t>(at - line.t_s.begin());
+      if (i == 0) continue;
+      const double age = (t_s - line.t_s[i]) / trail_s_;
+      ink.line(view_(line.px[i - 1]), view_(line.px[i]), stroke, 1.0 - 0.6 * age);
+    }
+  }
+  ink.lay_on(picture, stroke);
+}
+
+void OverlayPainter::draw_observed(cv::Mat& picture, std::size_t object, double t_s) {
+  const Stroke faint{.colour = palette::observed, .width_px = 1, .halo_px = 0};
+  const Stroke bright = observed_stroke();
+  const std::vector<ObservedPoint>& points = content_.objects()[object].observed;
+  std::size_t& next = drawn_[object];
+  for (; next < points.size() && points[next].t_s <= t_s; ++next)
+    past_points_.dot(view_(points[next].px), 1.0, faint, 0.5);
+  past_points_.lay_on(picture, faint);
+  Ink trail(picture.size());
+  for (std::size_t i = next; i-- > 0;) {
+    const double age = (t_s - points[i].t_s) / trail_s_;
+    if (age > 1.0) break;
+    trail.dot(view_(points[i].px), 1.9, bright, 0.95 - 0.75 * age);
+  }
+  trail.lay_on(picture, bright);
+}
+
+// Body edges, the predicted centre as a cross, the observed one as a ring around it.
+void OverlayPainter::draw_now(cv::Mat& picture, const ObjectPaths& paths,
+                              const tracking::Frame& frame, double t_s) const {
+  const Stroke predicted = predicted_stroke(1);
+  Ink ink(picture.size());
+  const bool predicted_body = content_.prediction().arc_at(paths.object, t_s) != nullptr;
+  Stroke body = predicted;
+  if (!predicted_body) body.colour = palette::observed;
+  add_wireframe(ink, content_.wireframe_at(paths.object, frame.index, t_s), view_, body);
+  ink.lay_on(picture, body);
+  ink.clear();
+  if (const auto px = content_.predicted_px(paths.object, t_s)) {
+    const Eigen::Vector2d at = view_(*px);
+    ink.line(at - Eigen::Vector2d(6, 0), at + Eigen::Vector2d(6, 0), predicted, 1.0);
+    ink.line(at - Eigen::Vector2d(0, 6), at + Eigen::Vector2d(0, 6), predicted, 1.0);
+    ink.lay_on(picture, predicted);
+    ink.clear();
+  }
+  const auto at = std::lower_bound(paths.observed.begin(), paths.observed.end(), t_s - 1e-9,
+                                   [](const ObservedPoint& p, double t) { return p.t_s < t; });
+  if (at == paths.observed.end() || (at->frame >= 0 && at->frame != frame.index)) return;
+  const Stroke observed{.colour = palette::observed, .width_px = 2, .halo_px = 1};
+  ink.ring(view_(at->px), 6.0, observed, 1.0);
+  ink.lay_on(picture, observed);
+}
+
+void OverlayPainter::mark_missing(cv::Mat& picture) const {
+  cv::rectangle(picture, {1, 1}, {picture.cols - 2, picture.rows - 2}, palette::yellow, 3);
+  draw_text_with_halo(picture, "no detection", {0.5 * picture.cols, 2.4 * text_px_}, 1.1 * text_px_,
+                      palette::yellow, Align::centre);
+}
+
+cv::VideoWriter open_writer(const std::filesystem::path& path, double frame_rate_hz,
+                            cv::Size size) {
+  cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
+                         frame_rate_hz, size, true);
+  if (!writer.isOpened())
+    throw InputError(fmt::format(
+        "{}: cannot be written as H.264 in mp4; name a .mp4 file, and see that ffmpeg has libx264",
+        path.string()));
+  return writer;
+}
+
+}  // namespace
+
+OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& options,
+                            const std::filesystem::path& path) {
+  if (path.extension() != ".mp4")
+    throw InputError(fmt::format("{}: an overlay is an mp4 file; name it .mp4", path.string()));
+  auto source =
+      tracking::decode_ahead(tracking::open_video(input.video, source_options(input, options)));
+  const tracking::VideoInfo info = source->info();
+  const OverlayContent content(input, info.width_px, info.height_px);
+  content.check_pictures(info.width_px, info.height_px, input.video.string());
+  OverlayFrames written;
+  written.slowed = options.slow > 0.0
+                       ? options.slow
+                       : std::max(1.0, std::ceil(info.frame_rate_hz / kScreenRateHz - 0.01));
+  written.frame_rate_hz = info.frame_rate_hz / written.slowed;
+  OverlayPainter painter(content, info, written.slowed);
+  written.width_px = painter.size().width;
+  written.height_px = painter.size().height;
+  data::PendingFile pending(path);
+  cv::VideoWriter writer = open_writer(pending.path(), written.frame_rate_hz, painter.size());
+  Progress progress("overlay");
+  while (const auto frame = source->next()) {
+    if (options.between_pictures) options.between_pictures();
+    const double t_s = content.time_of_frame(frame->index, frame->t_s);
+    writer.write(painter.paint(*frame, t_s));
+    written.frame.push_back(frame->index);
+    written.t_s.push_back(t_s);
+    progress.update(static_cast<std::int64_t>(written.frame.size()), info.frames);
+  }
+  writer.release();
+  if (written.frame.empty())
+    throw InputError(fmt::format("{}: no frame between from and to", input.video.string()));
+  check_written_video(pending.path(), static_cast<std::int64_t>(written.frame.size()), path);
+  pending.commit();
+  return written;
+}
+
+}  // namespace trochoid::tools

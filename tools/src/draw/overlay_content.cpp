@@ -1,0 +1,206 @@
+#include "draw/overlay_content.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<data::Scene> scene_of(const OverlayInput& input) {
+  if (input.scene) return input.scene;
+  if (input.fit && !input.fit->scene_toml.empty())
+    return data::parse_scene(input.fit->scene_toml, "the scene stored in the fit");
+  return std::nullopt;
+}
+
+bool has_shape(const std::optional<data::Scene>& scene) {
+  return scene && scene->body && scene->body->radius_m > 0.0;
+}
+
+}  // namespace
+
+std::optional<data::Camera> camera_of(const data::Scene& scene) {
+  std::error_code ignored;
+  if (scene.camera.file.empty() || !fs::exists(scene.camera.file, ignored)) return std::nullopt;
+  return data::read_camera(scene.camera.file);
+}
+
+std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks, int width_px,
+                                              int height_px) {
+  // x_px = p x + q y + u,  y_px = q x - p y + v: p = s cos a, q = s sin a; image y points down.
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300), high = -low;
+  for (const data::Track& track : tracks.tracks)
+    for (const data::TrackSample& sample : track.samples) {
+      if (!sample.has_metres() || !sample.centre_px.allFinite()) continue;
+      const double x = sample.centre_m.x(), y = sample.centre_m.y();
+      const Eigen::Vector4d row_x(x, y, 1.0, 0.0), row_y(-y, x, 0.0, 1.0);
+      normal += row_x * row_x.transpose() + row_y * row_y.transpose();
+      right += row_x * sample.centre_px.x() + row_y * sample.centre_px.y();
+      low = low.cwiseMin(sample.centre_px);
+      high = high.cwiseMax(sample.centre_px);
+    }
+  // A scale from less than this much motion would be noise.
+  constexpr double kLeastMotionPx = 5.0;
+  if (!((high - low).norm() > kLeastMotionPx)) return std::nullopt;
+  const Eigen::Vector4d solution = normal.ldlt().solve(right);
+  const double p = solution[0], q = solution[1], scale = std::hypot(p, q);
+  if (!(scale > 0.0) || !solution.allFinite()) return std::nullopt;
+  data::Camera camera = data::Camera::from_scale(width_px, height_px, scale);
+  camera.camera_from_table << p, q, 0.0, q, -p, 0.0, 0.0, 0.0, -scale;
+  camera.camera_from_table /= scale;
+  camera.camera_from_table_m.setZero();
+  camera.cx = solution[2];
+  camera.cy = solution[3];
+  return camera;
+}
+
+void OverlayContent::check_pictures(int width_px, int height_px,
+                                    const std::string& recording) const {
+  if (camera_) camera_->check_size(width_px, height_px, recording);
+}
+
+OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int height_px)
+    : tracks_(input.tracks), scene_(scene_of(input)), camera_(input.camera) {
+  if (!camera_ && scene_) camera_ = camera_of(*scene_);
+  if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
+  if (input.fit && !input.fit->parameters.empty())
+    prediction_ = replay(*input.fit, tracks_, input.fit_track);
+  for (const data::Track& track : tracks_.tracks) collect(track);
+  if (has_prediction()) {
+    auto lists =
+        residuals(tracks_, prediction_, input.fit->converged ? input.fit->noise_scale : 1.0);
+    for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].residuals = std::move(lists[i]);
+  }
+  collect_times();
+}
+
+void OverlayContent::collect(const data::Track& track) {
+  ObjectPaths& paths = objects_.emplace_back();
+  paths.object = track.object;
+  Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
+  int with_metres = 0;
+  for (const data::TrackSample& sample : track.samples) {
+    Eigen::Vector3d centre_m(sample.centre_m.x(), sample.centre_m.y(), 0.0);
+    if (const auto pose = prediction_.at(track.object, sample.t_s))
+      centre_m.z() = pose->centre_m.z();
+    else if (has_shape(scene_))
+      centre_m.z() = scene_->body->half_thickness_m();
+    Eigen::Vector2d px = sample.centre_px;
+    if (!px.allFinite() && camera_ && sample.has_metres()) px = camera_->image_from_table(centre_m);
+    if (!px.allFinite())
+      throw InputError(
+          "the track has no pixel positions (x_px, y_px); give --camera so that its metres can be "
+          "drawn into the picture");
+    paths.observed.push_back({.frame = sample.frame, .t_s = sample.t_s, .px = px});
+    if (sample.has_metres()) {
+      sum_m += centre_m;
+      ++with_metres;
+    }
+  }
+  if (camera_ && with_metres > 0 && !scale_px_per_m_) {
+    const auto jacobian = camera_->jacobian_px_per_m(sum_m / with_metres);
+    scale_px_per_m_ = std::sqrt(std::abs(jacobian.leftCols<2>().determinant()));
+  }
+  if (!camera_) return;
+  for (const PredictedArc& arc : prediction_.arcs) {
+    if (arc.object != track.object) continue;
+    PredictedLine& line = paths.predicted.emplace_back();
+    line.t_s = arc.t_s;
+    for (const data::Pose<>& pose : arc.pose)
+      line.px.push_back(camera_->image_from_table(pose.centre_m));
+  }
+}
+
+void OverlayContent::collect_times() {
+  std::map<std::int64_t, double> times;
+  first_s_ = std::numeric_limits<double>::infinity();
+  last_s_ = -first_s_;
+  for (const ObjectPaths& paths : objects_)
+    for (const ObservedPoint& point : paths.observed) {
+      if (point.frame >= 0) times.emplace(point.frame, point.t_s);
+      first_s_ = std::min(first_s_, point.t_s);
+      last_s_ = std::max(last_s_, point.t_s);
+    }
+  frame_times_.assign(times.begin(), times.end());
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < frame_times_.size(); ++i)
+    steps_s.push_back((frame_times_[i].second - frame_times_[i - 1].second) /
+                      static_cast<double>(frame_times_[i].first - frame_times_[i - 1].first));
+  frame_s_ = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
+}
+
+double OverlayContent::time_of_frame(std::int64_t frame, double fallback_s) const {
+  if (frame_times_.size() < 2) return fallback_s;
+  const auto after = std::lower_bound(frame_times_.begin(), frame_times_.end(),
+                                      std::pair(frame, -std::numeric_limits<double>::infinity()));
+  if (after == frame_times_.end()) {
+    const auto& [last, t_s] = frame_times_.back();
+    return t_s + static_cast<double>(frame - last) * frame_s_;
+  }
+  if (after->first == frame || after == frame_times_.begin())
+    return after->second - static_cast<double>(after->first - frame) * frame_s_;
+  const auto& [low, low_s] = *std::prev(after);
+  const auto& [high, high_s] = *after;
+  return low_s +
+         (high_s - low_s) * static_cast<double>(frame - low) / static_cast<double>(high - low);
+}
+
+bool OverlayContent::detected(std::int64_t frame, double t_s) const {
+  if (!frame_times_.empty()) {
+    const auto at =
+        std::lower_bound(frame_times_.begin(), frame_times_.end(), frame,
+                         [](const auto& known, std::int64_t f) { return known.first < f; });
+    return at != frame_times_.end() && at->first == frame;
+  }
+  return t_s >= first_s_ && t_s <= last_s_;
+}
+
+std::optional<data::Pose<>> OverlayContent::tracked_pose(int object, std::int64_t frame) const {
+  for (const data::Track& track : tracks_.tracks) {
+    if (track.object != object) continue;
+    const auto sample = std::lower_bound(
+        track.samples.begin(), track.samples.end(), frame,
+        [](const data::TrackSample& known, std::int64_t f) { return known.frame < f; });
+    if (sample == track.samples.end() || sample->frame != frame || !sample->has_metres() ||
+        !sample->theta || !sample->phi)
+      return std::nullopt;
+    data::Pose<> pose;
+    pose.theta_rad = sample->theta->value_rad;
+    pose.phi_rad = sample->phi->value_rad;
+    const data::Body& body = *scene_->body;
+    pose.centre_m = {
+        sample->centre_m.x(), sample->centre_m.y(),
+        data::height_on_floor_m(pose.theta_rad, body.radius_m, body.half_thickness_m())};
+    return pose;
+  }
+  return std::nullopt;
+}
+
+std::vector<data::WireCurve> OverlayContent::wireframe_at(int object, std::int64_t frame,
+                                                          double t_s) const {
+  if (!has_shape(scene_) || !camera_) return {};
+  std::optional<data::Pose<>> pose = prediction_.at(object, t_s);
+  if (!pose && !has_prediction() && scene_->support.kind == data::SupportKind::floor)
+    pose = tracked_pose(object, frame);
+  if (!pose) return {};
+  return data::wireframe(*scene_->body, *pose, *camera_);
+}
+
+std::optional<Eigen::Vector2d> OverlayContent::predicted_px(int object, double t_s) const {
+  const auto pose = prediction_.at(object, t_s);
+  if (!pose || !camera_) return std::nullopt;
+  return camera_->image_from_table(pose->centre_m);
+}
+
+}  // namespace trochoid::tools

@@ -1,0 +1,42 @@
+#pragma once
+#include <opencv2/core.hpp>
+
+#include "draw/overlay_content.hpp"
+
+namespace trochoid::tools {
+
+/// Residuals (observed minus predicted) against time, x and y of every object, with bands of one
+/// and two sigma and the frames without a detection hatched; without a fit only the hatched time
+/// line.
+class ResidualStrip {
+ public:
+  /// @param from_s, to_s span of the time axis, from_s < to_s.
+  /// @param text_px height of a capital letter.
+  ResidualStrip(const OverlayContent& content, double from_s, double to_s, int width_px,
+                double text_px);
+  /// Height it needs: a row per object with residuals, or one thin row.
+  [[nodiscard]] int height_px() const { return picture_.rows; }
+  /// Copies the strip into `target` (CV_8UC3 of its size), with a cursor at t_s unless NaN.
+  void draw(cv::Mat target, double t_s) const;
+
+ private:
+  struct Row {
+    double top_px, bottom_px;
+    double limit_mm;
+  };
+  [[nodiscard]] double x_of(double t_s) const;
+  [[nodiscard]] double y_of(const Row& row, double value_mm) const;
+  void draw_row(const ObjectPaths& paths, const Row& row, const std::string& name);
+  void draw_bands(const ObjectPaths& paths, const Row& row);
+  void draw_gaps(const ObjectPaths& paths, double top_px, double bottom_px);
+  void draw_time_axis(double top_px);
+
+  cv::Mat picture_;
+  double from_s_, to_s_, left_px_, right_px_, text_px_;
+  double plot_top_px_, plot_bottom_px_;
+};
+
+/// A step of 1, 2 or 5 times a power of ten that divides `span` into about `parts` parts.
+[[nodiscard]] double nice_step(double span, int parts);
+
+}  // namespace trochoid::tools

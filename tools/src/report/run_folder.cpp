@@ -1,0 +1,146 @@
+#include "report/run_folder.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+json read_json(const fs::path& path) {
+  std::ifstream file(path);
+  json value = json::parse(file, nullptr, /*allow_exceptions=*/false);
+  if (value.is_discarded() || !value.is_object())
+    throw InputError(
+        fmt::format("{}: is not a JSON object; run the recording again", path.string()));
+  return value;
+}
+
+// The only file of the folder whose name ends like this; nothing if there is none.
+std::optional<fs::path> file_ending(const fs::path& folder, const std::string& ending) {
+  std::optional<fs::path> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.ends_with(ending) || name.starts_with('.')) continue;
+    if (found)
+      throw InputError(fmt::format("{}: holds {} and {}; a report needs one {}", folder.string(),
+                                   found->filename().string(), name, ending));
+    found = entry.path();
+  }
+  return found;
+}
+
+template <class Value>
+Value value_or(const json& object, const char* key, Value otherwise) {
+  const auto found = object.find(key);
+  if (found == object.end()) return otherwise;
+  try {
+    return found->get<Value>();
+  } catch (const json::exception&) {
+    throw InputError(
+        fmt::format("{}: '{}' is not what a run writes; run the recording again", kRunFile, key));
+  }
+}
+
+void read_facts(const json& run, ReportInput& input) {
+  input.title = value_or<std::string>(run, "video", input.title);
+  input.command = value_or<std::string>(run, "command", "");
+  input.no_fit_reason = value_or<std::string>(run, "no_fit_reason", "");
+  input.frames = value_or<std::int64_t>(run, "frames", 0);
+  const json overlay = value_or<json>(run, "overlay", json::object());
+  if (!overlay.is_object()) return;
+  input.video_rate_hz = value_or<double>(overlay, "frame_rate_hz", 0.0);
+  input.video_t_s = value_or<std::vector<double>>(overlay, "t_s", {});
+}
+
+}  // namespace
+
+PendingFolder::PendingFolder(fs::path target) : target_(std::move(target)) {
+  std::error_code code;
+  if (!target_.has_filename()) target_ = target_.parent_path();
+  const fs::path parent = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+  if (!fs::is_directory(parent, code))
+    throw InputError(fmt::format("{}: cannot be made, the folder {} does not exist",
+                                 target_.string(), parent.string()));
+  if (::access(parent.c_str(), W_OK) != 0)
+    throw InputError(fmt::format("{}: cannot be made, the folder {} does not allow it",
+                                 target_.string(), parent.string()));
+  if (fs::exists(target_, code) && !fs::exists(target_ / kRunFile, code) &&
+      !(fs::is_directory(target_, code) && fs::is_empty(target_, code)))
+    throw InputError(
+        fmt::format("{}: exists and is not the folder of an earlier run; name another with -o",
+                    target_.string()));
+  temporary_ = data::pending_neighbour(target_);
+  if (!fs::create_directory(temporary_, code)) {
+    data::discard_pending(temporary_);
+    throw InputError(fmt::format("{}: cannot be made: {}", target_.string(),
+                                 code ? code.message() : "its neighbour exists"));
+  }
+}
+
+PendingFolder::~PendingFolder() {
+  if (!temporary_.empty()) data::discard_pending(temporary_);
+}
+
+std::string PendingFolder::with_own_name(std::string message) const {
+  const std::string temporary = temporary_.string(), own = target_.string();
+  for (std::size_t at = 0; (at = message.find(temporary, at)) != std::string::npos;
+       at += own.size())
+    message.replace(at, temporary.size(), own);
+  return message;
+}
+
+void PendingFolder::commit() {
+  if (const std::error_code code = data::rename_pending(temporary_, target_))
+    throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
+  temporary_.clear();
+}
+
+ReportInput read_run_folder(const fs::path& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code))
+    throw InputError(
+        fmt::format("{}: is not a folder; name the one a run has made", folder.string()));
+  const auto track = file_ending(folder, ".track.csv");
+  if (!track)
+    throw InputError(
+        fmt::format("{}: holds no *.track.csv; name the folder of a run", folder.string()));
+  ReportInput input;
+  input.tracks = data::read_track(*track);
+  input.title = input.tracks.source.empty() ? track->filename().string() : input.tracks.source;
+  input.checksums[track->filename().string()] = data::sha256_of_file(*track);
+  if (const auto fit = file_ending(folder, ".fit.json")) input.fit = data::read_fit(*fit);
+  if (fs::exists(folder / "scene.toml", code)) {
+    input.scene = data::read_scene(folder / "scene.toml");
+    input.scene->camera.file = fs::path(input.scene->camera.file).filename().string();
+  }
+  if (fs::exists(folder / "overlay.mp4", code)) input.video = folder / "overlay.mp4";
+  if (fs::exists(folder / kRunFile, code)) read_facts(read_json(folder / kRunFile), input);
+  if (const auto timing = file_ending(folder, ".timing.json")) {
+    const json times = read_json(*timing);
+    for (const auto& [stage, seconds] : times.items())
+      if (seconds.is_number() && stage.ends_with("_s"))
+        input.times_s.emplace_back(stage.substr(0, stage.size() - 2), seconds.get<double>());
+  }
+  return input;
+}
+
+data::Scene scene_of_fit(const data::Fit& fit, const fs::path& fit_file) {
+  data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in " + fit_file.string());
+  std::error_code code;
+  if (!scene.camera.file.empty()) {  // a run leaves the camera beside the fit
+    const fs::path beside = fit_file.parent_path() / fs::path(scene.camera.file).filename();
+    if (fs::exists(beside, code)) scene.camera.file = beside.string();
+  }
+  return scene;
+}
+
+}  // namespace trochoid::tools

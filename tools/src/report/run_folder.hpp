@@ -1,0 +1,47 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "report/report.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::tools {
+
+/// A folder beside `target` that becomes `target` on commit() and vanishes otherwise, so that a run
+/// leaves all its files or none. An existing folder is replaced only if a run made it.
+class PendingFolder {
+ public:
+  /// @throws InputError if the target cannot be written, or is something a run did not make.
+  explicit PendingFolder(std::filesystem::path target);
+  ~PendingFolder();
+  PendingFolder(const PendingFolder&) = delete;
+  PendingFolder& operator=(const PendingFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
+  void commit();
+  /// Runs `write`; what it complains about names the folder as the user knows it.
+  template <class Write>
+  auto told_by_its_name(const Write& write) const {
+    try {
+      return write();
+    } catch (const InputError& error) {
+      throw InputError(with_own_name(error.what()));
+    }
+  }
+
+ private:
+  [[nodiscard]] std::string with_own_name(std::string message) const;
+  std::filesystem::path target_, temporary_;
+};
+
+/// File of a run's folder that marks it as ours and tells what the other files cannot.
+inline constexpr const char* kRunFile = "run.json";
+
+/// Everything a run left in its folder, ready for a report: *.track.csv, and if present *.fit.json,
+/// scene.toml, overlay.mp4, run.json, *.timing.json.
+/// @throws InputError if the folder holds no track or more than one.
+[[nodiscard]] ReportInput read_run_folder(const std::filesystem::path& folder);
+
+/// The scene stored in a fit, its camera file found beside the fit when it is not where it says.
+[[nodiscard]] data::Scene scene_of_fit(const data::Fit& fit, const std::filesystem::path& fit_file);
+
+}  // namespace trochoid::tools

@@ -1,0 +1,114 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report/parts.hpp"
+
+namespace trochoid::tools {
+namespace {
+
+constexpr double kTooWide = 1.5;  // residuals this many times the track's sigma need a reason
+
+std::string length_words(double length_m) {
+  if (length_m >= 1e-3) return fmt::format("{:.3g} mm", length_m * 1e3);
+  return fmt::format("{:.3g} µm", length_m * 1e6);
+}
+
+std::string tracked_words(const ReportFacts& facts) {
+  const std::size_t bodies = facts.input.tracks.tracks.size();
+  return fmt::format("{} of {} {} over {:.3g} s",
+                     bodies == 1 ? "The path" : fmt::format("{} paths", bodies), facts.samples,
+                     facts.prediction.angles_alone() ? "samples" : "positions",
+                     facts.last_s - facts.first_s);
+}
+
+// Does the model describe the points, and is the scatter what the tracker expects?
+Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
+  Verdict verdict;
+  const std::string scatter =
+      facts.prediction.angles_alone()
+          ? fmt::format("{:.3g} mrad rms of the spin angle", 1e3 * facts.rms_spin_rad)
+          : fmt::format(
+                "{} rms per axis{}", length_words(facts.rms_axis_m),
+                std::isfinite(facts.rms_axis_sigma)
+                    ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
+                    : "");
+  const bool doubtful = !fit.converged;
+  const bool weak = fit.verdict == "weak";
+  const bool wide = facts.rms_axis_sigma > kTooWide;
+  if (doubtful) {
+    const std::string& why = fit.verdict_words.empty() ? fit.reason : fit.verdict_words;
+    return {"bad",
+            fit.verdict == "no_feature" ? "nothing to fit" : "not trustworthy",
+            fmt::format("The model “{}” was tried: {}{} Do not use its numbers.", fit.model, why,
+                        why.ends_with('?') ? "" : "."),
+            {}};
+  }
+  const bool followed = fit.verdict == "doubtful";
+  const char* word = followed                           ? "followed, not explained"
+                     : weak                             ? "explained, not all determined"
+                     : fit.verdict == "good_correlated" ? "explained, residuals correlated"
+                                                        : "explained";
+  verdict = {weak || followed || wide ? "fair" : "good",
+             word,
+             fmt::format("{}: the model “{}” follows them with {}: {}.", tracked_words(facts),
+                         fit.model, scatter, fit.verdict_words),
+             {}};
+  return verdict;
+}
+
+}  // namespace
+
+std::string value_words(double value, double sigma) {
+  if (!std::isfinite(value)) return "—";
+  if (!(sigma > 0.0) || !std::isfinite(sigma)) return short_number(value);
+  const int exponent =
+      static_cast<int>(std::floor(std::log10(sigma))) - 1;  // of the last digit shown
+  const double largest = std::max(std::abs(value), sigma);
+  const int power = static_cast<int>(std::floor(std::log10(largest)));
+  const bool as_power = largest >= 1e5 || largest < 1e-3;
+  constexpr int kMostDecimals = 12;  // more than that only paths without noise give
+  if ((as_power ? power : 0) - exponent > kMostDecimals)
+    return fmt::format("{:.13g} ± {:.1e}", value, sigma);
+  if (as_power) {
+    const double unit = std::pow(10.0, power);
+    const int decimals = std::max(power - exponent, 0);
+    return fmt::format("({:.{}f} ± {:.{}f}) × 10^{}", value / unit, decimals, sigma / unit,
+                       decimals, power);
+  }
+  const int decimals = std::max(-exponent, 0);
+  if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0.0;  // no "-0.000"
+  return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, sigma, decimals);
+}
+
+std::string short_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.5g}", value) : "—";
+}
+
+Verdict judge(const ReportFacts& facts) {
+  Verdict verdict;
+  if (facts.input.fit) {
+    verdict = judge_fit(facts, *facts.input.fit);
+    verdict.remarks = facts.input.fit->warnings;
+    for (const PredictedArc& arc : facts.prediction.arcs)
+      if (!arc.ended.empty())
+        verdict.remarks.push_back("the predicted motion ends before the track does: " + arc.ended);
+  } else {
+    verdict = {
+        "none",
+        "tracked only",
+        fmt::format("{}; no model was fitted{}.", tracked_words(facts),
+                    facts.input.no_fit_reason.empty() ? "" : ": " + facts.input.no_fit_reason),
+        {}};
+  }
+  if (!facts.metres)
+    verdict.remarks.push_back(
+        "positions are in pixels: a camera file, a scale or the body's radius would give metres");
+  if (facts.missing > 0)
+    verdict.remarks.push_back(fmt::format("{} frames in {} gap{} are without a detection",
+                                          facts.missing, facts.gaps, facts.gaps == 1 ? "" : "s"));
+  return verdict;
+}
+
+}  // namespace trochoid::tools
