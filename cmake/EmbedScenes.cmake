@@ -8,7 +8,7 @@ foreach(scene IN LISTS scenes)
   file(READ ${scene} text)
   string(APPEND entries "      {\"${name}\", R\"TOML(${text})TOML\"},\n")
 endforeach()
-file(WRITE ${OUTPUT} "#include \"scene_library.hpp\"
+file(WRITE ${OUTPUT} "#include \"common/scene_library.hpp\"
 
 namespace trochoid::tools {
 
