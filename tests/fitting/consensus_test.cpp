@@ -1,4 +1,4 @@
-#include "consensus.hpp"
+#include "observe/consensus.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "observations.hpp"
+#include "observe/observations.hpp"
 
 namespace trochoid::fitting {
 namespace {

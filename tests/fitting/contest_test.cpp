@@ -1,10 +1,10 @@
-#include "contest.hpp"
+#include "choose/contest.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "terms.hpp"
+#include "choose/terms.hpp"
 #include "trochoid/data/io.hpp"
 
 namespace trochoid::fitting {

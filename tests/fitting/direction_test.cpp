@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "observations.hpp"
+#include "observe/observations.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"

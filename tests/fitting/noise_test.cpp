@@ -1,4 +1,4 @@
-#include "noise.hpp"
+#include "observe/noise.hpp"
 
 #include <gtest/gtest.h>
 

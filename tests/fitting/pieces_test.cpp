@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
-#include "arcs.hpp"
-#include "problem.hpp"
-#include "segments.hpp"
+#include "observe/arcs.hpp"
+#include "observe/segments.hpp"
+#include "problem/problem.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 

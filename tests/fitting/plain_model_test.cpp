@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "problem.hpp"
-#include "statistics.hpp"
-#include "strategy.hpp"
+#include "judge/statistics.hpp"
+#include "problem/problem.hpp"
+#include "start/strategy.hpp"
 
 // How windows grow, and what the data determine and what not, on a model whose answer is known.
 namespace trochoid::fitting {

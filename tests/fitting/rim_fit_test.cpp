@@ -9,8 +9,8 @@
 #include <random>
 #include <sstream>
 
-#include "first_guess.hpp"
-#include "softness.hpp"
+#include "choose/softness.hpp"
+#include "start/first_guess.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"

@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "prepare.hpp"
-#include "problem.hpp"
+#include "problem/prepare.hpp"
+#include "problem/problem.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
 

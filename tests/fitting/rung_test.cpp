@@ -1,4 +1,4 @@
-#include "rung.hpp"
+#include "choose/rung.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "problem.hpp"
-#include "statistics.hpp"
+#include "judge/statistics.hpp"
+#include "problem/problem.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // The minimiser and what is said of a valley's bends, on models whose valley is known.

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "observations.hpp"
-#include "starts.hpp"
+#include "observe/observations.hpp"
+#include "start/starts.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/model/inertia.hpp"
 #include "values_with.hpp"

@@ -5,8 +5,8 @@
 #include <map>
 #include <random>
 
-#include "prepare.hpp"
-#include "strategy.hpp"
+#include "problem/prepare.hpp"
+#include "start/strategy.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"

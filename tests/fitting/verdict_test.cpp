@@ -7,8 +7,8 @@
 #include <random>
 #include <set>
 
-#include "adequacy.hpp"
-#include "prepare.hpp"
+#include "judge/adequacy.hpp"
+#include "problem/prepare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"

@@ -1,0 +1,121 @@
+#include "trochoid/fitting/compare.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "choose/climb.hpp"
+#include "choose/exchange.hpp"
+#include "choose/leave_out.hpp"
+#include "choose/rung_words.hpp"
+#include "choose/terms.hpp"
+#include "judge/adequacy.hpp"
+#include "problem/problem.hpp"
+#include "start/first_guess.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// Every rung frees the terms it has: a list made for one of them would hold the others' fixed.
+void free_all_terms(data::FitSettings& fit) {
+  std::erase_if(fit.free, [](const std::string& name) { return !leaves_choice(name); });
+}
+
+bool show_spin(std::span<const data::Track> tracks) {
+  return std::any_of(tracks.begin(), tracks.end(), [](const data::Track& track) {
+    return std::any_of(track.samples.begin(), track.samples.end(),
+                       [](const data::TrackSample& sample) { return sample.psi.has_value(); });
+  });
+}
+
+// @throws InputError for a name that means nothing to any of the models.
+void check_names(const data::FitSettings& fit, const std::set<std::string>& known) {
+  const auto check = [&](const char* key, const std::string& name) {
+    if (!names_one_of(known, name))
+      throw InputError(
+          fmt::format("[fit] {}: the models compared have no parameter '{}'; they have "
+                      "{}",
+                      key, name, fmt::join(known, ", ")));
+  };
+  for (const std::string& name : fit.free) check("free", name);
+  for (const auto& [name, value] : fit.fixed) check("fixed", name);
+  for (const auto& [name, bounds] : fit.bounds) check("bounds", name);
+}
+
+data::ModelScore table_row(const Rung& rung, bool recommended) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (!rung.fitted) return {rung.name, kNone, kNone, kNone, kNone, kNone, 0, false, rung.reason};
+  return {rung.name,       rung.fit.chi2,        rung.aicc,
+          rung.bic,        rung.fit.whiteness_p, rung.held_back_rms_sigma,
+          rung.parameters, recommended,          rung.reason};
+}
+
+std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {
+  std::vector<data::ModelScore> table;
+  for (const Rung& rung : rungs) table.push_back(table_row(rung, &rung == chosen));
+  return table;
+}
+
+// Of the others the comparison does not need to know.
+void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const Rung& chosen) {
+  std::vector<Rung*> near;
+  for (Rung& rung : rungs)
+    if (rung.bic < chosen.bic + most_evidence_against(chosen)) near.push_back(&rung);
+  side_by_side(contest, near, [&](std::size_t, Rung& rung, const FitOptions& options) {
+    predict_held_back(contest.tracks, options, rung);
+  });
+}
+
+}  // namespace
+
+Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
+                   const FitOptions& options) {
+  data::Scene named = scene;
+  if (!options.model.empty()) named.model.name = options.model;
+  // A body held at a pivot that leans there is a top, one that lies on it only turns.
+  const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
+  if (open && leaves_pivot(tracks, named)) named.model.name = "top";
+  free_all_terms(named.fit);
+  const Ladder ladder = ladder_of(named, show_spin(tracks));
+  const std::set<std::string> known = parameters_of_any(ladder);
+  check_names(scene.fit, known);
+  check_first_guess(options.start, "the models compared have", known);
+  Contest contest{ladder, tracks, options};
+  contest.options.profile = false;
+  contest.options.bootstrap = 0;
+  contest.options.model.clear();
+  Rungs rungs = climb(contest);
+  let_go_of_friction(contest, rungs);
+  const Rung* chosen = exchange_while_worth(contest, rungs);
+  if (chosen == nullptr) {
+    Comparison none{rungs[0].fit, rungs[0].scene};
+    none.fit.comparison = table_of(rungs, nullptr);
+    return none;
+  }
+  predict_held_back_by_near_ones(contest, rungs, *chosen);
+  Comparison result{with_full_bars(*chosen), chosen->scene};
+  if (options.profile || options.bootstrap > 0) {
+    FitOptions again = options;
+    again.model.clear();
+    again.rolls_at_first = chosen->rolls_at_first;
+    again.start = values_of(chosen->fit);
+    if (!again.start.empty()) again.strategy = "single";
+    try {
+      result.fit = fit_one_of_several(tracks, chosen->scene, again);
+    } catch (const NumericalError& error) {
+      result.fit.warnings.push_back(fmt::format("no profile and no bootstrap: {}", error.what()));
+    }
+  }
+  if (result.fit.converged) {
+    allow_for_rivals(rungs, *chosen, result.fit, usual_losses(ladder));
+    doubt_if_drifting(tracks, *chosen, contest.options, result.fit);
+  }
+  result.fit.comparison = table_of(rungs, chosen);
+  result.fit.recommendation = sentence(rungs, *chosen, ladder);
+  return result;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,101 @@
+#include "choose/contest.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "choose/terms.hpp"
+#include "trochoid/fitting/parallel.hpp"
+
+namespace trochoid::fitting {
+
+FitOptions options_for(const Rung& rung, const FitOptions& options) {
+  FitOptions own = options;
+  const auto named = [name = rung.name](const auto& say) {
+    return [name, say](const std::string& words) { say(fmt::format("{}: {}", name, words)); };
+  };
+  if (options.progress) own.progress = named(options.progress);
+  if (options.log) own.log = named(options.log);
+  return own;
+}
+
+void side_by_side(const Contest& contest, const std::vector<Rung*>& rungs,
+                  const std::function<void(std::size_t, Rung&, const FitOptions&)>& fit) {
+  FitOptions one = contest.options;
+  one.threads = 1;
+  in_parallel(static_cast<int>(rungs.size()), contest.options.threads, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    fit(i, *rungs[i], options_for(*rungs[i], one));
+  });
+}
+
+Rung& add_searched(const Contest& contest, const Terms& terms, Rungs& rungs,
+                   const FirstPart& first_part) {
+  Rung& rung = rungs.emplace_back(rung_with(contest.ladder, terms));
+  rung.first_part = first_part;
+  fit_rung(contest.tracks, nullptr, nullptr, options_for(rung, contest.options), rung);
+  return rung;
+}
+
+std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
+                                        const Rung& known, Rungs& rungs) {
+  std::vector<Rung*> added;
+  std::vector<const Nearby*> near;
+  for (const Neighbour& neighbour : wanted) {
+    if (is_known(rungs, neighbour.terms)) continue;
+    added.push_back(&blank_rung(contest.ladder, neighbour.terms, rungs));
+    near.push_back(&neighbour.near);
+  }
+  side_by_side(contest, added, [&](std::size_t i, Rung& rung, const FitOptions& options) {
+    fit_neighbour(contest.tracks, known, options, rung, *near[i]);
+  });
+  return {added.begin(), added.end()};
+}
+
+bool is_known(const Rungs& rungs, const Terms& terms) {
+  return std::any_of(rungs.begin(), rungs.end(),
+                     [&](const Rung& rung) { return rung.terms == terms && !rung.as_promised; });
+}
+
+Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
+  const auto promised = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
+    return rung.terms == terms && rung.as_promised;
+  });
+  Rung& rung = promised != rungs.end() ? *promised : rungs.emplace_back();
+  return rung = rung_with(ladder, terms);
+}
+
+Nearby nearby(const Promise& promise, const Promise::Change& change) {
+  return {change.values, change.chi2 - promise.before};
+}
+
+const Rung* least_bic(const Rungs& rungs) {
+  const Rung* best = nullptr;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && (best == nullptr || rung.bic < best->bic)) best = &rung;
+  return best;
+}
+
+const Rung* simplest_sufficient(const Ladder& ladder, const Rungs& rungs) {
+  const auto unusual = [&](const Rung& rung) {
+    return std::count_if(rung.terms.begin(), rung.terms.end(), [&](int index) {
+      const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+      return !term.usual && !term.last_resort;
+    });
+  };
+  const Rung* best = least_bic(rungs);
+  const double allowed = best != nullptr ? best->bic + kStrong : 0.0;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.bic <= allowed &&
+        std::tuple(rung.parameters, unusual(rung), rung.bic) <
+            std::tuple(best->parameters, unusual(*best), best->bic))
+      best = &rung;
+  return best;
+}
+
+double most_evidence_against(const Rung& known) {
+  return known.fit.model == "sliding" ? kStrong : kVeryStrong;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,156 @@
+#include "choose/exchange.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "choose/terms.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// What a change is promised to cost in BIC for its parameters, and to bring in chi-square.
+double price(const Promise& promise, const Promise::Change& change) {
+  return change.parameters * std::log(promise.rows);
+}
+double gain(const Promise& promise, const Promise::Change& change) {
+  return promise.before - change.chi2;
+}
+
+// Whether a further term, however little speaks for it, widens the error bars noticeably by what it
+// moves other parameters by, as it is weighed there (rivals.cpp).
+bool counts_in_error_bars(const Promise::Change& change, double gained) {
+  constexpr double kNoticeably = 1.3;
+  const double odds = std::exp(0.5 * gained - change.parameters);  // after AIC
+  const double variance = odds / (1.0 + odds) * change.moves * change.moves;
+  return 1.0 + variance > kNoticeably * kNoticeably;
+}
+
+// Whether a promised change of a known rung may come to something. One that hardly follows the
+// track has to be mended for a good part: all else would only follow the tracker's errors. Where
+// what is left hangs together, a further term may be what is missing, and all that it takes away
+// counts; what takes the place of another, or stands beside a rung that leaves noise, may do as
+// well as that. So may what differs by more terms, but of that only what promises to do as well.
+bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
+                 const Promise::Change& change, const Difference& by) {
+  constexpr double kGoodPart = 0.25;
+  const double gained = gain(promise, change), paid = price(promise, change);
+  if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
+    return gained > kGoodPart * promise.before;
+  if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
+  if (by.larger() && counts_in_error_bars(change, gained / dilution)) return true;
+  const double against = paid - gained / dilution;
+  if (by.larger()) return against < most_evidence_against(known);
+  if (by.exchanged()) return against < kVeryStrong;
+  return against < kStrong;
+}
+
+// Whether what a set promises one of its subsets promises as well.
+bool has_idle_terms(const std::map<int, Terms>& sets, int key,
+                    const std::function<double(int)>& promised_bic) {
+  return std::any_of(sets.begin(), sets.end(), [&](const auto& other) {
+    return other.first != key && (other.first & key) == other.first &&
+           promised_bic(other.first) <= promised_bic(key);
+  });
+}
+
+// Whether a further loss need not be fitted to know what it comes to. Where a body slides that is
+// dear.
+bool promises_nothing(const Rung& known, double gained, int parameters, const Difference& by) {
+  constexpr double kByChance = 1.0;  // what a parameter gains of chi-square
+  return by.larger() && known.fit.model == "sliding" && known.fit.whiteness_p >= kWhite &&
+         gained < kByChance * parameters;
+}
+
+// Sets of terms beside a known rung's that may do as well, the most promising first: one term more,
+// one in the place of another, and, of those that differ by more, a few. Those that promise nothing
+// are added to the rungs as they are promised.
+std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& known, Rungs& rungs) {
+  constexpr std::size_t kMostFar = 4;
+  const Ladder& ladder = contest.ladder;
+  const std::map<int, Terms> sets = all_sets(ladder, known.terms);
+  const Terms& all = sets.rbegin()->second;
+  std::map<int, std::set<std::string>> absent;
+  for (const auto& [key, terms] : sets) absent[key] = parameters_without(ladder, all, terms);
+  const auto promise =
+      promised(contest.tracks, known, contest.options, rung_with(ladder, all), absent);
+  std::vector<Neighbour> worth;
+  if (!promise) {
+    for (Terms& terms : with_one_more(ladder, known.terms)) worth.push_back({std::move(terms)});
+    return worth;
+  }
+  const double diluted = dilution(contest.tracks, known, contest.options);
+  const auto change = [&](int key) -> const Promise::Change& { return promise->instead.at(key); };
+  const auto bic = [&](int key) {  // beside the known one's
+    return price(*promise, change(key)) - gain(*promise, change(key));
+  };
+  std::vector<int> order;
+  for (const auto& [key, terms] : sets) order.push_back(key);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return bic(a) < bic(b); });
+  std::size_t far = 0;
+  for (const int key : order) {
+    const Terms& terms = sets.at(key);
+    const Difference by = difference(terms, known.terms);
+    if (is_known(rungs, terms) || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
+    const bool near = by.larger() || by.exchanged();
+    if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
+    const double gained = gain(*promise, change(key)) / diluted;
+    if (promises_nothing(known, gained, change(key).parameters, by)) {
+      take_as_promised(known, *promise, change(key), diluted, blank_rung(ladder, terms, rungs));
+      continue;
+    }
+    far += near ? 0 : 1;
+    worth.push_back({terms, nearby(*promise, change(key))});
+  }
+  return worth;
+}
+
+// Adds what may do as well as a known rung beside it. @returns the rung to go on from.
+const Rung* exchange_terms(const Contest& contest, const Rung& known, Rungs& rungs) {
+  constexpr std::size_t kFirst = 2;
+  const std::vector<Neighbour> worth = worth_exchanging(contest, known, rungs);
+  // Where something is missing, what promises most leads on, and changes what the others promise.
+  if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
+    add_neighbours(contest, std::span(worth).first(kFirst), known, rungs);
+    const Rung* best = simplest_sufficient(contest.ladder, rungs);
+    if (best->fit.converged && best->bic < known.bic - kVeryStrong) return best;
+  }
+  add_neighbours(contest, worth, known, rungs);
+  return simplest_sufficient(contest.ladder, rungs);
+}
+
+// The likeliest rung from which no exchange has been made yet, of those whose evidence is as good
+// as the chosen one's, if there is one: two losses together may stand for two others, with none of
+// which alone they are exchanged. Those of a sliding body are dear.
+const Rung* as_good(const Rungs& rungs, const Rung& chosen,
+                    const std::set<const Rung*>& exchanged) {
+  constexpr double kBareMention = 2.0;  // of BIC
+  const Rung* best = nullptr;
+  if (chosen.fit.model == "sliding") return best;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.fit.converged && !exchanged.contains(&rung) &&
+        rung.bic < chosen.bic + kBareMention && (best == nullptr || rung.bic < best->bic))
+      best = &rung;
+  return best;
+}
+
+}  // namespace
+
+const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs) {
+  constexpr std::size_t kMostRounds = 6;
+  const Rung* chosen = simplest_sufficient(contest.ladder, rungs);
+  std::set<const Rung*> exchanged;
+  for (std::size_t round = 0; round < kMostRounds && chosen != nullptr && chosen->fit.converged;
+       ++round) {
+    // A term found that way asks for the others anew, unless even then the model lacks something.
+    if (round > 0 && chosen->fit.verdict == "unexplained") break;
+    const Rung* from = exchanged.contains(chosen) ? as_good(rungs, *chosen, exchanged) : chosen;
+    if (from == nullptr) break;
+    exchanged.insert(from);
+    chosen = exchange_terms(contest, *from, rungs);
+  }
+  return chosen;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,193 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "choose/rung.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+struct Rival {
+  const Rung* rung = nullptr;
+  double weight = 0.0;   // of all that are not ruled out and of the chosen rung together 1
+  bool larger = false;   // has further terms beside all of the chosen rung's
+  bool bounded = false;  // keep_within_bounds()
+};
+
+// Of the same law, and not ruled out. One with further terms is left out for being larger, not for
+// being wrong: what it fits beyond is all that its terms promise where they do nothing.
+bool in_question(const Rung& rung, const Rung& chosen) {
+  return &rung != &chosen && rung.fitted && rung.fit.converged &&
+         rung.fit.model == chosen.fit.model && rung.fit.arcs.size() == chosen.fit.arcs.size() &&
+         (has_all_terms_of(rung, chosen) || rung.bic <= chosen.bic + kVeryStrong);
+}
+
+// Whether a rung's terms beyond the chosen one's are usual ones.
+bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual) {
+  return std::all_of(rung.terms.begin(), rung.terms.end(),
+                     [&](int term) { return usual.contains(term) || chosen.terms.contains(term); });
+}
+
+// Those that may be right as well, or those against which there is strong evidence, but only for
+// being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
+// where residuals hang together, as a further term may then only follow the tracker's errors; but
+// those do for which BIC speaks, though not strongly, all the same.
+std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms& usual,
+                             bool too_large) {
+  const bool white = chosen.fit.whiteness_p >= kWhite;
+  std::vector<Rival> rivals;
+  double all = 1.0;
+  for (const Rung& rung : rungs) {
+    const bool larger = has_all_terms_of(rung, chosen);
+    const bool acts = adds_what_is_usual(rung, chosen, usual);
+    const bool trusted = white || rung.bic < chosen.bic;
+    if (!in_question(rung, chosen) || (larger && !trusted) ||
+        (larger && rung.bic > chosen.bic + kStrong) != too_large)
+      continue;
+    const double lead = larger && !too_large ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
+    rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});
+    all += rivals.back().weight;
+  }
+  for (Rival& rival : rivals) rival.weight /= all;
+  return rivals;
+}
+
+// What a parameter is in another rung, less what it is here. A loss that is not there is none; of
+// the velocity of the centre a rung without it says nothing.
+double shift_of(const data::FitParameter& here, const data::Fit& other) {
+  const data::FitParameter* there = other.find(here.name);
+  const bool loss = here.name != "vx_m_s" && here.name != "vy_m_s";
+  if (there == nullptr && !loss) return 0.0;
+  const double change = (there != nullptr ? there->value : 0.0) - here.value;
+  return here.unit == "rad" ? std::remainder(change, 2.0 * std::numbers::pi) : change;
+}
+
+// Variance of a parameter in a rung with further terms beyond that in the chosen one, which does
+// not allow for those terms; of both by curvature.
+double further_variance(const Rival& rival, const data::Fit& chosen, const std::string& name) {
+  const data::FitParameter* here = chosen.find(name);
+  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(name) : nullptr;
+  if (here == nullptr || there == nullptr || !std::isfinite(there->sigma)) return 0.0;
+  return std::max(0.0, there->sigma * there->sigma - here->sigma * here->sigma);
+}
+
+// What rivals add to the covariance of all parameters, those that are bounded or the others.
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool bounded, const data::Fit& chosen,
+                          const std::vector<data::FitParameter>& parameters) {
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
+  for (const Rival& rival : rivals) {
+    if (rival.bounded != bounded) continue;
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(count), further = shift;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
+      if (here.status == data::ParameterStatus::fixed) continue;
+      shift[i] = shift_of(here, rival.rung->fit);
+      further[i] = further_variance(rival, chosen, here.name);
+    }
+    spread += rival.weight * shift * shift.transpose();
+    spread.diagonal() += rival.weight * further;
+  }
+  return spread;
+}
+
+// Beside a loss that could be anything, bars would tell of what is assumed about losses rather than
+// of the track: rivals that are too large widen them so far, and the rest is told in words. Of a
+// loss that acts on nearly every body it is no assumption that it is there.
+void keep_within_bounds(const std::vector<data::FitParameter>& parameters,
+                        Eigen::MatrixXd& spread) {
+  constexpr double kWidest = 2.5;
+  Eigen::VectorXd share(spread.rows());
+  for (Eigen::Index i = 0; i < share.size(); ++i) {
+    const double most =
+        parameters[static_cast<std::size_t>(i)].sigma * std::sqrt(kWidest * kWidest - 1.0);
+    share[i] = spread(i, i) > most * most ? most / std::sqrt(spread(i, i)) : 1.0;
+  }
+  spread = share.asDiagonal() * spread * share.asDiagonal();
+}
+
+void widen(const Eigen::MatrixXd& spread, data::Fit& fit) {
+  std::vector<Eigen::Index> places;  // among the parameters, of those in the covariance
+  for (const std::string& name : fit.covariance_names)
+    places.push_back(fit.find(name) - fit.parameters.data());
+  fit.covariance += spread(places, places);
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    double& sigma = fit.parameters[i].sigma;
+    if (spread(at, at) > 0.0) sigma = std::sqrt(sigma * sigma + spread(at, at));
+  }
+}
+
+void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::FitParameter>& before,
+                    data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  double most = kWorthWords;
+  std::string name;
+  for (std::size_t i = 0; i < before.size(); ++i)
+    if (before[i].sigma > 0.0 && fit.parameters[i].sigma > most * before[i].sigma) {
+      most = fit.parameters[i].sigma / before[i].sigma;
+      name = before[i].name;
+    }
+  if (name.empty()) return;
+  // Of that parameter; a likelier rival may leave it where it is.
+  const auto share = [&](const Rival& rival) {
+    return rival.weight * std::pow(shift_of(*fit.find(name), rival.rung->fit), 2);
+  };
+  const auto strongest =
+      std::max_element(rivals.begin(), rivals.end(),
+                       [&](const Rival& a, const Rival& b) { return share(a) < share(b); });
+  fit.warnings.push_back(
+      fmt::format("error bars allow for other models that explain the track as well, above all {}: "
+                  "that of {} is {:.2g} times as wide",
+                  strongest->rung->name, name, most));
+}
+
+// A loss too small to be needed may still move the others, or where none of it fits best leave them
+// open: the one that does so most.
+void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit) {
+  constexpr double kFar = 3.0;  // error bars
+  const Rung* moving = nullptr;
+  const data::FitParameter *moved = nullptr, *there = nullptr;
+  double most = kFar;
+  for (const Rung& rung : rungs) {
+    if (!in_question(rung, chosen) || !has_all_terms_of(rung, chosen)) continue;
+    for (const data::FitParameter& parameter : fit.parameters) {
+      // Where Coulomb's law does beside one loss more, the speed over which friction sets in is
+      // gone.
+      const data::FitParameter* other = rung.fit.find(parameter.name);
+      if (parameter.status != data::ParameterStatus::free || other == nullptr) continue;
+      const double shift = std::abs(shift_of(parameter, rung.fit));
+      const double bars =
+          std::max(shift, std::isfinite(other->sigma) ? other->sigma : 0.0) / parameter.sigma;
+      if (!(bars > most)) continue;
+      most = bars, moving = &rung, moved = &parameter, there = other;
+    }
+  }
+  if (moving == nullptr) return;
+  const double shift = std::abs(shift_of(*moved, moving->fit)) / moved->sigma;
+  fit.warnings.push_back(fmt::format(
+      "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}; the {:.4g} +- "
+      "{:.2g} given here is {}",
+      moving->name, moved->name, there->value, there->sigma, moved->value, moved->sigma,
+      shift > kFar ? fmt::format("away from that by {:.2g} times its own error bar", shift)
+                   : "what holds without it"));
+}
+
+}  // namespace
+
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit, const Terms& usual) {
+  const std::vector<data::FitParameter> before = fit.parameters;
+  std::vector<Rival> rivals = rivals_of(rungs, chosen, usual, false);
+  const std::vector<Rival> too_large = rivals_of(rungs, chosen, usual, true);
+  rivals.insert(rivals.end(), too_large.begin(), too_large.end());
+  Eigen::MatrixXd bounded = spread_of(rivals, true, chosen.fit, before);
+  keep_within_bounds(before, bounded);
+  widen(spread_of(rivals, false, chosen.fit, before) + bounded, fit);
+  warn_of_rivals(rivals, before, fit);
+  warn_of_larger_ones(rungs, chosen, fit);
+}
+
+}  // namespace trochoid::fitting

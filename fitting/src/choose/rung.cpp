@@ -1,0 +1,496 @@
+#include "choose/rung.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "choose/softness.hpp"
+#include "observe/arcs.hpp"
+#include "observe/observed.hpp"
+#include "observe/timing.hpp"
+#include "problem/prepare.hpp"
+#include "problem/problem.hpp"
+#include "start/first_guess.hpp"
+#include "trochoid/data/error.hpp"
+#include "trochoid/model/predictor.hpp"
+
+namespace trochoid::fitting {
+
+bool has_all_terms_of(const Rung& rung, const Rung& other) {
+  return std::includes(rung.terms.begin(), rung.terms.end(), other.terms.begin(),
+                       other.terms.end());
+}
+
+bool usable(const data::Fit& fit) {
+  return !fit.parameters.empty() && std::isfinite(fit.chi2);
+}
+
+bool explains(const Rung& rung) {
+  constexpr double kTrackersOwn = 1.3;
+  const std::string& verdict = rung.fit.verdict;
+  return rung.fitted && verdict != "doubtful" && verdict != "unexplained" &&
+         (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
+}
+
+data::Fit with_full_bars(const Rung& rung) {
+  return rung.full ? rung.full() : rung.fit;
+}
+
+void take(Draft draft, Rung& rung) {
+  rung.fit = std::move(draft.fit);
+  rung.full = std::move(draft.full);
+  rung.settled = draft.settled;
+}
+
+namespace {
+
+// Those of one of several arcs alone under their names there ("x_m@1").
+std::map<std::string, double> values_of_all_arcs(const data::Fit& fit) {
+  std::map<std::string, double> values;
+  for (const data::FitParameter& parameter : fit.parameters)
+    if (parameter.status != data::ParameterStatus::derived && std::isfinite(parameter.value))
+      values[parameter.name] = parameter.value;
+  return values;
+}
+
+}  // namespace
+
+std::map<std::string, double> values_of(const data::Fit& fit) {
+  return fit.arcs.size() < 2 ? values_of_all_arcs(fit) : std::map<std::string, double>{};
+}
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kHeldBack = 1.0 / 3.0;
+
+// Wrong by at most what a camera would see: squares of (prediction - measurement)/sigma.
+struct Squares {
+  double sum = 0.0;
+  int rows = 0;
+  void add(double deviation) {
+    sum += deviation * deviation;
+    ++rows;
+  }
+};
+
+void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
+                 Squares& squares) {
+  if (angle_only && sample.psi) {
+    const double off = std::remainder(predicted[2] - sample.psi->value_rad, 2.0 * std::numbers::pi);
+    squares.add(off / sample.psi->sigma_rad);
+  }
+  if (angle_only || !sample.has_metres()) return;
+  const Eigen::Vector2d off = predicted.head<2>() - sample.centre_m;
+  // Without covariances in metres; the caller divides by the fitted part's rms.
+  const Eigen::Matrix2d covariance =
+      sample.has_covariance() ? sample.covariance_m2 : Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d L = covariance.llt().matrixL();
+  const Eigen::Vector2d whitened = L.triangularView<Eigen::Lower>().solve(off);
+  squares.add(whitened.x());
+  squares.add(whitened.y());
+}
+
+// When and where in the image samples were seen.
+ArcData seen_at(const std::vector<const data::TrackSample*>& samples) {
+  ArcData arc;
+  for (const data::TrackSample* sample : samples) {
+    arc.t_s.push_back(sample->t_s);
+    arc.row_px.push_back(sample->centre_px.y());
+  }
+  return arc;
+}
+
+// Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
+Squares squares_of(const data::Track& track, int first, int last, int track_index,
+                   const data::Scene& scene, const data::Fit& fit) {
+  Squares squares;
+  int arc = -1;
+  for (std::size_t i = 0; i < fit.arcs.size(); ++i)
+    if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
+  if (arc < 0) return squares;
+  const auto plain = model::make_predictor(scene);
+  data::Scene measured = scene;
+  const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
+  const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
+  const auto& parameters = predictor->parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::string own = arc > 0 ? fmt::format("{}@{}", parameters[i].name, arc) : "";
+    const data::FitParameter* fitted = own.empty() ? nullptr : fit.find(own);
+    if (fitted == nullptr) fitted = fit.find(parameters[i].name);
+    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
+  }
+  std::vector<double> t_s;
+  std::vector<const data::TrackSample*> samples;
+  for (int i = first; i < last; ++i) {
+    const data::TrackSample& sample = track.samples[static_cast<std::size_t>(i)];
+    if (sample.t_s < fit.arcs[static_cast<std::size_t>(arc)].from_s) continue;
+    t_s.push_back(sample.t_s);
+    samples.push_back(&sample);
+  }
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = fit.arcs[static_cast<std::size_t>(arc)].from_s;
+  request.observables.push_back(model::Observable::psi_rad);
+  request.lies_where_it_fell = true;
+  const bool angle_only = fit.model == "pivot";
+  const model::Prediction run = has_timing(*predictor)
+                                    ? predict_timed(*predictor, values, request, seen_at(samples),
+                                                    timing_of(*predictor, measured))
+                                    : predictor->predict(values, request);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Eigen::Vector3d at = run.values.segment<3>(3 * static_cast<Eigen::Index>(i));
+    if (at.allFinite())
+      add_squares(*samples[i], at, angle_only, squares);
+    else
+      squares.add(kInfinity);  // the model ends before the body does
+  }
+  return squares;
+}
+
+// Fits the first two thirds, predicts the rest.
+double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptions options) {
+  options.rolls_at_first = rung.rolls_at_first;
+  options.start = values_of(rung.fit);
+  if (!options.start.empty()) options.strategy = "single";
+  options.hold_back = kHeldBack;
+  if (options.progress)
+    options.progress = [say = options.progress](const std::string& stage) {
+      say(fmt::format("without the last third, {}", stage));
+    };
+  const data::Fit early =
+      fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature, rung.settled);
+  if (!usable(early)) return kInfinity;
+  Squares seen, unseen;
+  bool sigma_known = true;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
+    const int split = kept_samples(first, last, kHeldBack);
+    const int index = static_cast<int>(i);
+    const Squares before = squares_of(tracks[i], first, split, index, rung.scene, early);
+    const Squares after = squares_of(tracks[i], split, last, index, rung.scene, early);
+    seen.sum += before.sum, seen.rows += before.rows;
+    unseen.sum += after.sum, unseen.rows += after.rows;
+    for (const data::TrackSample& sample : tracks[i].samples)
+      sigma_known = sigma_known && (early.model == "pivot" || sample.has_covariance());
+  }
+  if (unseen.rows == 0 || seen.rows == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double rms = std::sqrt(unseen.sum / unseen.rows);
+  return sigma_known ? rms : rms / std::sqrt(std::max(seen.sum / seen.rows, 1e-300));
+}
+
+// Of the typical size of a parameter: near the solution without it; and what no residual sees.
+constexpr double kLittle = 0.02, kNext = 1e-6;
+
+using Values = std::map<std::string, double>;
+
+// The power of the spin b by which each of a top's drags on it goes, over b itself: how fast it
+// slows the spin.
+constexpr std::pair<const char*, double> kSpinDrags[] = {
+    {"gamma3_dry_1_s2", -1.0}, {"gamma3_1_s", 0.0}, {"gamma3_quadratic", 1.0}};
+
+// Typical size of a parameter beside known values: drags slow the spin at like rates, and one
+// beside another has little left to do.
+double typical_size(const model::ParameterInfo& info, const Values& known) {
+  constexpr double kTypical_1_s = 5e-4;  // a little of it turns no mark astray
+  const auto spin = known.find("b_1_s");
+  if (spin == known.end() || spin->second == 0.0) return info.value;
+  const bool beside_another =
+      std::any_of(std::begin(kSpinDrags), std::end(kSpinDrags),
+                  [&](const auto& drag) { return known.contains(drag.first); });
+  for (const auto& [name, power] : kSpinDrags)
+    if (info.name == name && (power != 0.0 || beside_another))
+      return kTypical_1_s * std::pow(std::abs(spin->second), -power);
+  return info.value;
+}
+
+// What took the place of another drag on the spin begins by slowing it at the same rate, halfway
+// through the record: from nothing the way is long.
+void hand_over_spin_drag(const data::Fit& known, const Values& before, Values& start,
+                         const std::set<std::string>& own) {
+  const auto spin = before.find("b_1_s");
+  if (spin == before.end() || spin->second == 0.0) return;
+  double b_1_s = std::abs(spin->second), rate_1_s = 0.0;
+  for (const auto& [name, power] : kSpinDrags)
+    if (const auto drag = before.find(name); drag != before.end() && !own.contains(name))
+      rate_1_s += drag->second * std::pow(b_1_s, power);
+  // Nor where next to nothing is left: a drag that goes by its inverse would have to be infinite.
+  constexpr double kMost = 3.0;
+  b_1_s *= std::exp(-std::min(kMost, 0.5 * rate_1_s * (known.arcs[0].to_s - known.arcs[0].from_s)));
+  for (const auto& [name, power] : kSpinDrags)
+    if (rate_1_s > 0.0 && own.contains(name) && !before.contains(name))
+      start[name] = rate_1_s * std::pow(b_1_s, -power);
+}
+
+// Parameters of a rung that are not among the known values, at a share of their typical size.
+Values further_parameters(const Values& known, const Rung& rung, double share) {
+  Values further;
+  const auto predictor = model::make_predictor(rung.scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (info.role == model::ParameterInfo::Role::dynamics && !known.contains(info.name))
+      further[info.name] = share * typical_size(info, known);
+  return further;
+}
+
+// From a known rung's values on.
+Values extended_start(const Rung& known, const Rung& rung) {
+  Values start = values_of(known.fit);
+  start.merge(further_parameters(values_of_all_arcs(known.fit), rung, kLittle));
+  if (known.fit.arcs.size() == 1)
+    hand_over_spin_drag(known.fit, values_of(known.fit), start, parameters_of(rung.scene));
+  return start;
+}
+
+void keep_better(Draft draft, Rung& rung) {
+  if (!usable(rung.fit) || (usable(draft.fit) && draft.fit.chi2 < rung.fit.chi2))
+    take(std::move(draft), rung);
+}
+
+// Scores and reason, once the fit is made.
+void conclude(Rung& rung) {
+  if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
+  if (!rung.fitted && rung.reason.empty()) rung.reason = rung.fit.reason;
+  rung.parameters = static_cast<int>(rung.fit.covariance_names.size());
+  if (!rung.fitted) return;
+  rung.aicc = rung.fit.aicc;
+  rung.bic = rung.fit.bic;
+}
+
+// Runs an attempt at a rung and scores it. What has no answer, or more parameters than the track
+// has measurements, is no reason to give up the other rungs; without the plainest there are none.
+void try_rung(Rung& rung, const std::function<void()>& fit) {
+  const auto give_up = [&](const Error& error) {
+    rung.fitted = usable(rung.fit);
+    rung.reason = error.what();
+  };
+  try {
+    fit();
+  } catch (const NumericalError& error) {
+    give_up(error);
+  } catch (const TrackError& error) {
+    if (rung.terms.empty()) throw;
+    give_up(error);
+  }
+  conclude(rung);
+}
+
+}  // namespace
+
+void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  if (!rung.fitted || !rung.fit.converged || rung.as_promised) return;
+  try {
+    rung.held_back_rms_sigma = held_back(tracks, rung, options);
+  } catch (const Error&) {
+    // A model that has no answer to part of the track does not predict the rest.
+    rung.held_back_rms_sigma = kInfinity;
+  }
+}
+
+namespace {
+
+// Whether a slip at the start ends within so few samples that the body may as well have rolled.
+bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung) {
+  constexpr double kFewSamples = 8.0;
+  if (!rung.fitted || !rung.fit.converged || rung.fit.arcs.size() != 1 || !softness_is_open(rung) ||
+      rung.rolls_at_first)
+    return false;
+  Values at = values_of(rung.fit);
+  const RollsAtFirst rim{rung.scene.body->radius_m, rung.scene.body->half_thickness_m()};
+  const Eigen::Vector2d rolls = rim.velocity_m_s(at["theta_rad"], at["phi_rad"], at["w1_rad_s"],
+                                                 at["w2_rad_s"], at["w3_rad_s"]);
+  const double slip_m_s = (Eigen::Vector2d(at["vx_m_s"], at["vy_m_s"]) - rolls).norm();
+  const double brake_m_s2 = at["friction"] * rung.scene.model.gravity_m_s2;
+  return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
+}
+
+// A slip at the start is left out unless there is strong evidence for it.
+void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  Rung rolls = rung;
+  rolls.rolls_at_first = true;
+  rolls.fitted = false;
+  rolls.fit = {}, rolls.full = {};
+  fit_from_values(tracks, values_of(rung.fit), options, rolls);
+  if (rolls.fitted && rolls.fit.converged && rolls.bic < rung.bic + kStrong)
+    rung = std::move(rolls);
+}
+
+}  // namespace
+
+void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
+              const FitOptions& options, Rung& rung, Reach reach) {
+  FitOptions own = options;
+  if (below != nullptr) own.rolls_at_first = rung.rolls_at_first = below->rolls_at_first;
+  try_rung(rung, [&] {
+    const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
+    if (extends) {
+      own.start = extended_start(*below, rung);
+      own.strategy = "single";
+      take(draft_one_of_several(tracks, rung.scene, own, nullptr, below->settled), rung);
+    }
+    // Near a solution that explains nothing there is nothing to be found.
+    const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
+                      rung.fit.chi2 <= below->fit.chi2 * (1.0 + 1e-6);
+    if (reach == Reach::search && !near && (!usable(rung.fit) || rung.fit.whiteness_p < kWhite)) {
+      own.start = options.start;
+      if (term != nullptr)
+        for (const auto& [name, value] : term->start) own.start[name] = value;
+      if (extends)
+        hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
+                            parameters_of(rung.scene));
+      own.strategy = "auto";
+      if (softness_is_open(rung))
+        fit_softly(tracks, own, rung);
+      else
+        keep_better(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+    }
+    rung.fitted = usable(rung.fit);
+  });
+  if (slips_unseen_at_first(tracks, rung)) let_roll_at_first(tracks, options, rung);
+}
+
+std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung& known,
+                                const FitOptions& options, const Rung& larger,
+                                const std::map<int, std::set<std::string>>& others) {
+  FitOptions at = options;
+  at.rolls_at_first = known.rolls_at_first;
+  at.start = values_of_all_arcs(known.fit);
+  std::set<std::string> further;
+  for (const auto& [name, value] : further_parameters(at.start, larger, kNext)) {
+    at.start[name] = value;
+    further.insert(name);
+  }
+  data::Scene scene = larger.scene;
+  scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
+  try {
+    return promised(tracks, scene, at, further, others);
+  } catch (const TrackError&) {
+  } catch (const NumericalError&) {
+  }
+  return std::nullopt;
+}
+
+void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
+                       const FitOptions& options, data::Fit& fit) {
+  if (!(fit.whiteness_p < kWhite)) return;
+  FitOptions at = options;
+  at.rolls_at_first = rung.rolls_at_first;
+  at.start = values_of_all_arcs(rung.fit);
+  try {
+    doubt_if_drifting(tracks, rung.scene, at, fit);
+  } catch (const NumericalError&) {  // integrated as coarsely as a search does
+  }
+}
+
+double dilution(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options) {
+  FitOptions at = options;
+  at.rolls_at_first = known.rolls_at_first;
+  at.start = values_of_all_arcs(known.fit);
+  try {
+    return dilution(tracks, known.scene, at);
+  } catch (const NumericalError&) {  // integrated as coarsely as a search does
+    return 1.0;
+  }
+}
+
+void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
+                         const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  own.start = first_part.values;
+  const bool slides = rung.scene.model.name == "sliding";
+  own.strategy = slides ? kRollsFirst : "growing";
+  own.rolls_at_first = rung.rolls_at_first = slides;
+  try_rung(rung, [&] {
+    take(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+void fit_from_values(std::span<const data::Track> tracks,
+                     const std::map<std::string, double>& values, const FitOptions& options,
+                     Rung& rung) {
+  FitOptions own = options;
+  own.start = values;
+  own.strategy = "single";
+  own.rolls_at_first = rung.rolls_at_first;
+  try_rung(rung, [&] {
+    take(draft_one_of_several(tracks, rung.scene, own), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
+                      double diluted, Rung& rung) {
+  const double gained = (promise.before - change.chi2) / diluted;
+  rung.fit = known.fit;
+  rung.fit.chi2 -= gained;
+  for (data::FitParameter& parameter : rung.fit.parameters) {
+    const auto value = change.values.find(parameter.name);
+    const auto wider = change.wider.find(parameter.name);
+    if (value != change.values.end()) parameter.value = value->second;
+    if (wider != change.wider.end()) parameter.sigma *= wider->second;
+  }
+  const auto predictor = model::make_predictor(rung.scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (const auto sigma = change.sigmas.find(info.name); sigma != change.sigmas.end())
+      rung.fit.parameters.push_back({info.name, change.values.at(info.name),
+                                     sigma->second * std::sqrt(diluted), info.unit,
+                                     data::ParameterStatus::free, true, ""});
+  rung.rolls_at_first = known.rolls_at_first;
+  rung.fitted = rung.as_promised = true;
+  rung.reason =
+      "it would gain nothing by the derivatives beside the model without it, and was not fitted";
+  rung.parameters = known.parameters + change.parameters;
+  rung.aicc = known.aicc + 2.0 * change.parameters - gained;
+  rung.bic = known.bic + change.parameters * std::log(promise.rows) - gained;
+}
+
+namespace {
+
+// Fits a rung beside a known one, from these values.
+void fit_beside(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+                Rung& rung) {
+  try_rung(rung, [&] {
+    if (softness_is_open(rung) && !softness_is_open(known))
+      fit_softly(tracks, options, rung);
+    else
+      take(draft_one_of_several(tracks, rung.scene, options, nullptr, known.settled), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+// Whether a rung does about as well beside a known one as was expected.
+bool as_expected(const Rung& rung, const Rung& known, const Nearby& near) {
+  constexpr double kTwice = 2.0;  // the tangent plane is not the valley
+  return rung.fitted && rung.fit.converged &&
+         rung.bic < known.bic + kVeryStrong + kTwice * std::max(0.0, near.cost);
+}
+
+}  // namespace
+
+void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
+                   const FitOptions& options, Rung& rung, const Nearby& near) {
+  FitOptions own = options;
+  own.rolls_at_first = rung.rolls_at_first = known.rolls_at_first;
+  if (known.fit.arcs.size() != 1) return fit_beside(tracks, known, own, rung);
+  own.strategy = "single";
+  const Rung blank = rung;
+  const Values from_known = extended_start(known, rung);
+  if (!near.values.empty()) {
+    own.start = near.values;
+    own.start.insert(from_known.begin(), from_known.end());
+    fit_beside(tracks, known, own, rung);
+    if (as_expected(rung, known, near)) return;
+  }
+  Rung again = blank;
+  own.start = from_known;
+  fit_beside(tracks, known, own, again);
+  const bool better = again.fitted && (!rung.fitted || again.bic < rung.bic);
+  if (better || !usable(rung.fit)) rung = std::move(again);
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,141 @@
+#pragma once
+#include <deque>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "choose/ladder.hpp"
+#include "choose/promise.hpp"
+#include "start/first_guess.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+namespace trochoid::fitting {
+
+// Evidence by differences of BIC (Kass and Raftery, J. Am. Stat. Assoc. 90, 773, 1995): up to 2
+// "not worth more than a bare mention", above 6 "strong", above 10 "very strong". Trackers err a
+// little with the motion itself: a further term needs strong evidence.
+inline constexpr double kStrong = 6.0, kVeryStrong = 10.0;
+/// p-value above which residuals count as white.
+inline constexpr double kWhite = 0.01;
+
+/// A model of the ladder and what became of it.
+struct Rung {
+  Terms terms;
+  std::string name;
+  data::Scene scene;
+  data::Fit fit;                    ///< error bars by curvature
+  std::function<data::Fit()> full;  ///< `fit` with full error bars, which cost as much as a fit
+  Settled settled;
+  bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
+  bool fitted = false;
+  bool as_promised = false;  ///< not fitted itself, take_as_promised()
+  std::string reason;        ///< why there is no fit, or why it is not accepted; else empty
+  double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
+  int parameters = 0;
+  /// What explains the longest first part of the track that a search for it, or for the model that
+  /// only rolls, came across.
+  FirstPart first_part;
+  double aicc = std::numeric_limits<double>::infinity();
+  double bic = std::numeric_limits<double>::infinity();
+};
+
+/// References to rungs stay valid while more are added.
+using Rungs = std::deque<Rung>;
+
+/// Whether a rung has all terms of another; also where they are the same.
+[[nodiscard]] bool has_all_terms_of(const Rung& rung, const Rung& other);
+
+/// Whether a fit came to an end, good or bad.
+[[nodiscard]] bool usable(const data::Fit& fit);
+
+/// A rung's fit with full error bars; as it is where there are no others.
+[[nodiscard]] data::Fit with_full_bars(const Rung& rung);
+
+/// Makes a draft the rung's fit, and what full error bars are made from.
+void take(Draft draft, Rung& rung);
+
+/// Free and fixed values by name; empty where there are several arcs.
+[[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
+
+/// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
+/// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
+/// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
+/// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
+/// whose own error bars count too (not where residuals hang together: those terms may follow the
+/// tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
+/// Rungs with further terms against which BIC's evidence is strong, for their size, widen bars up
+/// to a bound; what one of them would change beyond that is said.
+/// @param usual  terms that act on nearly every body: rungs that add nothing else count without
+/// that bound.
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
+                      const Terms& usual = {});
+
+/// Whether a rung's verdict is not that its path is only followed or not even that, and what is
+/// left looks like noise or hardly exceeds the track's own: then it hangs together for the tracker.
+[[nodiscard]] bool explains(const Rung& rung);
+
+/// How a rung is looked for: searched for where the solution below does not lead to it, or not.
+enum class Reach { search, from_below };
+
+/// Fits a rung's scene, first from the solution of the rung below.
+/// @param below  the fitted rung this one extends by one term; null for the plainest.
+void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
+              const FitOptions& options, Rung& rung, Reach reach = Reach::search);
+
+/// Predicts the last third of the tracks from a fit of the others.
+void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
+
+/// What a known rung's tangent plane says of a larger one.
+/// @param others  parameters of each of the known rung's terms that may be left out.
+/// @returns nothing where nothing can be told: the larger one has too many parameters for the
+/// track, or no prediction. Its fit says so.
+[[nodiscard]] std::optional<Promise> promised(std::span<const data::Track> tracks,
+                                              const Rung& known, const FitOptions& options,
+                                              const Rung& larger,
+                                              const std::map<int, std::set<std::string>>& others);
+
+/// Doubts a fit of a rung's scene where halves of the record ask for different parameters
+/// (adequacy.hpp). Rungs are compared without that: there it is further terms that take it away.
+void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
+                       const FitOptions& options, data::Fit& fit);
+
+/// How many times less than its change a rung's chi-square tells, for what its residuals have in
+/// common.
+[[nodiscard]] double dilution(std::span<const data::Track> tracks, const Rung& known,
+                              const FitOptions& options);
+
+/// Fits a rung from the values that explain a first part of the track, which it may explain more
+/// of. A sliding one rolls at first and slides by Coulomb's law from where that ends: friction that
+/// sets in gently lets a body creep, which would show in the first part.
+void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
+                         const FitOptions& options, Rung& rung);
+
+/// Fits a rung from near its solution.
+void fit_from_values(std::span<const data::Track> tracks,
+                     const std::map<std::string, double>& values, const FitOptions& options,
+                     Rung& rung);
+
+/// Where a rung's minimum is expected beside a known one's: what that one's tangent plane says.
+struct Nearby {
+  std::map<std::string, double> values;  ///< by name; empty: nothing is expected
+  double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
+};
+
+/// Makes a rung with a further loss that promises nothing what the promise says, without a fit,
+/// which would creep along beside the known rung's: it is told of, and error bars allow for it.
+/// @param diluted  promised gains tell so many times less (dilution()).
+void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
+                      double diluted, Rung& rung);
+
+/// Fits a rung that differs by a term or two from `known`, from where it is expected. Where what is
+/// found there is clearly worse than that promises, or nothing is expected, from the solution of
+/// `known` itself.
+void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
+                   const FitOptions& options, Rung& rung, const Nearby& near = {});
+
+}  // namespace trochoid::fitting

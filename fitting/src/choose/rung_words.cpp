@@ -1,0 +1,77 @@
+#include "choose/rung_words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "choose/retrograde.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+std::string listed(const std::vector<const Rung*>& rungs, double bic) {
+  std::string words;
+  for (const Rung* rung : rungs)
+    words +=
+        fmt::format("{}{} (BIC {:+.1f})", words.empty() ? "" : ", ", rung->name, rung->bic - bic);
+  return words;
+}
+
+// Which losses turn the mean path round, and whether others alone would do it as well.
+std::string retrograde_sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
+  const std::optional<double> from_s = retrograde_from_s(chosen.fit, chosen.scene);
+  if (!from_s) return "";
+  const auto term = [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].name; };
+  std::string acting, alike, out, nowhere;
+  for (const int index : chosen.terms) acting += (acting.empty() ? "" : " and ") + term(index);
+  for (const Rung& rung : rungs) {
+    if (rung.terms.size() != 1 || &rung == &chosen || rung.fit.model == "smooth") continue;
+    if (!rung.fitted) {
+      nowhere += (nowhere.empty() ? "" : ", ") + term(*rung.terms.begin());
+      continue;
+    }
+    std::string& list = rung.bic - chosen.bic < kVeryStrong ? alike : out;
+    list += fmt::format("{}{} (BIC {:+.0f})", list.empty() ? "" : ", ", term(*rung.terms.begin()),
+                        rung.bic - chosen.bic);
+  }
+  std::string words =
+      fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explains it", *from_s,
+                  acting.empty() ? chosen.name + " without losses" : acting);
+  if (!alike.empty()) words += ", but this track cannot tell that from " + alike;
+  if (!out.empty()) words += "; ruled out as the only loss: " + out;
+  if (!nowhere.empty()) words += "; no fit at all with nothing but " + nowhere;
+  return words + ".";
+}
+
+}  // namespace
+
+std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
+  if (!chosen.fit.converged)
+    return fmt::format("none of the {} models tried explains the track; {} comes nearest.",
+                       rungs.size(), chosen.name);
+  std::string words = fmt::format(
+      "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
+      chosen.name, chosen.parameters, chosen.fit.whiteness_p > 0.01 ? "white" : "not white",
+      chosen.held_back_rms_sigma);
+  std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
+  for (const Rung& rung : rungs) {
+    if (!rung.fitted || &rung == &chosen) continue;
+    const bool near = rung.bic - chosen.bic < kVeryStrong;
+    (has_all_terms_of(rung, chosen) ? more : near ? alike : worse).push_back(&rung);
+  }
+  const auto by_bic = [](const Rung* a, const Rung* b) { return a->bic < b->bic; };
+  std::sort(alike.begin(), alike.end(), by_bic);
+  std::sort(worse.begin(), worse.end(), by_bic);
+  std::sort(more.begin(), more.end(), by_bic);
+  if (!more.empty())
+    words += fmt::format("; neither needed nor ruled out: {}", listed(more, chosen.bic));
+  if (!alike.empty())
+    words += fmt::format("; the data do not rule out {}", listed(alike, chosen.bic));
+  else if (!worse.empty())
+    words += fmt::format("; the next best, {}, is ruled out", listed({worse.front()}, chosen.bic));
+  for (const std::string& term : ladder.left_out) words += fmt::format("; not tried: {}", term);
+  return words + "." + retrograde_sentence(rungs, chosen, ladder);
+}
+
+}  // namespace trochoid::fitting

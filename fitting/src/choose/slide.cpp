@@ -1,0 +1,94 @@
+#include "choose/slide.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "choose/exchange.hpp"
+#include "choose/leave_out.hpp"
+#include "choose/terms.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// The losses of a rung and of others that are as likely, up to so many.
+Terms as_likely(const Rungs& rungs, const Rung& chosen, std::size_t most) {
+  std::vector<const Rung*> near;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.fit.converged && rung.bic < chosen.bic + kStrong) near.push_back(&rung);
+  std::sort(near.begin(), near.end(), [](const Rung* a, const Rung* b) { return a->bic < b->bic; });
+  Terms terms = chosen.terms;
+  for (const Rung* rung : near) {
+    Terms more = terms;
+    more.insert(rung->terms.begin(), rung->terms.end());
+    if (more.size() <= most) terms = std::move(more);
+  }
+  return terms;
+}
+
+// With other losses a body may be seen to roll for longer: those that a first part of the track
+// asks for explain more of it, which asks for others. @param known  explains that first part.
+// @returns a rung that explains about as long a first part as any, or all of the track; of losses
+// that do so alike it has several.
+Rung longest_rolling(const Contest& contest, Rung known) {
+  constexpr double kSurely = 0.9;  // of the first part: before its end a slip may have begun
+  constexpr double kLonger = 1.05, kAsLong = 0.85;  // of its duration
+  constexpr int kMostParts = 4;
+  const double from_s = known.first_part.from_s;  // later than the track's where it is cut
+  for (int part = 0; part < kMostParts; ++part) {
+    const double before_s = known.first_part.until_s - from_s;
+    Contest early = contest;
+    early.options.to = fmt::format("{:.17g}", from_s + kSurely * before_s);
+    Rungs rungs;
+    Rung& first = rungs.emplace_back(rung_with(contest.ladder, known.terms));
+    fit_from_values(contest.tracks, known.first_part.values, options_for(first, early.options),
+                    first);
+    step_down(early, first, rungs);
+    const Rung* chosen = exchange_while_worth(early, rungs);
+    if (chosen == nullptr || !chosen->fit.converged) break;
+    Rung longer = rung_with(contest.ladder, as_likely(rungs, *chosen, kMostTerms));
+    fit_from_first_part(contest.tracks, {values_of(chosen->fit), 0.0, 0.0},
+                        options_for(longer, contest.options), longer);
+    if (explains(longer)) return longer;
+    const double after_s = longer.first_part.until_s - from_s;
+    if (!longer.first_part.empty() && after_s > kAsLong * before_s) known = std::move(longer);
+    if (after_s < kLonger * before_s) break;
+  }
+  return known;
+}
+
+// What seems to roll first and to slide later may creep all the time, where friction sets in
+// softly: searched from the beginning, with all that usually acts.
+void creep(const Contest& contest, Rungs& rungs) {
+  const Terms terms = all_that_usually_acts(contest.ladder, {});
+  if (terms.empty()) return;
+  Rungs searched;
+  const Rung& creeps = add_searched(contest, terms, searched);
+  if (explains(creeps)) step_down(contest, rungs.emplace_back(creeps), rungs);
+}
+
+}  // namespace
+
+bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs) {
+  const Rung rolling = longest_rolling(contest, known);
+  if (explains(rolling)) {
+    step_down(contest, rungs.emplace_back(rolling), rungs);
+    return true;
+  }
+  const Terms terms = with_last_resort(contest.ladder, rolling.terms);
+  if (terms.empty()) return false;  // no floor on which it may slide
+  Rung slides = rung_with(contest.ladder, terms);
+  fit_from_first_part(contest.tracks, rolling.first_part, options_for(slides, contest.options),
+                      slides);
+  if (!usable(slides.fit) || !slides.fit.converged) return false;
+  const Rung& added = rungs.emplace_back(std::move(slides));
+  // What follows the track to its end needs other losses, not another search.
+  if (explains(added))
+    step_down(contest, added, rungs);
+  else
+    creep(contest, rungs);
+  return true;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,12 @@
+#pragma once
+#include "choose/contest.hpp"
+
+namespace trochoid::fitting {
+
+/// A body that rolls first slides later, with what acts while it rolls.
+/// @param known  a rung that rolls and explains a first part of the track.
+/// @returns whether a rung was added that explains the track, or follows it to its end and is to go
+/// on from.
+bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs);
+
+}  // namespace trochoid::fitting

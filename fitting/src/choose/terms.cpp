@@ -1,0 +1,154 @@
+#include "choose/terms.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "problem/problem.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+const Term& term_of(const Ladder& ladder, int index) {
+  return ladder.terms[static_cast<std::size_t>(index)];
+}
+
+int count_of(const Ladder& ladder) {
+  return static_cast<int>(ladder.terms.size());
+}
+
+std::string name_of(const Ladder& ladder, const Terms& terms) {
+  std::string name = ladder.law, added;
+  for (const int index : terms) {
+    const Term& term = term_of(ladder, index);
+    if (term.smooth)
+      name = "smooth floor";
+    else
+      added += " + " + term.name;
+  }
+  return name + added;
+}
+
+// What [fit] says of parameters that a rung does not have is meant for other rungs.
+void keep_own(data::Scene& scene) {
+  data::FitSettings& fit = scene.fit;
+  if (fit.free.empty() && fit.fixed.empty() && fit.bounds.empty()) return;
+  const std::set<std::string> own = parameters_of(scene);
+  std::erase_if(fit.free, [&](const std::string& name) { return !names_one_of(own, name); });
+  std::erase_if(fit.fixed, [&](const auto& item) { return !names_one_of(own, item.first); });
+  std::erase_if(fit.bounds, [&](const auto& item) { return !names_one_of(own, item.first); });
+}
+
+}  // namespace
+
+bool names_one_of(const std::set<std::string>& parameters, const std::string& name) {
+  return std::any_of(parameters.begin(), parameters.end(), [&](const std::string& parameter) {
+    return parameter == name || parameter.starts_with(name + "[");
+  });
+}
+
+Rung rung_with(const Ladder& ladder, const Terms& terms) {
+  Rung rung;
+  rung.terms = terms;
+  rung.name = name_of(ladder, terms);
+  rung.scene = ladder.plain;
+  for (const int term : terms) term_of(ladder, term).switch_on(rung.scene);
+  keep_own(rung.scene);
+  return rung;
+}
+
+std::set<std::string> parameters_of_any(const Ladder& ladder) {
+  std::set<std::string> names = parameters_of(ladder.plain);
+  for (int index = 0; index < count_of(ladder); ++index) {
+    Terms terms{index};
+    if (const auto of = term_of(ladder, index).of) terms.insert(*of);
+    names.merge(parameters_of(rung_with(ladder, terms).scene));
+  }
+  return names;
+}
+
+std::set<std::string> parameters_without(const Ladder& ladder, const Terms& terms,
+                                         const Terms& fewer) {
+  std::set<std::string> own = parameters_of(rung_with(ladder, terms).scene);
+  for (const std::string& name : parameters_of(rung_with(ladder, fewer).scene)) own.erase(name);
+  return own;
+}
+
+std::optional<int> smooth_term(const Ladder& ladder) {
+  for (int index = 0; index < count_of(ladder); ++index)
+    if (term_of(ladder, index).smooth) return index;
+  return std::nullopt;
+}
+
+bool means_something(const Ladder& ladder, const Terms& terms, int index) {
+  const std::optional<int> of = term_of(ladder, index).of;
+  return !of || terms.contains(*of);
+}
+
+bool may_go(const Ladder& ladder, const Terms& terms, int index) {
+  return !term_of(ladder, index).last_resort &&
+         std::all_of(terms.begin(), terms.end(),
+                     [&](int other) { return term_of(ladder, other).of != index; });
+}
+
+Terms usual_losses(const Ladder& ladder) {
+  Terms terms;
+  for (int index = 0; index < count_of(ladder); ++index)
+    if (term_of(ladder, index).usual) terms.insert(index);
+  return terms;
+}
+
+Terms with_last_resort(const Ladder& ladder, Terms terms) {
+  bool resort = false;
+  for (int index = 0; index < count_of(ladder); ++index) {
+    if (!term_of(ladder, index).last_resort || term_of(ladder, index).smooth) continue;
+    resort = true;
+    terms.insert(index);
+  }
+  return resort ? terms : Terms{};
+}
+
+Terms all_that_usually_acts(const Ladder& ladder, Terms terms) {
+  terms.merge(usual_losses(ladder));
+  return with_last_resort(ladder, std::move(terms));
+}
+
+std::vector<Terms> with_one_more(const Ladder& ladder, const Terms& terms) {
+  std::vector<Terms> sets;
+  for (int index = 0; index < count_of(ladder); ++index) {
+    if (terms.contains(index) || !means_something(ladder, terms, index) ||
+        term_of(ladder, index).last_resort)
+      continue;
+    sets.push_back(terms);
+    sets.back().insert(index);
+  }
+  return sets;
+}
+
+std::map<int, Terms> all_sets(const Ladder& ladder, const Terms& known) {
+  std::vector<int> open;
+  for (int index = 0; index < count_of(ladder); ++index)
+    if (!term_of(ladder, index).last_resort) open.push_back(index);
+  std::map<int, Terms> sets;
+  for (int key = 0; key < 1 << open.size(); ++key) {
+    Terms terms = known;
+    for (std::size_t bit = 0; bit < open.size(); ++bit)
+      if ((key >> bit & 1) != 0)
+        terms.insert(open[bit]);
+      else
+        terms.erase(open[bit]);
+    if (std::all_of(terms.begin(), terms.end(),
+                    [&](int term) { return means_something(ladder, terms, term); }))
+      sets[key] = std::move(terms);
+  }
+  return sets;
+}
+
+Difference difference(const Terms& terms, const Terms& known) {
+  const auto beyond = [](const Terms& these, const Terms& others) {
+    return static_cast<std::size_t>(std::count_if(
+        these.begin(), these.end(), [&](int term) { return !others.contains(term); }));
+  };
+  return {beyond(terms, known), beyond(known, terms)};
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,62 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "choose/ladder.hpp"
+#include "choose/rung.hpp"
+
+// Which terms of a ladder stand together, and which act where nothing is known yet.
+namespace trochoid::fitting {
+
+/// A rung with these terms, not fitted yet; of what [fit] says it has what concerns its parameters.
+[[nodiscard]] Rung rung_with(const Ladder& ladder, const Terms& terms);
+
+/// Parameters of any of a ladder's rungs.
+[[nodiscard]] std::set<std::string> parameters_of_any(const Ladder& ladder);
+
+/// Parameters that a rung has and one with fewer terms has not.
+[[nodiscard]] std::set<std::string> parameters_without(const Ladder& ladder, const Terms& terms,
+                                                       const Terms& fewer);
+
+/// Whether [fit] may call one of these parameters so; a group's name covers its components.
+[[nodiscard]] bool names_one_of(const std::set<std::string>& parameters, const std::string& name);
+
+/// Index of the term that is a floor without friction, if the ladder has it.
+[[nodiscard]] std::optional<int> smooth_term(const Ladder& ladder);
+
+/// Whether a term stands for something beside these.
+[[nodiscard]] bool means_something(const Ladder& ladder, const Terms& terms, int index);
+
+/// Whether one of these terms may be left out: the last resort stays, and what another is a
+/// property of.
+[[nodiscard]] bool may_go(const Ladder& ladder, const Terms& terms, int index);
+
+/// What usually acts on a body that rolls.
+[[nodiscard]] Terms usual_losses(const Ladder& ladder);
+
+/// The terms and the last resort; empty where there is none.
+[[nodiscard]] Terms with_last_resort(const Ladder& ladder, Terms terms);
+
+/// The last resort together with the usual losses: a body that slides without any may not even stay
+/// on the floor as long as the track. Empty where there is no last resort.
+[[nodiscard]] Terms all_that_usually_acts(const Ladder& ladder, Terms terms);
+
+/// The terms with one more; the last resort is not added.
+[[nodiscard]] std::vector<Terms> with_one_more(const Ladder& ladder, const Terms& terms);
+
+/// All sets of terms, beside the last resort among `known`, that mean something. A key has a bit
+/// for each term: what is part of another set has a part of its bits.
+[[nodiscard]] std::map<int, Terms> all_sets(const Ladder& ladder, const Terms& known);
+
+/// How a set of terms differs from a known one.
+struct Difference {
+  std::size_t added = 0, removed = 0;
+  [[nodiscard]] bool larger() const { return added == 1 && removed == 0; }
+  [[nodiscard]] bool exchanged() const { return added == 1 && removed == 1; }
+};
+[[nodiscard]] Difference difference(const Terms& terms, const Terms& known);
+
+}  // namespace trochoid::fitting

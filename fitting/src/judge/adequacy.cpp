@@ -1,0 +1,406 @@
+#include "judge/adequacy.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "observe/smoothing.hpp"
+#include "start/strategy.hpp"
+
+namespace trochoid::fitting {
+
+namespace {
+
+// Positions as predicted, given whitened residuals.
+Eigen::MatrixX2d predicted_m(const ArcData& data, const Eigen::VectorXd& residuals) {
+  Eigen::MatrixX2d xy = data.positions_m();
+  for (const Reading& reading : data.readings)
+    if (reading.channel == Channel::position) {
+      const Eigen::Matrix2d wt = reading.whitener.transpose();
+      xy.row(reading.sample) += (wt.inverse() * residuals.segment<2>(reading.row)).transpose();
+    }
+  return xy;
+}
+
+// Where the prediction, which has no noise, scatters about a smooth curve as the samples do, frames
+// are too few to tell noise from motion: then it is at most so many times the stated.
+constexpr double kMisjudged = 2.0, kMostlyMotion = 0.5;
+
+}  // namespace
+
+Squares squares(const Problem& problem, const Solution& solution) {
+  Squares sum;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    if (data.observable_index(model::Observable::x_m) < 0) continue;
+    Problem plain = problem;
+    plain.noise_scale.fill(1.0);
+    Eigen::VectorXd r;
+    if (!evaluate(plain, arc, solution.u, r, nullptr)) return {.ok = false};
+    const Eigen::MatrixX2d xy = data.positions_m();
+    const Eigen::RowVector2d mean = xy.colwise().mean();
+    const double noise_m = noise_about_smooth_curve(data.t_s, xy);
+    const bool motion =
+        !data.sigma_unknown &&
+        noise_about_smooth_curve(data.t_s, predicted_m(data, r)) > kMostlyMotion * noise_m;
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != Channel::position) continue;
+      const Eigen::Matrix2d wt = reading.whitener.transpose();
+      sum.residual += r.segment<2>(reading.row).squaredNorm();
+      sum.motion += (wt * (reading.value - mean.transpose())).squaredNorm();
+      const double scatter = wt.squaredNorm() * noise_m * noise_m;
+      sum.scatter += motion ? std::min(scatter, 2.0 * kMisjudged * kMisjudged) : scatter;
+    }
+  }
+  return sum;
+}
+
+namespace {
+
+constexpr double kHopeless = 4.0;  // times the noise: far beyond what a tracker misjudges
+constexpr double kDoubtful = 2.0;
+constexpr const char* kChannelWords[] = {"positions", "tilt", "azimuth", "spin angle"};
+
+// A quiet minimiser in the wrong valley: the residuals carry a good part of the motion although the
+// samples scatter far less about a smooth curve.
+bool explains_path(const Squares& sum) {
+  return sum.ok && (sum.residual <= 0.03 * sum.motion || sum.residual <= 4.0 * sum.scatter);
+}
+
+struct Misfit {
+  double times = 0.0;  // residuals over noise
+  Channel channel = Channel::position;
+};
+
+bool seen(const Problem& problem, Channel channel) {
+  return std::any_of(problem.arcs.begin(), problem.arcs.end(), [&](const ArcData& arc) {
+    return std::any_of(arc.readings.begin(), arc.readings.end(),
+                       [&](const Reading& reading) { return reading.channel == channel; });
+  });
+}
+
+double typical_sigma(const Problem& problem, Channel channel) {
+  std::vector<double> sigmas;
+  for (const ArcData& arc : problem.arcs)
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == channel) sigmas.push_back(1.0 / reading.whitener(0, 0));
+  return median(std::move(sigmas));
+}
+
+// Stated sigmas without pixels are somebody's word for independent errors.
+bool is_tracked(const Problem& problem) {
+  return std::all_of(problem.arcs.begin(), problem.arcs.end(),
+                     [](const ArcData& a) { return a.filmed || a.sigma_unknown; });
+}
+
+// Of the worst channel. A path that is followed is doubtful at most: trackers know little of their
+// common errors. The noise is the larger one of the track's own sigmas and the scatter of
+// its samples about a smooth curve.
+Misfit misfit(const Problem& problem, const Squares& sum) {
+  constexpr double kFollowed_rad = 0.2;
+  // Within 1 % of the motion, and not so far off that only the model can be to blame.
+  constexpr double kFollowed = 1e-4, kAnyTracker = 8.0;
+  constexpr double kFine = 1.04;  // nobody asks whether the samples scatter as much
+  int rows = 0;
+  for (const ArcData& arc : problem.arcs)
+    for (const Reading& reading : arc.readings)
+      rows += reading.channel == Channel::position ? 2 : 0;
+  const double path = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
+  const bool path_followed =
+      is_tracked(problem) && sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
+  Misfit worst;
+  for (int c = 0; c < kChannels; ++c) {
+    const auto channel = static_cast<Channel>(c);
+    double scatter = 1.0;
+    for (const ArcData& arc : problem.arcs)
+      if (problem.noise_scale[c] > kFine) scatter = std::max(scatter, excess_scatter(arc, channel));
+    double times = problem.noise_scale[c] / scatter;
+    if (channel == Channel::position && path_followed) times = std::min(times, kHopeless);
+    // Where the angle is all there is, being followed is not enough.
+    const bool whole = problem.predictor->model_name() == "pivot" && times >= kAnyTracker;
+    if (channel != Channel::position && !whole &&
+        problem.noise_scale[c] * typical_sigma(problem, channel) < kFollowed_rad)
+      continue;
+    if (seen(problem, channel) && times > worst.times) worst = {times, channel};
+  }
+  if (sum.ok && !path_followed && path > worst.times) worst = {path, Channel::position};
+  return worst;
+}
+
+// Positions the fit has given up although they lie on one path with the others: not the tracker's
+// glitches, but motion that the model does not have.
+struct GivenUp {
+  int samples = 0, of = 0;
+  double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
+  // One or two may be glitches that happen to lie near the path.
+  [[nodiscard]] bool more_than(double share) const {
+    constexpr int kFewest = 3;
+    return samples >= kFewest && samples > share * of;
+  }
+  [[nodiscard]] std::string words() const {
+    return fmt::format(
+        "{} of its {} positions, between {:.4g} and {:.4g} s, lie too far from the model to count, "
+        "although they lie on one path with the others",
+        samples, of, first_s, last_s);
+  }
+};
+
+GivenUp given_up(const Problem& problem, const Solution& solution) {
+  constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
+  // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
+  constexpr double kNothing = 1e-5;
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
+  GivenUp all;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    Eigen::VectorXd residuals;
+    if (data.observable_index(model::Observable::x_m) < 0 ||
+        !evaluate(plain, arc, solution.u, residuals, nullptr))
+      continue;
+    const Eigen::MatrixX2d xy = data.positions_m();
+    const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
+    const double nothing_m =
+        kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    const std::vector<int> consistent = consistent_samples(data);
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != Channel::position) continue;
+      ++all.of;
+      if (robust_weight(problem, arc, reading) > kHardlyCounts ||
+          off.row(reading.sample).norm() < nothing_m ||
+          !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
+        continue;
+      ++all.samples;
+      all.first_s = std::min(all.first_s, data.t_s[reading.sample]);
+      all.last_s = std::max(all.last_s, data.t_s[reading.sample]);
+    }
+  }
+  return all;
+}
+
+// Chi-square of the positions about a polynomial in time, weighted as in the fit.
+double polynomial_chi2(const Problem& problem, int arc, int degree) {
+  const ArcData& data = problem.arcs[arc];
+  std::vector<const Reading*> readings;
+  for (const Reading& reading : data.readings)
+    if (reading.channel == Channel::position) readings.push_back(&reading);
+  const auto n = static_cast<Eigen::Index>(readings.size());
+  const double duration_s = std::max(data.duration_s(), 1e-300);
+  Eigen::MatrixXd basis(2 * n, 2 * (degree + 1));
+  Eigen::VectorXd right(2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Reading& reading = *readings[i];
+    const double weight = robust_weight(problem, arc, reading) / problem.noise_scale[0];
+    const Eigen::Matrix2d wt = weight * reading.whitener.transpose();
+    const double t = 2.0 * (data.t_s[reading.sample] - data.t_s.front()) / duration_s - 1.0;
+    double power = 1.0;
+    for (int k = 0; k <= degree; ++k, power *= t) basis.block<2, 2>(2 * i, 2 * k) = power * wt;
+    right.segment<2>(2 * i) = wt * reading.value;
+  }
+  const Eigen::VectorXd c = basis.colPivHouseholderQr().solve(right);
+  constexpr double kRounding = 1e-13;
+  const double left = (right - basis * c).norm();
+  return left > kRounding * right.norm() ? left * left : 0.0;
+}
+
+// The least degree of polynomials that explain the positions as well as the model does, by BIC; -1
+// if none, or where position is not what carries the model.
+int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u) {
+  const std::string& model = problem.predictor->model_name();
+  if (model == "puck" || model == "pivot" || model == "smooth") return -1;
+  constexpr int kHighest = 3;
+  double rows = 0.0, chi2 = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    // A tilt or an azimuth in the track says more about the motion than the path does.
+    if (data.observable_index(model::Observable::x_m) < 0 ||
+        data.observable_index(model::Observable::phi_rad) >= 0 ||
+        data.observable_index(model::Observable::theta_rad) >= 0)
+      return -1;
+    Eigen::VectorXd r;
+    if (!evaluate(problem, arc, u, r, nullptr)) return -1;
+    for (const Reading& reading : data.readings)
+      if (reading.channel == Channel::position) {
+        chi2 += r.segment<2>(reading.row).squaredNorm();
+        rows += 2.0;
+      }
+  }
+  // Losses that mean nothing do not count against the model.
+  const auto counted =
+      std::count_if(problem.free.begin(), problem.free.end(),
+                    [&](const FreeParameter& parameter) { return !is_loss(problem, parameter); });
+  const double bic = chi2 + static_cast<double>(counted) * std::log(rows);
+  for (int degree = 0; degree <= kHighest; ++degree) {
+    double sum = 0.0;
+    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+      sum += polynomial_chi2(problem, arc, degree) + 2.0 * (degree + 1) * std::log(rows);
+    if (sum <= bic) return degree;
+  }
+  return -1;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
+}
+
+std::vector<std::string> undetermined(const data::Fit& fit) {
+  std::vector<std::string> names;
+  for (const data::FitParameter& parameter : fit.parameters)
+    if (parameter.status == data::ParameterStatus::free && !parameter.identifiable)
+      names.push_back(parameter.name);
+  return names;
+}
+
+void warn_unexplained(const Squares& sum, data::Fit& fit) {
+  // Twice the scatter: more than a smoothing curve misjudges the noise.
+  if (!sum.ok || sum.residual <= 4.0 * sum.scatter) return;
+  fit.warnings.push_back(
+      fmt::format("the residuals are {:.1f} times the scatter of the samples about a smooth curve: "
+                  "the model lacks something, or a better minimum exists",
+                  std::sqrt(sum.residual / sum.scatter)));
+}
+
+void refuse(const char* outcome, const char* verdict, std::string words, data::Fit& fit) {
+  fit.converged = false;
+  fit.outcome = outcome;
+  fit.verdict = verdict;
+  fit.reason = std::move(words);
+  fit.verdict_words = fit.reason;
+}
+
+void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
+            const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
+  constexpr double kMany = 0.01;
+  fit.converged = true;
+  fit.outcome = "converged";
+  fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
+  const double widened = error.widened;
+  const bool correlated = error.whiteness.inflation > 1.0;
+  const bool misses = worst.times > kDoubtful;
+  const bool doubtful = misses || lost.more_than(kMany);
+  const bool stated = std::none_of(problem.arcs.begin(), problem.arcs.end(),
+                                   [](const ArcData& arc) { return arc.sigma_unknown; });
+  std::string words = "the model explains the track";
+  if (doubtful && !misses)
+    words = "the model follows the track, but does not explain it: " + lost.words();
+  else if (doubtful)
+    words = fmt::format(
+        "the model follows the track, but does not explain it: the residuals of its {} are {:.2g} "
+        "times their noise, the model lacks something, or a better minimum exists, and the error "
+        "bars are too small",
+        kChannelWords[static_cast<int>(worst.channel)], worst.times);
+  else if (correlated)
+    words += fmt::format(
+        "{}; what is left hangs together over {:.2g} s, and the error bars are widened {:.2g} "
+        "times for that",
+        stated ? fmt::format(" to {:.2g} times its stated noise", fit.noise_scale) : "",
+        error.whiteness.correlation_time_s, widened);
+  else
+    words += fmt::format(", and what is left looks like noise{}",
+                         stated ? fmt::format(" ({:.2g} times the stated)", fit.noise_scale) : "");
+  const std::vector<std::string> open = undetermined(fit);
+  fit.verdict = doubtful        ? "doubtful"
+                : !open.empty() ? "weak"
+                : correlated    ? "good_correlated"
+                                : "good";
+  if (!open.empty()) words += "; not determined: " + listed(open);
+  fit.verdict_words = words;
+}
+
+}  // namespace
+
+void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
+           bool cut_short, data::Fit& fit) {
+  const Squares sum = squares(problem, solution);
+  warn_unexplained(sum, fit);
+  const Misfit worst = misfit(problem, sum);
+  const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
+  if (!solution.converged) return refuse("no_convergence", "unexplained", solution.message, fit);
+  if (!explains_path(sum))
+    return refuse("unexplained", "unexplained",
+                  "the best path found leaves most of the motion unexplained", fit);
+  if (worst.times > kHopeless)
+    return refuse("unexplained", "unexplained",
+                  fmt::format("the model does not explain the track: the residuals of its {} are "
+                              "{:.2g} times their noise",
+                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                  fit);
+  // Where there are many valleys another one may explain what this one does not.
+  if (cut_short && !is_tracked(problem) && worst.times * worst.times > chi2_gate(problem.rows()))
+    return refuse("unexplained", "unexplained",
+                  fmt::format("the search ended at its limit, and the best path it found does not "
+                              "explain the track: the residuals of its {} are {:.2g} times their "
+                              "noise",
+                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                  fit);
+  constexpr double kTooMany = 0.1;
+  const GivenUp lost = given_up(problem, solution);
+  if (lost.more_than(kTooMany))
+    return refuse("unexplained", "unexplained",
+                  "the model does not explain the track: " + lost.words(), fit);
+  if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)
+    return refuse("not_identifiable", "no_feature",
+                  fmt::format("{} in time explains the path as well: nothing in it asks for the "
+                              "model '{}', whose parameters mean nothing here",
+                              kPolynomials[degree], fit.model),
+                  fit);
+  accept(problem, solution, error, worst, lost, fit);
+}
+
+void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  constexpr double kByChance = 1e-6, kNotWhite = 0.01;
+  // Rendered recordings of rolling rings and discs came to 7.
+  constexpr double kOfATracker = 20.0;
+  const Drift& drift = error.drift;
+  const bool passed =
+      fit.verdict == "good" || fit.verdict == "good_correlated" || fit.verdict == "weak";
+  if (!passed || error.whiteness.p_value > kNotWhite) return;
+  if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
+  if (is_tracked(problem) && drift.gain < kOfATracker) return;
+  fit.verdict = "doubtful";
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain it: the second half asks for other "
+      "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
+      "model lacks something, and the error bars are too small",
+      drift.gain);
+}
+
+bool explains(const Problem& problem, const Solution& solution) {
+  const Squares sum = squares(problem, solution);
+  return explains_path(sum) && misfit(problem, sum).times <= kDoubtful;
+}
+
+double straying_m(std::span<const data::Track> tracks) {
+  double squares = 0.0, rows = 0.0;
+  for (const data::Track& track : tracks) {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    double count = 0.0;
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.has_metres()) mean += sample.centre_m, count += 1.0;
+    if (count == 0.0) continue;
+    mean /= count;
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.has_metres()) squares += (sample.centre_m - mean).squaredNorm();
+    rows += 2.0 * count;
+  }
+  return rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
+}
+
+bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene) {
+  std::vector<double> sigmas_m;
+  for (const data::Track& track : tracks)
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.has_covariance())
+        sigmas_m.push_back(std::sqrt(0.5 * sample.covariance_m2.trace()));
+  const double radius_m = scene.body ? scene.body->radius_m : 0.0;
+  return straying_m(tracks) > std::max(5.0 * median(std::move(sigmas_m)), 0.05 * radius_m);
+}
+
+}  // namespace trochoid::fitting

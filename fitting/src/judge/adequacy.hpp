@@ -1,0 +1,58 @@
+#pragma once
+#include <span>
+
+#include "judge/statistics.hpp"
+#include "problem/problem.hpp"
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+
+namespace trochoid::fitting {
+
+/// Squares of the positions, in units of the track's sigmas: about the prediction, about their
+/// mean, and about a smooth curve. The last is noise only where frames follow each other closely
+/// enough; where the prediction scatters likewise it counts for twice the sigmas at most.
+struct Squares {
+  bool ok = true;
+  double residual = 0.0, motion = 0.0, scatter = 0.0;
+};
+[[nodiscard]] Squares squares(const Problem& problem, const Solution& solution);
+
+/// What a fit is worth. Words of data::Fit::verdict:
+///   unexplained      not a minimum; or residuals beyond 4 times the track's sigmas, the samples'
+///                    scatter about a smooth curve and 1 % of the motion (angles: 0.2 rad), or
+///                    beyond 8 times; or a 30th of the motion's variance left; or a tenth of the
+///                    positions, three at least, given up that lie on one path with the others
+///   no_feature       a constant, a line, a parabola or a cubic in time explains the positions as
+///                    well (BIC): nothing in them asks for the model
+///   doubtful         followed, but residuals are beyond 2 times those measures, or a
+///                    hundredth of the positions, three at least, given up, or
+///                    doubt_if_drifting() says so
+///   weak             explained, but parameters of the motion are not determined
+///   good_correlated  explained; residuals hang together, error bars are widened for that
+///   good             explained; what is left looks like noise
+/// @param cut_short  the search ended at its limit before anything passed its gate: residuals that
+///                   do not pass it now, of independent errors, are unexplained.
+/// Sets converged, outcome, reason, verdict and verdict_words; warns of residuals above the
+/// scatter.
+void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
+           bool cut_short, data::Fit& fit);
+
+/// Lowers a verdict of what is explained to doubtful where the second half of the record asks for
+/// other parameters than the first, its noise allowed for: the model then lacks something that the
+/// parameters stand in for, and their error bars do not know of it. A tracker's errors go with the
+/// motion a little, too: of filmed positions more is asked.
+void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit);
+
+/// Whether a path is neither unexplained nor doubtful for its residuals.
+[[nodiscard]] bool explains(const Problem& problem, const Solution& solution);
+
+/// How far the centre of a body held at a pivot strays from its mean place [m] (rms of a
+/// coordinate); 0 without positions in metres.
+[[nodiscard]] double straying_m(std::span<const data::Track> tracks);
+
+/// Whether it strays further than a disc that turns face-on about a pivot near its middle: 5 times
+/// the sigmas and a twentieth of the body's radius.
+[[nodiscard]] bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene);
+
+}  // namespace trochoid::fitting

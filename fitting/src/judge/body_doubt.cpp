@@ -1,0 +1,186 @@
+#include "judge/body_doubt.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "observe/observed.hpp"
+#include "problem/linearise.hpp"
+#include "start/strategy.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+/// A quantity of the scene that is not a parameter of any fit.
+struct Given {
+  const char* name;
+  std::function<void(data::Scene&, double value)> set;
+};
+
+const std::array<Given, 7>& givens() {
+  static const std::array<Given, 7> all{
+      {{"mass_kg", [](data::Scene& s, double v) { s.body->mass_kg = v; }},
+       {"radius_m", [](data::Scene& s, double v) { s.body->radius_m = v; }},
+       {"inner_radius_m", [](data::Scene& s, double v) { s.body->inner_radius_m = v; }},
+       {"thickness_m", [](data::Scene& s, double v) { s.body->thickness_m = v; }},
+       {"I_kg_m2", [](data::Scene& s, double v) { s.body->I_kg_m2 = v; }},
+       {"Is_kg_m2", [](data::Scene& s, double v) { s.body->Is_kg_m2 = v; }},
+       {"gravity_m_s2", [](data::Scene& s, double v) { s.model.gravity_m_s2 = v; }}}};
+  return all;
+}
+
+bool gave_the_scale(const data::Scene& scene, const std::string& name) {
+  return name == "radius_m" && scene.camera.file.empty() && !scene.camera.scale_px_per_m;
+}
+
+}  // namespace
+
+void take_priors_for_given(data::Scene& scene) {
+  for (const Given& given : givens())
+    if (const auto prior = scene.fit.prior.find(given.name);
+        prior != scene.fit.prior.end() && scene.body && !gave_the_scale(scene, given.name))
+      given.set(scene, prior->second.value);
+}
+
+namespace {
+
+// Residuals with a given quantity off by some standard deviations of its prior; empty if the model
+// has no prediction there.
+class Moved {
+ public:
+  Moved(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
+        const Given& given, const data::Prior& prior, double frame_time_s)
+      : problem_(problem),
+        u_(u),
+        scene_(scene),
+        given_(given),
+        prior_(prior),
+        frame_time_s_(frame_time_s) {}
+
+  [[nodiscard]] Eigen::VectorXd by(double deviations) const {
+    data::Scene scene = scene_;
+    scene.model.name = problem_.predictor->model_name();
+    given_.set(scene, prior_.value + deviations * prior_.sigma);
+    const auto plain = model::make_predictor(scene);
+    const auto wrapped = observed(*plain, scene, frame_time_s_);
+    const Problem other = for_predictor(problem_, wrapped ? *wrapped : *plain);
+    Eigen::VectorXd residuals;
+    if (other.free.size() != problem_.free.size() || !all_residuals(other, u_, residuals))
+      return {};
+    return residuals;
+  }
+
+  // Derivative of the residuals by the deviation. A track may see the thousandth part of a prior's:
+  // the step moves the residuals by about their noise, where they are straight and well above the
+  // integration error.
+  [[nodiscard]] Eigen::VectorXd derivative(const Eigen::VectorXd& here) const {
+    constexpr double kFirst = 1e-2, kLeast = 1e-6;
+    const Eigen::VectorXd there = by(kFirst);
+    if (there.size() == 0) return {};
+    const double moved = (there - here).norm(), noise = std::sqrt(static_cast<double>(here.size()));
+    const double step = std::clamp(kFirst * noise / std::max(moved, 1e-300), kLeast, 1.0);
+    const Eigen::VectorXd up = by(step), down = by(-step);
+    if (up.size() == 0 || down.size() == 0) return {};
+    return (up - down) / (2.0 * step);
+  }
+
+ private:
+  const Problem& problem_;
+  const Eigen::VectorXd& u_;
+  const data::Scene& scene_;
+  const Given& given_;
+  const data::Prior& prior_;
+  double frame_time_s_;
+};
+
+// How the fitted values follow a change of the residuals, to first order.
+Eigen::VectorXd follow(const Linearised& all, const Eigen::VectorXd& change) {
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(all.residuals.size());  // priors do not move
+  right.head(change.size()) = change;
+  const Eigen::VectorXd size = all.jacobian.colwise().norm().cwiseMax(1e-300);
+  const Eigen::MatrixXd scaled = all.jacobian * size.cwiseInverse().asDiagonal();
+  return -scaled.completeOrthogonalDecomposition().solve(right).cwiseQuotient(size);
+}
+
+}  // namespace
+
+std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
+                               const data::Scene& scene, double frame_time_s) {
+  std::vector<Doubt> doubts;
+  std::optional<Linearised> all;
+  for (const Given& given : givens()) {
+    const auto prior = scene.fit.prior.find(given.name);
+    if (prior == scene.fit.prior.end() || !scene.body || gave_the_scale(scene, given.name) ||
+        problem.predictor->index_of(given.name) >= 0)
+      continue;
+    if (!all) all = linearise(problem, u);
+    const Eigen::Index rows = problem.rows();
+    const Eigen::VectorXd by_given = Moved(problem, u, scene, given, prior->second, frame_time_s)
+                                         .derivative(all->residuals.head(rows));
+    if (by_given.size() == 0) continue;
+    doubts.push_back({given.name, follow(*all, by_given)});
+  }
+  return doubts;
+}
+
+namespace {
+
+// Of one arc, whose spin is its own.
+Doubt unseen_spin(const Problem& problem, const Eigen::VectorXd& u, int arc, Linearised& all) {
+  const model::Predictor& predictor = *problem.predictor;
+  const int spin = predictor.index_of("w3_rad_s"), radius = predictor.index_of("contact_radius_m");
+  const Eigen::VectorXd values = problem.values(arc, u);
+  const auto fitted = [&](const FreeParameter& p) { return p.index == spin && p.arc == arc; };
+  if (std::any_of(problem.free.begin(), problem.free.end(), fitted) || values[spin] != 0.0)
+    return {};
+  Problem turning = problem;
+  turning.base[arc][spin] =
+      std::hypot(values[predictor.index_of("vx_m_s")], values[predictor.index_of("vy_m_s")]) /
+      values[radius];
+  Eigen::VectorXd there;
+  if (!all_residuals(turning, u, there)) return {};
+  if (all.residuals.size() == 0) all = linearise(problem, u);
+  const Eigen::VectorXd change = there - all.residuals.head(there.size());
+  const Eigen::VectorXd shift = follow(all, change);
+  // What the path has of it that no other value could have made: how much of such a spin there is,
+  // and how well that is known, one time as much being as likely as not beforehand.
+  const Eigen::VectorXd own = change + all.jacobian.topRows(there.size()) * shift;
+  const double seen = own.squaredNorm();
+  const double share = std::max(0.0, -own.dot(all.residuals.head(there.size()))) / (1.0 + seen);
+  return {"w3_rad_s", std::sqrt(1.0 / (1.0 + seen) + share * share) * shift};
+}
+
+}  // namespace
+
+std::vector<Doubt> unseen_spins(const Problem& problem, const Eigen::VectorXd& u,
+                                const data::Scene& scene) {
+  std::vector<Doubt> doubts;
+  if (problem.predictor->model_name() != "puck" || scene.fit.fixed.contains("w3_rad_s"))
+    return doubts;
+  Linearised all;  // once, and only where it is needed
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    if (Doubt doubt = unseen_spin(problem, u, arc, all); doubt.shift.size() > 0)
+      doubts.push_back(std::move(doubt));
+  return doubts;
+}
+
+std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {
+  std::vector<std::string> idle;
+  const auto& infos = problem.predictor->parameters();
+  for (const auto& [name, prior] : scene.fit.prior) {
+    const bool of_body =
+        std::any_of(givens().begin(), givens().end(),
+                    [&name = name](const Given& given) { return name == given.name; });
+    const bool of_model = std::any_of(
+        infos.begin(), infos.end(), [&name = name](const auto& info) { return name == info.name; });
+    if (!of_body && !of_model && name != "frame_rate_hz") idle.push_back(name);
+  }
+  return idle;
+}
+
+}  // namespace trochoid::fitting

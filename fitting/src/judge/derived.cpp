@@ -1,0 +1,160 @@
+#include "judge/derived.hpp"
+
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "trochoid/model/inertia.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// A quantity with a standard deviation that is independent of the fit.
+struct Given {
+  bool known = false;
+  double value = 0.0, sigma = 0.0;
+};
+
+Given given(const data::Scene& scene, const std::string& name, std::optional<double> from_body) {
+  const auto prior = scene.fit.prior.find(name);
+  if (prior != scene.fit.prior.end()) return {true, prior->second.value, prior->second.sigma};
+  if (from_body) return {true, *from_body, 0.0};
+  return {};
+}
+
+// Error propagation through f(fit values, givens) by central differences: both covariance of the
+// fit and the givens' own sigmas.
+class Propagation {
+ public:
+  Propagation(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance)
+      : problem_(problem), covariance_(covariance), values_(problem.values(0, u)) {}
+
+  using Function = std::function<double(const Eigen::VectorXd& values, const std::vector<double>&)>;
+
+  [[nodiscard]] Given operator()(const Function& f, const std::vector<Given>& givens) const {
+    std::vector<double> g;
+    for (const Given& one : givens) g.push_back(one.value);
+    Given result{true, f(values_, g), 0.0};
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(covariance_.rows());
+    for (int i = 0; i < gradient.size(); ++i) {
+      if (problem_.free[i].arc > 0) continue;
+      const double sigma = std::sqrt(covariance_(i, i));
+      if (!(sigma > 0.0) || !std::isfinite(sigma)) continue;
+      Eigen::VectorXd shifted = values_;
+      const double step = 1e-4 * sigma;
+      shifted[problem_.free[i].index] += step;
+      const double up = f(shifted, g);
+      shifted[problem_.free[i].index] -= 2.0 * step;
+      gradient[i] = (up - f(shifted, g)) / (2.0 * step);
+    }
+    double variance = gradient.dot(covariance_ * gradient);
+    for (std::size_t i = 0; i < givens.size(); ++i) {
+      if (!(givens[i].sigma > 0.0)) continue;
+      std::vector<double> up = g, down = g;
+      up[i] += 0.5 * givens[i].sigma;
+      down[i] -= 0.5 * givens[i].sigma;
+      const double change = f(values_, up) - f(values_, down);
+      variance += change * change;
+    }
+    result.sigma = std::sqrt(variance);
+    return result;
+  }
+
+ private:
+  const Problem& problem_;
+  const Eigen::MatrixXd& covariance_;
+  Eigen::VectorXd values_;
+};
+
+void add(data::Fit& fit, const std::string& name, const std::string& unit, const Given& value,
+         const std::string& note) {
+  if (!std::isfinite(value.value) || fit.find(name) != nullptr) return;
+  data::FitParameter parameter;
+  parameter.name = name;
+  parameter.value = value.value;
+  parameter.sigma = value.sigma;
+  parameter.unit = unit;
+  parameter.status = data::ParameterStatus::derived;
+  parameter.note = note;
+  fit.parameters.push_back(parameter);
+}
+
+bool is_free(const Problem& problem, const char* name) {
+  const int index = problem.predictor->index_of(name);
+  for (const FreeParameter& parameter : problem.free)
+    if (parameter.index == index) return true;
+  return false;
+}
+
+}  // namespace
+
+void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
+                     const Eigen::MatrixXd& covariance, const data::Scene& scene, data::Fit& fit) {
+  const Propagation propagate(problem, u, covariance);
+  const int a = problem.predictor->index_of("a_1_s2"), b = problem.predictor->index_of("b_1_s");
+  const int l = problem.predictor->index_of("l_m");
+  const int omega = problem.predictor->index_of("omega_s_rad_s");
+  const data::Body body = scene.body.value_or(data::Body{});
+  const bool shaped = scene.body && body.kind != data::BodyKind::top && body.radius_m > 0.0;
+  const Given I = given(scene, "I_kg_m2", body.I_kg_m2),
+              Is = given(scene, "Is_kg_m2", body.Is_kg_m2);
+  const Given mass = given(scene, "mass_kg", body.mass_kg);
+
+  if (omega >= 0 && is_free(problem, "omega_s_rad_s")) {
+    add(fit, "I_over_Is", "1",
+        propagate([=](const Eigen::VectorXd& v, const auto&) { return v[omega] / v[b]; }, {}),
+        "omega_s / b, the spin from the mark");
+  } else if (I.known && Is.known) {
+    add(fit, "I_over_Is", "1",
+        propagate([](const auto&, const std::vector<double>& g) { return g[0] / g[1]; }, {I, Is}),
+        "from the given I and Is");
+    add(fit, "omega_s_rad_s", "rad/s",
+        propagate([=](const Eigen::VectorXd& v,
+                      const std::vector<double>& g) { return v[b] * g[0] / g[1]; },
+                  {I, Is}),
+        "b I / Is with the given I and Is");
+  } else if (shaped) {
+    // Per unit mass; about the pivot I = A + m l^2 with the fitted l.
+    data::Body unit = body;
+    unit.mass_kg = 1.0;
+    unit.I_kg_m2.reset();
+    unit.Is_kg_m2.reset();
+    const model::CentralInertia inertia = model::central_inertia(unit);
+    const auto ratio = [=](const Eigen::VectorXd& v) {
+      return (inertia.transverse_kg_m2 + v[l] * v[l]) / inertia.axial_kg_m2;
+    };
+    add(fit, "I_over_Is", "1",
+        propagate([=](const Eigen::VectorXd& v, const auto&) { return ratio(v); }, {}),
+        "from the body's shape and the fitted l");
+    add(fit, "omega_s_rad_s", "rad/s",
+        propagate([=](const Eigen::VectorXd& v, const auto&) { return v[b] * ratio(v); }, {}),
+        "b I / Is, I / Is from the body's shape and the fitted l");
+  }
+  Given gravity = given(scene, "gravity_m_s2", scene.model.gravity_m_s2);
+  if (I.known && !mass.known)
+    add(fit, "mass_kg", "kg",
+        propagate([=](const Eigen::VectorXd& v,
+                      const std::vector<double>& g) { return v[a] * g[0] / (g[1] * v[l]); },
+                  {I, gravity}),
+        "a I / (g l) with the given I and gravity");
+}
+
+void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
+                          const Eigen::MatrixXd& covariance, data::Fit& fit) {
+  if (!problem.rolls_at_first) return;
+  const Propagation propagate(problem, u, covariance);
+  const auto index = [&](const char* name) { return problem.predictor->index_of(name); };
+  const int theta = index("theta_rad"), phi = index("phi_rad"), w1 = index("w1_rad_s"),
+            w2 = index("w2_rad_s"), w3 = index("w3_rad_s");
+  const RollsAtFirst rim = *problem.rolls_at_first;
+  for (const auto& [name, axis] : {std::pair{"vx_m_s", 0}, {"vy_m_s", 1}})
+    add(fit, name, "m/s",
+        propagate(
+            [=, axis = axis](const Eigen::VectorXd& v, const auto&) {
+              return rim.velocity_m_s(v[theta], v[phi], v[w1], v[w2], v[w3])[axis];
+            },
+            {}),
+        "velocity of the centre; the body rolls at first, so it follows from the spin");
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,169 @@
+#include "judge/describe.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "judge/derived.hpp"
+#include "judge/one_friction.hpp"
+#include "judge/steady_top.hpp"
+#include "observe/observed.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// Standard deviations if scale and frame rate were exact: what two clips of one camera share falls
+// out of their comparison. Empty if neither is in doubt.
+Eigen::VectorXd sigma_of_one_camera(const Problem& problem, const Eigen::MatrixXd& covariance) {
+  std::vector<int> shared;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (const std::string name = problem.name(i); name == kScale || name == kTimeFactor)
+      shared.push_back(i);
+  if (shared.empty()) return {};
+  const Eigen::MatrixXd across = covariance(Eigen::all, shared);
+  const Eigen::MatrixXd reduced =
+      covariance - across * covariance(shared, shared).ldlt().solve(across.transpose());
+  return reduced.diagonal().cwiseMax(0.0).cwiseSqrt();
+}
+
+void report_parameters(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  const auto& infos = problem.predictor->parameters();
+  fit.covariance = error.covariance;
+  const Eigen::VectorXd one_camera = sigma_of_one_camera(problem, error.covariance);
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    fit.covariance_names.push_back(problem.name(i));
+    const FreeParameter& free = problem.free[i];
+    const int arc = std::max(0, free.arc);
+    data::FitParameter parameter;
+    parameter.name = problem.name(i);
+    parameter.value = problem.base[arc][free.index];
+    parameter.sigma = std::sqrt(error.covariance(i, i));
+    parameter.unit = infos[free.index].unit;
+    parameter.identifiable = error.identifiable[i];
+    parameter.note = infos[free.index].meaning;
+    if (one_camera.size() > 0 && infos[free.index].role == model::ParameterInfo::Role::dynamics)
+      parameter.note +=
+          fmt::format("; +- {:.2g} between clips of this scale and frame rate", one_camera[i]);
+    if (free.held && free.transform.is_over_decades())
+      parameter.note +=
+          fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
+    if (free.prior && parameter.sigma > 0.9 * free.prior->sigma)
+      parameter.status = data::ParameterStatus::prior;
+    if (!std::isfinite(parameter.sigma)) parameter.identifiable = false;
+    fit.parameters.push_back(parameter);
+  }
+  for (int index = 0; index < static_cast<int>(infos.size()); ++index) {
+    const bool is_free = std::any_of(problem.free.begin(), problem.free.end(),
+                                     [&](const FreeParameter& p) { return p.index == index; });
+    // An unseen spin angle is not a fixed value, it is simply absent.
+    if (is_free || (infos[index].role == model::ParameterInfo::Role::initial)) continue;
+    fit.parameters.push_back({infos[index].name, problem.base[0][index], 0.0, infos[index].unit,
+                              data::ParameterStatus::fixed, true, infos[index].meaning});
+  }
+}
+
+void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  for (const data::NullVector& vector : fit.null_vectors) fit.warnings.push_back(vector.words);
+  for (const ArcData& arc : problem.arcs)
+    if (arc.sigma_unknown) {
+      fit.warnings.push_back("the track has no covariances: sigma is estimated from the residuals");
+      break;
+    }
+  for (const ArcData& arc : problem.arcs)
+    if (arc.held)
+      fit.warnings.push_back(fmt::format(
+          "track {} begins at rest: fitted from {:.4g} s, where the body is let go; from sets "
+          "another start",
+          arc.track + 1, arc.t_s.front()));
+  if (error.whiteness.inflation > 1.0)
+    fit.warnings.push_back(
+        fmt::format("residuals hang together over {:.3g} s: error bars widened by {:.2f}",
+                    error.whiteness.correlation_time_s, error.widened));
+}
+
+// Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes.
+void warn_short_top(const Problem& problem, data::Fit& fit) {
+  const auto* b = fit.find("b_1_s");
+  const auto* rate = fit.find("dphi_rad_s");
+  const auto* theta = fit.find("theta_rad");
+  if (b == nullptr || rate == nullptr || theta == nullptr) return;
+  const double frequency = std::abs(b->value - 2.0 * rate->value * std::cos(theta->value));
+  const double periods = problem.arcs[0].duration_s() * frequency / (2.0 * std::numbers::pi);
+  if (periods >= 1.0) return;
+  fit.warnings.push_back(fmt::format(
+      "the track is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
+      periods));
+}
+
+// A rolling body's nutation is about as fast as its node line turns.
+void warn_short_rim(const Problem& problem, data::Fit& fit) {
+  const auto* w2 = fit.find("w2_rad_s");
+  const auto* theta = fit.find("theta_rad");
+  if (w2 == nullptr || theta == nullptr) return;
+  const double rate = std::abs(w2->value) / std::max(std::sin(theta->value), 1e-6);
+  const double turns = problem.arcs[0].duration_s() * rate / (2.0 * std::numbers::pi);
+  if (turns >= 1.0) return;
+  fit.warnings.push_back(fmt::format(
+      "the track is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and "
+      "losses are hardly separable, and error bars may be too small",
+      turns));
+}
+
+// A law for small tilts may miss air's viscosity by a few times, not by orders of magnitude.
+void warn_thick_air(data::Fit& fit) {
+  constexpr double kMost = 10.0;
+  const data::FitParameter* gap = fit.find("gap_viscosity_Pa_s");
+  if (gap == nullptr || gap->status != data::ParameterStatus::free) return;
+  const double times = gap->value / kAirViscosity_Pa_s;
+  if (times < kMost) return;
+  fit.warnings.push_back(fmt::format(
+      "gap_viscosity_Pa_s is {:.0f} times that of air: on a dry floor some other loss, which the "
+      "model lacks, looks like a gap layer",
+      times));
+}
+
+void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
+                      data::Fit& fit) {
+  const Criteria score = criteria(problem, u, error.surprise);
+  fit.chi2 = score.chi2;
+  fit.dof = score.rows - static_cast<int>(problem.free.size());
+  fit.aicc = score.aicc;
+  fit.bic = score.bic;
+  const bool positions = problem.arcs[0].observables[0] == model::Observable::x_m;
+  fit.noise_scale = problem.noise_scale[positions ? 0 : 3];
+  fit.whiteness_p = error.whiteness.p_value;
+  fit.correlation_time_s = error.whiteness.correlation_time_s;
+  fit.rank = error.rank;
+  fit.condition = error.condition;
+  fit.null_vectors = error.null_vectors;
+}
+
+}  // namespace
+
+void describe_arcs(const Problem& problem, data::Fit& fit) {
+  for (const ArcData& arc : problem.arcs)
+    fit.arcs.push_back(
+        {arc.track, arc.object, arc.t_s.front(), arc.t_s.back(), static_cast<int>(arc.t_s.size())});
+  fit.time_origin_s = problem.arcs.front().start_s;
+}
+
+void describe(const Problem& problem, const Solution& solution, const Uncertainty& error,
+              const data::Scene& scene, data::Fit& fit) {
+  describe_quality(problem, solution.u, error, fit);
+  report_parameters(problem, error, fit);
+  describe_arcs(problem, fit);
+  warn(problem, error, fit);
+  tell_whether_one_friction(problem, fit);
+  warn_short_rim(problem, fit);
+  warn_thick_air(fit);
+  add_derived_velocity(problem, solution.u, error.covariance, fit);
+  if (!fit.model.starts_with("top")) return;
+  add_derived_top(problem, solution.u, error.covariance, scene, fit);
+  warn_short_top(problem, fit);
+  admit_steady_precession(problem, solution.u, fit);
+}
+
+}  // namespace trochoid::fitting

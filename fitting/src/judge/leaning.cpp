@@ -1,0 +1,104 @@
+#include "judge/leaning.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "problem/linearise.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+struct Sample {
+  int arc = 0, index = 0;
+  double leverage = 0.0;
+};
+
+int width_of(const Reading& reading) {
+  return reading.channel == Channel::position ? 2 : 1;
+}
+
+// An orthonormal basis of what the parameters can do to the residuals: rows of all arcs, then of
+// the priors.
+Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
+  constexpr double kSeen = 1e-9;  // below that the derivatives are rounding
+  const Eigen::MatrixXd jacobian = linearise(problem, u).jacobian;
+  const Eigen::VectorXd sizes = jacobian.colwise().norm().cwiseMax(1e-300);
+  const Eigen::BDCSVD<Eigen::MatrixXd> svd(jacobian * sizes.cwiseInverse().asDiagonal(),
+                                           Eigen::ComputeThinU);
+  const auto seen = (svd.singularValues().array() > kSeen * svd.singularValues()[0]).count();
+  return svd.matrixU().leftCols(seen);
+}
+
+// The share a sample with these readings has in the direction of the parameters it says most of: 1
+// where it alone does.
+double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows) {
+  Eigen::MatrixXd own(0, rows.cols());
+  for (const Reading* reading : readings) {
+    const int width = width_of(*reading);
+    own.conservativeResize(own.rows() + width, Eigen::NoChange);
+    own.bottomRows(width) = rows.middleRows(reading->row, width);
+  }
+  if (own.rows() == 0) return 0.0;
+  const double largest = Eigen::JacobiSVD<Eigen::MatrixXd>(own).singularValues()[0];
+  return largest * largest;
+}
+
+std::vector<Sample> carrying_most(const Problem& problem, const Eigen::VectorXd& u) {
+  constexpr double kMostOfIt = 0.8;
+  constexpr std::size_t kFew = 3;
+  const Eigen::MatrixXd basis = reachable(problem, u);
+  std::vector<Sample> samples;
+  int row = 0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const ArcData& data = problem.arcs[arc];
+    const Eigen::MatrixXd rows = basis.middleRows(row, data.rows);
+    row += data.rows;
+    std::vector<std::vector<const Reading*>> of_sample(data.t_s.size());
+    for (const Reading& reading : data.readings) of_sample[reading.sample].push_back(&reading);
+    for (int i = 0; i < static_cast<int>(data.t_s.size()); ++i)
+      if (const double share = leverage_of(of_sample[i], rows); share > kMostOfIt)
+        samples.push_back({arc, i, share});
+  }
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const Sample& a, const Sample& b) { return a.leverage > b.leverage; });
+  samples.resize(std::min(samples.size(), kFew));
+  return samples;
+}
+
+// The same problem, to which a sample says nothing.
+Problem deaf_to(Problem problem, const Sample& sample) {
+  const ArcData& data = problem.arcs[sample.arc];
+  Eigen::VectorXd& weights = problem.row_weights[sample.arc];
+  if (weights.size() == 0) weights = Eigen::VectorXd::Ones(data.rows);
+  for (const Reading& reading : data.readings)
+    if (reading.sample == sample.index) weights.segment(reading.row, width_of(reading)).setZero();
+  return problem;
+}
+
+}  // namespace
+
+std::vector<Leaning> leanings(const Problem& problem, const Solution& solution,
+                              const Eigen::VectorXd& sigmas) {
+  // A sample with nine tenths of a direction moves it by three error bars when it goes, and that is
+  // in order.
+  constexpr double kFar = 5.0;
+  const SolveOptions down{.iterations = 60, .function_tolerance = 1e-7};
+  std::vector<Leaning> found;
+  for (const Sample& sample : carrying_most(problem, solution.u)) {
+    Problem deaf = deaf_to(problem, sample);
+    // The integration's noise stops a descent along a floor that hardly slopes.
+    constexpr double kFine = 1e-8;
+    deaf.tolerance = std::min(problem.tolerance, kFine);
+    const Solution there = seek(deaf, solution.u, down);
+    if (!there.usable) continue;
+    Leaning leaning{problem.arcs[sample.arc].t_s[sample.index], Eigen::VectorXd(sigmas.size())};
+    for (int i = 0; i < static_cast<int>(sigmas.size()); ++i)
+      leaning.shift[i] = problem.value(i, there.u) - problem.value(i, solution.u);
+    if ((leaning.shift.cwiseAbs() - kFar * sigmas).maxCoeff() > 0.0)
+      found.push_back(std::move(leaning));
+  }
+  return found;
+}
+
+}  // namespace trochoid::fitting

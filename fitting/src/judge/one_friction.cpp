@@ -1,0 +1,93 @@
+#include "judge/one_friction.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <vector>
+
+#include "judge/statistics.hpp"
+#include "observe/observed.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+struct Estimate {
+  double value = 0.0, sigma = 0.0;
+  int arc = 0;
+};
+
+// The friction of one arc alone; sigma 0 where that cannot be told.
+Estimate friction_of(const Problem& problem, int arc, int friction) {
+  Problem alone = single_arc(problem, arc);
+  std::erase_if(alone.free, [&](const FreeParameter& parameter) {
+    const std::string& name = problem.predictor->parameters()[parameter.index].name;
+    // Common to all arcs, and a few of them cannot tell it from friction.
+    return name == kScale || name == kTimeFactor || name == "contact_radius_m";
+  });
+  int place = -1;
+  for (int i = 0; i < static_cast<int>(alone.free.size()); ++i)
+    if (alone.free[i].index == friction) place = i;
+  if (place < 0 || alone.rows() <= static_cast<int>(alone.free.size())) return {};
+  const Solution solution = solve(alone, alone.start());
+  if (!solution.usable || !solution.converged) return {};
+  try {
+    const Uncertainty error = uncertainty(alone, solution.u);
+    const double sigma = std::sqrt(error.covariance(place, place));
+    const double value = alone.value(place, solution.u);
+    if (!std::isfinite(sigma) || sigma > value) return {};
+    return {value, sigma, arc};
+  } catch (const NumericalError&) {
+    return {};
+  }
+}
+
+// The arcs' frictions differ by more than their errors: the common one is their mean, no better
+// known than they agree.
+void widen(double times, data::Fit& fit) {
+  for (data::FitParameter& parameter : fit.parameters) {
+    if (parameter.name != "friction") continue;
+    parameter.sigma *= times;
+    parameter.note += fmt::format("; widened {:.2g} times: the arcs differ", times);
+  }
+  for (Eigen::Index i = 0; i < fit.covariance.rows(); ++i) {
+    if (fit.covariance_names[static_cast<std::size_t>(i)] != "friction") continue;
+    fit.covariance.row(i) *= times;
+    fit.covariance.col(i) *= times;
+  }
+}
+
+}  // namespace
+
+void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
+  const int friction = problem.predictor->index_of("friction");
+  const int arcs = static_cast<int>(problem.arcs.size());
+  if (problem.predictor->model_name() != "puck" || friction < 0 || arcs < 2) return;
+  std::vector<Estimate> estimates;
+  for (int arc = 0; arc < arcs; ++arc)
+    if (const Estimate one = friction_of(problem, arc, friction); one.sigma > 0.0)
+      estimates.push_back(one);
+  if (estimates.size() < 2) return;
+  double weights = 0.0, sum = 0.0, chi2 = 0.0;
+  std::string list;
+  for (const Estimate& one : estimates) {
+    weights += 1.0 / (one.sigma * one.sigma);
+    sum += one.value / (one.sigma * one.sigma);
+    const ArcData& arc = problem.arcs[static_cast<std::size_t>(one.arc)];
+    list +=
+        fmt::format("{}{:.3g} +- {:.2g} (object {}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
+                    one.value, one.sigma, arc.object, arc.t_s.front(), arc.t_s.back());
+  }
+  for (const Estimate& one : estimates)
+    chi2 += std::pow((one.value - sum / weights) / one.sigma, 2);
+  const double dof = static_cast<double>(estimates.size()) - 1.0;
+  const double p = chi2_upper_tail(chi2, dof);
+  constexpr double kDoubtful = 0.01;
+  if (p <= kDoubtful) widen(std::sqrt(chi2 / dof), fit);
+  fit.warnings.push_back(fmt::format(
+      "one friction coefficient {} the {} arcs (chi-square {:.3g} for {:.0f}, p = {:.2g}); alone: "
+      "{}",
+      p > kDoubtful ? "explains" : "does not explain", estimates.size(), chi2, dof, p, list));
+}
+
+}  // namespace trochoid::fitting

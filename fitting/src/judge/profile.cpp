@@ -1,0 +1,219 @@
+#include "judge/profile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "trochoid/fitting/parallel.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+constexpr double kQuantile95 = 3.841458820694124;  // chi-square, one degree of freedom
+constexpr int kMostPoints = 40;
+
+// One side of a profile: offsets of u from the solution, away from it, and the rise there.
+struct Side {
+  std::vector<double> offsets, rises;
+  bool bounded = false;
+  double bound = 0.0;  // offset where the rise is the quantile
+};
+
+class OneParameter {
+ public:
+  OneParameter(const Problem& problem, const Solution& solution, int index)
+      : problem_(problem), solution_(solution), index_(index), held_(problem) {
+    held_.free.erase(held_.free.begin() + index);
+    others_.resize(solution.u.size() - 1);
+    for (Eigen::Index i = 0, j = 0; i < solution.u.size(); ++i)
+      if (i != index) others_[j++] = solution.u[i];
+  }
+
+  // Rise of chi-square with the parameter at u + offset; starts where the last call ended.
+  // Infinite where the model has no prediction.
+  double rise(double offset, const SolveOptions& options = {}) {
+    const FreeParameter& parameter = problem_.free[index_];
+    const double u = solution_.u[index_] + offset;
+    for (std::size_t arc = 0; arc < held_.base.size(); ++arc)
+      if (parameter.arc < 0 || parameter.arc == static_cast<int>(arc))
+        held_.base[arc][parameter.index] = parameter.transform.value(u);
+    const Solution best = seek(held_, others_, options);
+    if (!best.usable) return std::numeric_limits<double>::infinity();
+    others_ = best.u;
+    return best.chi2 + outside(u) - solution_.chi2;
+  }
+
+ private:
+  // What the held parameter's own prior adds.
+  [[nodiscard]] double outside(double u) const {
+    const FreeParameter& parameter = problem_.free[index_];
+    if (!parameter.prior) return 0.0;
+    const double off =
+        (parameter.transform.value(u) - parameter.prior->value) / parameter.prior->sigma;
+    return off * off;
+  }
+
+  const Problem& problem_;
+  const Solution& solution_;
+  int index_;
+  Problem held_;
+  Eigen::VectorXd others_;
+};
+
+// Between an offset below the threshold and one above: secant steps on the root of the rise, which
+// is nearly a straight line.
+void close_in(OneParameter& parameter, double threshold, Side& side) {
+  const std::size_t n = side.offsets.size();
+  double inner = n > 1 ? side.offsets[n - 2] : 0.0, outer = side.offsets[n - 1];
+  double inner_root = n > 1 ? std::sqrt(std::max(side.rises[n - 2], 0.0)) : 0.0;
+  double outer_root = std::sqrt(side.rises[n - 1]);
+  const double wanted = std::sqrt(threshold);
+  for (int i = 0; i < 4; ++i) {
+    const double share = (wanted - inner_root) / std::max(outer_root - inner_root, 1e-300);
+    side.bound = inner + std::clamp(share, 0.02, 0.98) * (outer - inner);
+    const double rise = parameter.rise(side.bound);
+    if (!std::isfinite(rise)) break;
+    side.offsets.push_back(side.bound);
+    side.rises.push_back(rise);
+    const double root = std::sqrt(std::max(rise, 0.0));
+    if (std::abs(root - wanted) < 0.02 * wanted) break;
+    (root < wanted ? inner : outer) = side.bound;
+    (root < wanted ? inner_root : outer_root) = root;
+  }
+  side.bounded = true;
+}
+
+Side walk(const Problem& problem, const Solution& solution, int index, double first_step,
+          double farthest, double threshold) {
+  OneParameter parameter(problem, solution, index);
+  Side side;
+  double offset = 0.0, step = first_step;
+  for (int point = 0; point < kMostPoints && std::abs(offset) < farthest; ++point) {
+    const double rise = parameter.rise(offset + step);
+    if (!std::isfinite(rise)) {  // perhaps only too long a step
+      step *= 0.25;
+      if (std::abs(step) < 1e-3 * std::abs(first_step)) break;
+      continue;
+    }
+    offset += step;
+    side.offsets.push_back(offset);
+    side.rises.push_back(rise);
+    if (rise > threshold) {
+      close_in(parameter, threshold, side);
+      break;
+    }
+    if (rise < 0.5 * threshold) step *= 1.6;
+  }
+  return side;
+}
+
+// Not where and how the body happened to be: angles and positions at the start. Its spin counts.
+bool tells_of_the_body(const Problem& problem, int index) {
+  const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[index].index];
+  return info.role != model::ParameterInfo::Role::initial ||
+         (info.unit != "rad" && info.unit != "m");
+}
+
+// Where the profile reaches the 95 % bound to one side [units of the value]; no farther than
+// looked.
+double bound_to_side(const Problem& problem, const Solution& solution, int index, double first_step,
+                     double inflation) {
+  constexpr double kFarther = 1.6;
+  constexpr int kMostSteps = 7;
+  constexpr SolveOptions kRoughly{.iterations = 8, .function_tolerance = 1e-5};
+  const double wanted = std::sqrt(kQuantile95 * inflation);
+  OneParameter parameter(problem, solution, index);
+  double offset = 0.0, root = 0.0, next = first_step;
+  for (int step = 0; step < kMostSteps; ++step, next *= kFarther) {
+    const double rise = parameter.rise(next, kRoughly);
+    if (!std::isfinite(rise)) break;
+    const double next_root = std::sqrt(std::max(rise, 0.0));
+    if (next_root >= wanted) {
+      offset += (wanted - root) / (next_root - root) * (next - offset);
+      break;
+    }
+    offset = next, root = next_root;
+  }
+  const Transform& transform = problem.free[index].transform;
+  const double u = solution.u[index];
+  return std::abs(transform.value(u + offset) - transform.value(u));
+}
+
+data::Profile assemble(const Problem& problem, const Solution& solution, int index,
+                       const Side& below, const Side& above, double inflation) {
+  const Transform& transform = problem.free[index].transform;
+  std::vector<std::pair<double, double>> points{{transform.value(solution.u[index]), 0.0}};
+  for (const Side* side : {&below, &above})
+    for (std::size_t i = 0; i < side->offsets.size(); ++i)
+      points.emplace_back(transform.value(solution.u[index] + side->offsets[i]),
+                          side->rises[i] / inflation);
+  std::sort(points.begin(), points.end());
+  data::Profile profile;
+  profile.parameter = problem.name(index);
+  for (const auto& [value, rise] : points) {
+    profile.values.push_back(value);
+    profile.delta_chi2.push_back(rise);
+  }
+  const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[index].index];
+  profile.lower_95 = below.bounded ? transform.value(solution.u[index] + below.bound) : info.lower;
+  profile.upper_95 = above.bounded ? transform.value(solution.u[index] + above.bound) : info.upper;
+  if (profile.lower_95 > profile.upper_95) std::swap(profile.lower_95, profile.upper_95);
+  const int bounds = below.bounded + above.bounded;
+  profile.verdict = bounds == 2 ? "bounded" : bounds == 1 ? "one-sided" : "flat";
+  return profile;
+}
+
+}  // namespace
+
+std::vector<data::Profile> profiles(const Problem& problem, const Solution& solution,
+                                    const Uncertainty& error, int threads) {
+  std::vector<int> chosen;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (tells_of_the_body(problem, i)) chosen.push_back(i);
+  constexpr double kFourDecades = 9.210340371976184;
+  std::vector<Side> sides(2 * chosen.size());
+  in_parallel(static_cast<int>(sides.size()), threads, [&](int i) {
+    const int index = chosen[static_cast<std::size_t>(i / 2)];
+    const Transform& transform = problem.free[index].transform;
+    const double slope = std::abs(transform.slope(solution.u[index]));
+    const bool logarithmic = transform.kind == Transform::Kind::log;
+    double sd = std::sqrt(error.covariance(index, index)) / std::max(slope, 1e-300);
+    // An unidentifiable parameter has no scale of its own: a tenth of its size.
+    const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(solution.u[index]), 1e-3);
+    if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
+    const double farthest = logarithmic ? kFourDecades : 100.0 * sd;
+    const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd;
+    sides[static_cast<std::size_t>(i)] =
+        walk(problem, solution, index, step, farthest, kQuantile95 * error.chi2_inflation[index]);
+  });
+  std::vector<data::Profile> result;
+  for (std::size_t c = 0; c < chosen.size(); ++c)
+    result.push_back(assemble(problem, solution, chosen[c], sides[2 * c], sides[2 * c + 1],
+                              error.chi2_inflation[chosen[c]]));
+  return result;
+}
+
+std::optional<FarSide> far_side_of_friction(const Problem& problem, const Solution& solution,
+                                            const Uncertainty& error, int threads) {
+  const int friction = problem.predictor->index_of("friction");
+  const bool slides_on_rim = friction >= 0 && problem.predictor->index_of("w1_rad_s") >= 0;
+  const auto& seen = error.identifiable;
+  if (!slides_on_rim || std::all_of(seen.begin(), seen.end(), [](bool one) { return one; }))
+    return std::nullopt;
+  const auto free = std::find_if(problem.free.begin(), problem.free.end(),
+                                 [&](const FreeParameter& one) { return one.index == friction; });
+  const auto index = static_cast<int>(free - problem.free.begin());
+  if (free == problem.free.end() || !seen[index]) return std::nullopt;
+  const double quantile = std::sqrt(kQuantile95), sigma = std::sqrt(error.covariance(index, index));
+  const double step = quantile * sigma / std::abs(free->transform.slope(solution.u[index]));
+  std::array<double, 2> bounds{};
+  in_parallel(2, threads, [&](int side) {
+    bounds[static_cast<std::size_t>(side)] = bound_to_side(
+        problem, solution, index, side == 0 ? -step : step, error.chi2_inflation[index]);
+  });
+  const FarSide far{index, std::max(bounds[0], bounds[1]) / quantile};
+  return far.sigma > sigma ? std::optional(far) : std::nullopt;
+}
+
+}  // namespace trochoid::fitting

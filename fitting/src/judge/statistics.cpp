@@ -1,0 +1,287 @@
+#include "judge/statistics.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "observe/smoothing.hpp"
+#include "problem/linearise.hpp"
+#include "problem/valley.hpp"
+
+namespace trochoid::fitting {
+
+double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u) {
+  const FreeParameter& parameter = problem.free[index];
+  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+  const double value = std::abs(problem.value(index, u));
+  const ArcData& arc = problem.arcs[std::max(0, parameter.arc)];
+  const double duration = std::max(arc.duration_s(), 1e-9);
+  if (info.unit == "rad") return 1.0;
+  // A loss that came out as nothing is known if its error is small against the given value's.
+  if (info.logarithmic) return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
+  if (info.unit == "s")  // a clock's error is known if it is known to a frame
+    return duration / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
+  if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);
+  double extent = 1.0;
+  if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1) {
+    const Eigen::MatrixX2d xy = arc.positions_m();
+    extent = std::max((xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff(), 1e-9);
+  }
+  if (info.unit == "m") return std::max(value, extent);
+  if (info.unit == "m/s") return std::max(value, extent / duration);
+  return value > 0.0 ? value : 1.0;
+}
+
+namespace {
+
+// What a constant offset of half a sample's sigma in one coordinate of a channel does to the
+// residuals of all arcs: a tracker whose errors hang together may also be off altogether (light,
+// shadow, camera), and no number of samples averages that away.
+Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Channel channel,
+                              int axis) {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(all.jacobian.rows());
+  std::vector<double> sizes;
+  int first = 0;
+  for (const ArcData& arc : problem.arcs) {
+    for (const Reading& reading : arc.readings) {
+      if (reading.channel != channel || !arc.filmed) continue;
+      const Eigen::Vector2d row = reading.whitener.transpose().col(axis);
+      const int width = channel == Channel::position ? 2 : 1;
+      rows.segment(first + reading.row, width) = row.head(width);
+      sizes.push_back(row.head(width).norm());
+    }
+    first += arc.rows;
+  }
+  const double typical = median(std::move(sizes));
+  return typical > 0.0 ? Eigen::VectorXd(0.5 / typical * rows) : rows;
+}
+
+data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
+  data::NullVector vector;
+  std::string list;
+  for (Eigen::Index i = 0; i < direction.size(); ++i) {
+    const std::string name = problem.name(static_cast<int>(i));
+    vector.components[name] = direction[i];
+    if (std::abs(direction[i]) < 0.25) continue;
+    list += fmt::format("{}{} ({:+.2f})", list.empty() ? "" : ", ", name, direction[i]);
+  }
+  vector.words = std::isfinite(sd)
+                     ? fmt::format(
+                           "the data hardly see the direction {}: moved together they are "
+                           "uncertain by {:.3g} of their size",
+                           list, sd)
+                     : fmt::format("the data do not see the direction {}", list);
+  return vector;
+}
+
+}  // namespace
+
+namespace {
+
+// What was known beforehand stays known, however the data's share was widened.
+void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    if (!problem.free[i].prior) continue;
+    const double known = problem.free[i].prior->sigma * problem.free[i].prior->sigma;
+    if (!(covariance(i, i) > known)) continue;
+    const Eigen::VectorXd column = covariance.col(i);
+    covariance -= (covariance(i, i) - known) / (covariance(i, i) * covariance(i, i)) * column *
+                  column.transpose();
+  }
+}
+
+// The directions of parameter space in natural sizes, and how sharply the data see each.
+struct Directions {
+  Eigen::MatrixXd axes;     // one per column
+  Eigen::VectorXd inverse;  // standard deviation of independent residuals along each; 0: unseen
+  Eigen::MatrixXd blind;    // covariance of the unseen ones
+  Eigen::MatrixXd bread;    // covariance of the seen ones
+};
+
+Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
+                         Uncertainty& result) {
+  const Eigen::Index count = scaled.cols();
+  Eigen::MatrixXd triangle = scaled;
+  if (scaled.rows() > count)
+    triangle = Eigen::HouseholderQR<Eigen::MatrixXd>(scaled)
+                   .matrixQR()
+                   .topRows(count)
+                   .triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
+  Eigen::VectorXd singular = Eigen::VectorXd::Zero(count);
+  singular.head(svd.singularValues().size()) = svd.singularValues();
+  const double largest = std::max(singular.maxCoeff(), 1e-300);
+  // 1e-9: below that the derivatives themselves (integrated at ~1e-8) are rounding.
+  const double floor = 1e-9 * largest;
+  // Standard deviation of what the data do not see at all, in natural sizes: no derivative says how
+  // large, and with small residuals 1 / floor would read as a sharp measurement.
+  const double unseen = std::max(1.0 / floor, 1e3);
+  Directions seen{
+      svd.matrixV(), Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count), {}};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::VectorXd direction = seen.axes.col(i);
+    const bool sees = singular[i] > floor;
+    if (sees)
+      seen.inverse[i] = 1.0 / singular[i];
+    else
+      seen.blind += unseen * unseen * direction * direction.transpose();
+    if (sees && singular[i] > 1.0)
+      ++result.rank;
+    else
+      result.null_vectors.push_back(
+          null_vector(problem, direction, sees ? seen.inverse[i] : INFINITY));
+  }
+  result.condition = largest / std::max(singular.minCoeff(), 1e-300);
+  seen.bread = seen.axes * seen.inverse.cwiseAbs2().asDiagonal() * seen.axes.transpose();
+  return seen;
+}
+
+// The noise is known from its few residuals only: 97.5 % quantile of Student's distribution over
+// that of the normal one (Abramowitz and Stegun 26.7.5), so that two sigmas hold what they promise.
+double student_factor(double degrees_of_freedom) {
+  constexpr double z = 1.959963984540054;
+  const double n = std::max(degrees_of_freedom, 5.0);  // fewer say nothing of the noise at all
+  const double first = (z * z * z + z) / 4.0;
+  const double second = (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / 96.0;
+  return 1.0 + (first + second / n) / (n * z);
+}
+
+// Noise of all channels, and the offsets that may be common to a whole record.
+struct Noise {
+  std::vector<ChannelNoise> channels;
+  std::vector<Eigen::VectorXd> offsets;
+};
+
+Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::MatrixXd& scaled,
+               const Directions& seen, Uncertainty& result) {
+  Noise found;
+  const Eigen::MatrixXd unit_steps = seen.axes * seen.inverse.asDiagonal();
+  result.whiteness = {};
+  result.drift = {};
+  result.surprise = 0.0;
+  for (int c = 0; c < kChannels; ++c) {
+    const auto channel = static_cast<Channel>(c);
+    const auto rows = static_cast<double>(
+        std::count(all.channel.begin(), all.channel.begin() + problem.rows(), channel));
+    if (rows == 0.0) continue;
+    found.channels.push_back(channel_noise(problem, all, channel, scaled, unit_steps));
+    const Whiteness& one = found.channels.back().whiteness;
+    result.surprise += found.channels.back().surprise +
+                       2.0 * rows * std::log(problem.noise_scale[c]) +
+                       cost_of_standing_out(problem, channel);
+    if (one.inflation > 1.0)
+      for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
+        found.offsets.push_back(common_offset(problem, all, channel, axis));
+    if (found.channels.back().drift.gain > result.drift.gain)
+      result.drift = found.channels.back().drift;
+    result.whiteness.p_value = std::min(result.whiteness.p_value, one.p_value);
+    if (one.inflation > result.whiteness.inflation) {
+      result.whiteness.inflation = one.inflation;
+      result.whiteness.correlation_time_s = one.correlation_time_s;
+    }
+  }
+  return found;
+}
+
+// The sandwich covariance of noise that may hang together.
+Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const Noise& noise,
+                         const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread) {
+  const auto rows = static_cast<double>(problem.rows());
+  const double few = student_factor(rows - static_cast<double>(problem.free.size()));
+  Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(scaled.cols(), scaled.cols());
+  for (const ChannelNoise& one : noise.channels)
+    filling += few * few * seen_through(problem, all, one, scaled);
+  const auto priors = scaled.bottomRows(scaled.rows() - problem.rows());
+  filling += priors.transpose() * priors;
+  Eigen::MatrixXd covariance = bread * filling * bread;
+  for (const Eigen::VectorXd& offset : noise.offsets) {
+    const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
+    covariance += shift * shift.transpose();
+  }
+  return covariance;
+}
+
+// Median over the parameters of how many times wider the error bars are than those of independent
+// residuals.
+double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& plain) {
+  std::vector<double> ratios;
+  for (Eigen::Index i = 0; i < plain.size(); ++i)
+    if (plain[i] > 0.0) ratios.push_back(std::sqrt(variance[i] / plain[i]));
+  return std::max(1.0, median(std::move(ratios)));
+}
+
+}  // namespace
+
+Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
+  const Linearised all = linearise(problem, u);
+  const int count = static_cast<int>(problem.free.size());
+  Uncertainty result;
+  Eigen::VectorXd size(count);
+  for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  const Directions seen = directions_of(problem, scaled, result);
+  const Noise noise = noise_of(problem, all, scaled, seen, result);
+  Eigen::MatrixXd covariance = sandwich(problem, all, noise, scaled, seen.bread);
+  result.chi2_inflation.resize(count);
+  for (int i = 0; i < count; ++i)
+    result.chi2_inflation[i] =
+        seen.bread(i, i) > 0.0 ? std::max(1.0, covariance(i, i) / seen.bread(i, i)) : 1.0;
+  const Eigen::VectorXd sd =
+      (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd to_sizes = seen.axes * seen.inverse.asDiagonal();
+  const Valley valley{problem,     u, all, scaled * seen.axes, size.asDiagonal() * seen.axes,
+                      seen.inverse};
+  covariance += to_sizes * valley.bends(sd) * to_sizes.transpose();
+  covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
+  result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
+  heed_priors(problem, result.covariance);
+  const Eigen::VectorXd plain = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
+  result.widened = typical_widening(result.covariance.diagonal(), plain);
+  result.identifiable.resize(count);
+  for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
+  return result;
+}
+
+double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u) {
+  Problem finer = problem, coarser = problem;
+  finer.tolerance = std::max(problem.tolerance * 1e-2, 1e-13);
+  coarser.tolerance = problem.tolerance * 1e2;
+  double worst = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd here, other;
+    // Where a finer run exceeds the step limit, a coarser one says more than there is.
+    if (!evaluate(problem, arc, u, here, nullptr) ||
+        (!evaluate(finer, arc, u, other, nullptr) && !evaluate(coarser, arc, u, other, nullptr)))
+      return std::numeric_limits<double>::infinity();
+    worst = std::max(worst, (here - other).cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise) {
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  Criteria result;
+  for (int arc = 0; arc < static_cast<int>(plain.arcs.size()); ++arc) {
+    Eigen::VectorXd r;
+    if (!evaluate(plain, arc, u, r, nullptr)) {
+      result.chi2 = std::numeric_limits<double>::infinity();
+      return result;
+    }
+    result.chi2 += r.squaredNorm();
+    result.rows += static_cast<int>(r.size());
+  }
+  const double n = result.rows;
+  const double k = static_cast<double>(problem.free.size()) + 1.0;
+  result.bic = surprise + k * std::log(n);
+  // Akaike's correction has no meaning for fewer rows than that.
+  result.aicc = surprise + 2.0 * k + 2.0 * k * (k + 1.0) / std::max(1.0, n - k - 1.0);
+  return result;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,56 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "judge/whiteness.hpp"
+#include "problem/problem.hpp"
+#include "trochoid/data/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// What the data say about the free parameters at a solution.
+struct Uncertainty {
+  Eigen::MatrixXd covariance;  ///< of the values (not of u), order of Problem::free
+  /// How many times too fast chi-square, which takes residuals for independent, rises along each
+  /// parameter; at least 1.
+  Eigen::VectorXd chi2_inflation;
+  std::vector<bool> identifiable;
+  int rank = 0;  ///< directions known to better than 100 % (1 rad for angles)
+  double condition = 0.0;
+  std::vector<data::NullVector> null_vectors;
+  Whiteness whiteness;  ///< of the worst channel
+  Drift drift;          ///< likewise
+  /// Times the error bars are wider than those of independent residuals, typically.
+  double widened = 1.0;
+  /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
+  /// their correlation allowed for, without its constant.
+  double surprise = 0.0;
+  std::vector<std::string> remarks;
+};
+
+/// The size at which a parameter of a free index counts as "known to 100 %" [its unit].
+[[nodiscard]] double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u);
+
+/// Singular values of the Jacobian scaled by each parameter's natural size decide the rank. The
+/// covariance is the sandwich of least squares in noise that hangs together: each parameter is
+/// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the
+/// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few. A
+/// constant offset of half a sample's sigma is allowed for in every filmed channel whose residuals
+/// hang together. Where the valley of chi-square bends within a standard deviation, the second
+/// moment of the bend is added.
+[[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
+
+/// Largest change of a whitened residual when the integrator works a hundred times finer; where
+/// that exceeds the step limit, a hundred times coarser.
+[[nodiscard]] double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u);
+
+struct Criteria {
+  double chi2 = 0.0;  ///< with the track's own sigmas, robust weights
+  int rows = 0;
+  double aicc = 0.0, bic = 0.0;
+};
+/// AICc and BIC from Uncertainty::surprise: what residuals that hang together may owe to the
+/// tracker does not count as evidence between models.
+[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise);
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,23 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "problem/problem.hpp"
+
+namespace trochoid::fitting {
+
+/// Residuals of all arcs and their derivatives by the values (not by u); priors are further rows.
+struct Linearised {
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd residuals;
+  std::vector<Channel> channel;  ///< of each row; priors are counted to no channel
+  std::vector<int> arc;          ///< -1 for priors
+};
+/// @throws NumericalError where the model has no prediction.
+[[nodiscard]] Linearised linearise(const Problem& problem, const Eigen::VectorXd& u);
+
+/// Residuals of all arcs, without priors; false where the model has no prediction.
+[[nodiscard]] bool all_residuals(const Problem& problem, const Eigen::VectorXd& u,
+                                 Eigen::VectorXd& residuals);
+
+}  // namespace trochoid::fitting

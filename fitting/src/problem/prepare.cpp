@@ -1,0 +1,224 @@
+#include "problem/prepare.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "observe/arcs.hpp"
+#include "observe/segments.hpp"
+#include "observe/smoothing.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+ChannelChoice channels_of(const std::string& model) {
+  if (model == "pivot") return {.position = false, .psi = true};
+  if (model == "puck") return {.position = true, .psi = true};
+  return {.position = true, .theta = true, .phi = true, .psi = true};
+}
+
+// A puck's track falls apart at impacts and rest; a disc on a pivot has to be let go first; other
+// bodies are followed throughout.
+std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& model,
+                                   const FitOptions& options) {
+  const SampleRange chosen = chosen_range(track, options.from, options.to);
+  const SampleRange kept{chosen.first,
+                         kept_samples(chosen.first, chosen.second, options.hold_back)};
+  if (model == "puck") return sliding_ranges(track, kept);
+  if (model == "pivot" && options.from.empty()) return {{released_at(track, kept), kept.second}};
+  return {kept};
+}
+
+std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
+                             const data::Scene& scene, const FitOptions& options) {
+  const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
+                      scene.body->faces_look_alike() && model != "top";
+  std::vector<ArcData> arcs;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    data::check(tracks[i], fmt::format("track {}", i + 1));
+    for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
+      ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
+      arc.track = static_cast<int>(i);
+      arc.held =
+          model == "pivot" && first > chosen_range(tracks[i], options.from, options.to).first;
+      if (arc.readings.empty())
+        throw TrackError(fmt::format("track {}: no sample has {}", i + 1,
+                                     model == "pivot"
+                                         ? "a spin angle psi_rad, which the pivot model is fitted "
+                                           "to; name the mark under [body] and track again"
+                                         : "positions in metres; track with a scale or a camera "
+                                           "file"));
+      arcs.push_back(std::move(arc));
+    }
+  }
+  if (arcs.empty())
+    throw TrackError(
+        "no track has a stretch in which the puck slides freely, slowing down; are the positions "
+        "in metres, and does it move?");
+  return arcs;
+}
+
+// 0.02 sigma of a typical sample over the size of the path, within what the integrators do well.
+double tolerance_for(const std::vector<ArcData>& arcs, double share) {
+  double least = 1e-5;
+  for (const ArcData& arc : arcs) {
+    if (arc.observable_index(model::Observable::x_m) < 0) continue;
+    const Eigen::MatrixX2d xy = arc.positions_m();
+    const double extent = (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    std::vector<double> weights;
+    for (const Reading& reading : arc.readings)
+      if (reading.channel == Channel::position) weights.push_back(reading.whitener.norm());
+    const double sigma = 1.0 / std::max(median(std::move(weights)), 1e-300);
+    if (extent > 0.0) least = std::min(least, share * sigma / extent);
+  }
+  return std::clamp(least, 1e-11, 1e-5);
+}
+
+// The path is the same for either sense of a spin: at none it does not tell which way to go.
+void start_turning(const data::Prior& prior, double& spin_rad_s) {
+  constexpr double kShare = 0.25;  // of the prior's standard deviation
+  if (spin_rad_s != 0.0) return;
+  spin_rad_s = prior.value != 0.0 ? prior.value : kShare * prior.sigma;
+}
+
+// Turns parameters on that only some measurements show, and off those nothing shows: the spin angle
+// without a mark, and a puck's spin, which the path alone hardly carries, unless a prior does.
+void suit_to_data(Problem& problem, const data::Scene& scene) {
+  const bool puck = problem.predictor->model_name() == "puck";
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const bool seen = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
+    for (const char* name : {"psi_rad", "omega_s_rad_s", "w3_rad_s"}) {
+      if (name == std::string("w3_rad_s") && !puck) continue;
+      const int index = problem.predictor->index_of(name);
+      if (index < 0 || scene.fit.fixed.contains(name)) continue;
+      const auto same = [&](const FreeParameter& p) { return p.index == index && p.arc == arc; };
+      const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
+      const auto prior = scene.fit.prior.find(name);
+      const bool told = puck && prior != scene.fit.prior.end();
+      if (told && !is_free)
+        problem.free.push_back({index, arc, {}, prior->second, {}, prior->second.value});
+      if (told && !seen && name == std::string("w3_rad_s"))
+        start_turning(prior->second, problem.base[arc][index]);
+      if (seen && !told && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
+      if (!seen && !told && is_free) std::erase_if(problem.free, same);
+    }
+  }
+  // A face that is crowned rests further in than its rim; path and spin together tell.
+  const int contact = problem.predictor->index_of("contact_radius_m");
+  const bool spin_seen = std::any_of(problem.arcs.begin(), problem.arcs.end(), [](const auto& arc) {
+    return arc.observable_index(model::Observable::psi_rad) >= 0;
+  });
+  const bool listed = std::any_of(problem.free.begin(), problem.free.end(),
+                                  [&](const auto& p) { return p.index == contact; });
+  if (puck && contact >= 0 && spin_seen && !listed && scene.fit.free.empty() &&
+      !scene.fit.fixed.contains("contact_radius_m")) {
+    // Where they do not, it lies somewhere within the face: at its bounds it would bend the spin.
+    constexpr double kAnywhere = 0.5;
+    const double radius_m = problem.predictor->parameters()[contact].value;
+    const auto given = scene.fit.prior.find("contact_radius_m");
+    const data::Prior prior = given != scene.fit.prior.end()
+                                  ? given->second
+                                  : data::Prior{radius_m, kAnywhere * radius_m};
+    problem.free.push_back(
+        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, prior, {}, radius_m});
+  }
+  std::stable_sort(problem.free.begin(), problem.free.end(),
+                   [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
+}
+
+// Rates of decay start where they show in the record and let the body go on through it, whatever
+// the scene's first value: a start decades away ends before the track does or moves nothing.
+void start_decay_within_sight(Problem& problem) {
+  constexpr double kLeast = 0.01, kTypical = 0.3, kMost = 3.0;  // decay over the whole record
+  double longest_s = 0.0;
+  for (const ArcData& arc : problem.arcs) longest_s = std::max(longest_s, arc.duration_s());
+  if (!(longest_s > 0.0)) return;
+  for (FreeParameter& parameter : problem.free) {
+    const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+    if (info.unit != "1/s" || !is_loss(problem, parameter)) continue;
+    const double decay = parameter.given * longest_s;
+    if (decay > kLeast && decay < kMost) continue;
+    parameter.given = kTypical / longest_s;
+    for (Eigen::VectorXd& base : problem.base) base[parameter.index] = parameter.given;
+  }
+}
+
+// Values by name: for all arcs or, with "@i", for arc i.
+void take_start(const std::map<std::string, double>& start, Problem& problem) {
+  const auto& parameters = problem.predictor->parameters();
+  for (std::size_t arc = 0; arc < problem.base.size(); ++arc)
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      auto given = start.find(fmt::format("{}@{}", parameters[i].name, arc));
+      if (given == start.end()) given = start.find(parameters[i].name);
+      if (given != start.end()) problem.base[arc][static_cast<Eigen::Index>(i)] = given->second;
+    }
+}
+
+bool says_something_of(const data::FitSettings& fit, const std::string& name) {
+  return fit.fixed.contains(name) || fit.prior.contains(name) || fit.bounds.contains(name) ||
+         std::find(fit.free.begin(), fit.free.end(), name) != fit.free.end();
+}
+
+// Friction that sets in softly lets a body slip a little however it moves: to roll is no state of
+// its own there, and derivatives by the attitude do not hold what the velocity changes by.
+bool sets_in_softly(const data::Scene& scene, const Problem& problem) {
+  const int softness = problem.predictor->index_of(kSlipScale);
+  return scene.model.slip_regularisation_m_s.value_or(0.0) > 0.0 ||
+         std::any_of(problem.free.begin(), problem.free.end(),
+                     [&](const FreeParameter& p) { return p.index == softness; });
+}
+
+// The velocity of a body that is known to roll when its record begins follows from its spin, unless
+// the scene says otherwise.
+void tie_to_spin(const data::Scene& scene, Problem& problem) {
+  const auto is_velocity = [&](int index) {
+    const std::string& name = problem.predictor->parameters()[index].name;
+    return name == "vx_m_s" || name == "vy_m_s";
+  };
+  if (problem.predictor->model_name() != "sliding" || problem.arcs.size() > 1 || !scene.body ||
+      says_something_of(scene.fit, "vx_m_s") || says_something_of(scene.fit, "vy_m_s") ||
+      sets_in_softly(scene, problem))
+    return;
+  problem.rolls_at_first = {scene.body->radius_m, scene.body->half_thickness_m()};
+  std::erase_if(problem.free, [&](const FreeParameter& p) { return is_velocity(p.index); });
+}
+
+}  // namespace
+
+double frame_time_s(std::span<const data::Track> tracks) {
+  std::vector<double> steps_s;
+  for (const data::Track& track : tracks)
+    for (std::size_t i = 1; i < track.samples.size(); ++i)
+      steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
+  return median(std::move(steps_s));
+}
+
+Problem prepare(std::span<const data::Track> tracks, const model::Predictor& predictor,
+                const data::Scene& scene, const FitOptions& options) {
+  const std::string& model = predictor.model_name();
+  Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
+  problem.shortfalls = std::make_shared<Shortfalls>();
+  for (const ArcData& whole : problem.arcs) {
+    const ArcData arc = whole.keep(consistent_samples(whole));
+    for (int c = 0; c < kChannels; ++c)
+      problem.noise_scale[c] =
+          std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
+  }
+  suit_to_data(problem, scene);
+  if (options.rolls_at_first) tie_to_spin(scene, problem);
+  const int needed = static_cast<int>(problem.free.size());
+  if (problem.rows() <= needed)
+    throw TrackError(
+        fmt::format("the track's {} measurements{} cannot determine {} parameters of model '{}'",
+                    problem.rows(), problem.arcs.front().held ? " after the body is let go" : "",
+                    needed, model));
+  start_decay_within_sight(problem);
+  take_start(options.start, problem);
+  problem.tolerance =
+      options.tolerance > 0.0 ? options.tolerance : tolerance_for(problem.arcs, 3e-3);
+  return problem;
+}
+
+}  // namespace trochoid::fitting

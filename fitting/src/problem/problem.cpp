@@ -1,0 +1,481 @@
+#include "problem/problem.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "observe/observed.hpp"
+#include "observe/smoothing.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+
+using model::ParameterInfo;
+
+double Transform::value(double u) const {
+  switch (kind) {
+    case Kind::log:
+      return std::exp(u);
+    case Kind::above:
+      return lower + std::exp(u);
+    case Kind::below:
+      return upper - std::exp(u);
+    case Kind::limited:
+      return upper / (1.0 + std::exp(-u));
+    case Kind::between:
+      return lower + 0.5 * (upper - lower) * (1.0 + std::tanh(u));
+    default:
+      return u;
+  }
+}
+
+double Transform::slope(double u) const {
+  switch (kind) {
+    case Kind::log:
+    case Kind::above:
+      return std::exp(u);
+    case Kind::below:
+      return -std::exp(u);
+    case Kind::limited: {
+      const double share = 1.0 / (1.0 + std::exp(-u));
+      return upper * share * (1.0 - share);
+    }
+    case Kind::between: {
+      const double t = std::tanh(u);
+      return 0.5 * (upper - lower) * (1.0 - t * t);
+    }
+    default:
+      return 1.0;
+  }
+}
+
+double Transform::inverse(double value) const {
+  const double least = 1e-300;
+  switch (kind) {
+    case Kind::log:
+      return std::log(std::max(value, least));
+    // A start on or beyond the bound moves a thousandth of its size inside, else it never leaves.
+    case Kind::above:
+      return std::log(std::max(value - lower, 1e-3 * std::abs(lower) + least));
+    case Kind::below:
+      return std::log(std::max(upper - value, 1e-3 * std::abs(upper) + least));
+    case Kind::limited: {
+      const double share = std::clamp(value / upper, least, 0.999);
+      return std::log(share / (1.0 - share));
+    }
+    case Kind::between: {
+      const double t = 2.0 * (value - lower) / (upper - lower) - 1.0;
+      return std::atanh(std::clamp(t, -0.999, 0.999));
+    }
+    default:
+      return value;
+  }
+}
+
+int Problem::shared_count() const {
+  return static_cast<int>(
+      std::count_if(free.begin(), free.end(), [](const FreeParameter& p) { return p.arc < 0; }));
+}
+
+std::string Problem::name(int free_index) const {
+  const FreeParameter& parameter = free[free_index];
+  const std::string& plain = predictor->parameters()[parameter.index].name;
+  return parameter.arc > 0 ? fmt::format("{}@{}", plain, parameter.arc) : plain;
+}
+
+std::vector<int> Problem::columns_of(int arc) const {
+  std::vector<int> columns;
+  for (int i = 0; i < static_cast<int>(free.size()); ++i)
+    if (free[i].arc < 0 || free[i].arc == arc) columns.push_back(i);
+  return columns;
+}
+
+Eigen::VectorXd Problem::start() const {
+  Eigen::VectorXd u(free.size());
+  for (int i = 0; i < static_cast<int>(free.size()); ++i)
+    u[i] = free[i].transform.inverse(base[std::max(0, free[i].arc)][free[i].index]);
+  return u;
+}
+
+Eigen::Vector2d RollsAtFirst::velocity_m_s(double theta_rad, double phi_rad, double w1_rad_s,
+                                           double w2_rad_s, double w3_rad_s) const {
+  const double s = std::sin(theta_rad), c = std::cos(theta_rad);
+  const double h = std::copysign(half_thickness_m, c), z = radius_m * s + h * c;
+  const Eigen::Vector2d node(h * w2_rad_s - radius_m * w3_rad_s, -z * w1_rad_s);
+  return Eigen::Rotation2Dd(phi_rad) * node;
+}
+
+namespace {
+
+void let_roll(const RollsAtFirst& rim, const model::Predictor& predictor, Eigen::VectorXd& values) {
+  const int vx = predictor.index_of("vx_m_s"), vy = predictor.index_of("vy_m_s");
+  if (vx < 0 || vy < 0) return;
+  const auto value = [&](const char* name) { return values[predictor.index_of(name)]; };
+  const Eigen::Vector2d v =
+      rim.velocity_m_s(value("theta_rad"), value("phi_rad"), value("w1_rad_s"), value("w2_rad_s"),
+                       value("w3_rad_s"));
+  values[vx] = v.x();
+  values[vy] = v.y();
+}
+
+}  // namespace
+
+Eigen::VectorXd Problem::values(int arc, const Eigen::VectorXd& u) const {
+  Eigen::VectorXd values = base[arc];
+  for (const int i : columns_of(arc)) values[free[i].index] = free[i].transform.value(u[i]);
+  if (rolls_at_first) let_roll(*rolls_at_first, *predictor, values);
+  return values;
+}
+
+double Problem::value(int free_index, const Eigen::VectorXd& u) const {
+  return free[free_index].transform.value(u[free_index]);
+}
+
+void Problem::set_base(const Eigen::VectorXd& u) {
+  for (int arc = 0; arc < static_cast<int>(arcs.size()); ++arc) {
+    Eigen::VectorXd sign;
+    base[arc] = values(arc, u);
+    fold_tilt(*predictor, base[arc], sign);
+  }
+}
+
+int Problem::max_steps() const {
+  // Motion that a camera follows turns less than once per sample; a step covers a good part of a
+  // turn. Sliding changes its direction fast wherever it is slow.
+  std::size_t samples = 0;
+  for (const ArcData& arc : arcs) samples = std::max(samples, arc.t_s.size());
+  const bool slides = predictor->model_name() == "sliding";
+  const int steps = (slides ? 20000 : 2000) + 20 * static_cast<int>(samples);
+  // A search may give up what a polish, finer, has to follow to the end.
+  constexpr double kSearching = 1e-8, kPower = 0.25, kMost = 15.0;
+  return static_cast<int>(steps * std::clamp(std::pow(kSearching / tolerance, kPower), 1.0, kMost));
+}
+
+int Problem::rows() const {
+  int rows = 0;
+  for (const ArcData& arc : arcs) rows += arc.rows;
+  return rows;
+}
+
+std::string Shortfalls::words() const {
+  int all = 0;
+  std::size_t commonest = 0;
+  for (std::size_t i = 0; i < by_outcome.size(); ++i) {
+    all += by_outcome[i];
+    if (by_outcome[i] > by_outcome[commonest]) commonest = i;
+  }
+  if (departed > all)
+    return fmt::format(
+        "the model does not move as the track does: of {} starts none explains more than a part of "
+        "it",
+        departed.load());
+  if (all == 0)
+    return "no start could be made from the track: is it too short, or does nothing in it move as "
+           "the model does?";
+  std::string_view ending = model::sentence(static_cast<model::Outcome>(commonest));
+  ending.remove_suffix(ending.ends_with('.') ? 1 : 0);
+  return fmt::format(
+      "no start led to a prediction of the whole track: {} attempts ended before it, {} of them "
+      "so: "
+      "{}; are the body's dimensions, the scale and the frame rate right?",
+      all, by_outcome[commonest].load(), ending);
+}
+
+Problem single_arc(const Problem& problem, int arc) {
+  Problem part = problem;
+  part.arcs = {problem.arcs[arc]};
+  part.base = {problem.base[arc]};
+  part.row_weights = {Eigen::VectorXd()};
+  part.free.clear();
+  for (FreeParameter parameter : problem.free)
+    if (parameter.arc < 0 || parameter.arc == arc) {
+      parameter.arc = std::min(parameter.arc, 0);
+      part.free.push_back(parameter);
+    }
+  return part;
+}
+
+bool is_loss(const Problem& problem, const FreeParameter& parameter) {
+  const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
+  return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
+         info.name != "b_1_s" && info.name != "l_m" && info.name != "friction" &&
+         info.name != kSlipScale;
+}
+
+namespace {
+
+bool listed(const std::vector<std::string>& names, const std::string& name) {
+  // A group such as "air_linear_N_m_s" covers its components "air_linear_N_m_s[1]".
+  return std::any_of(names.begin(), names.end(), [&](const std::string& entry) {
+    return name == entry || (name.starts_with(entry) && name.substr(entry.size()).starts_with("["));
+  });
+}
+
+// What [fit] says of a parameter: by its own name, else by that of its group.
+template <class Value>
+const Value* said_of(const std::string& name, const std::map<std::string, Value>& entries) {
+  auto entry = entries.find(name);
+  if (entry == entries.end()) entry = entries.find(name.substr(0, name.find('[')));
+  return entry == entries.end() ? nullptr : &entry->second;
+}
+
+void check_names(const model::Predictor& predictor, const data::FitSettings& settings) {
+  const auto known = [&](const std::string& name) {
+    return std::any_of(predictor.parameters().begin(), predictor.parameters().end(),
+                       [&](const ParameterInfo& info) { return listed({name}, info.name); });
+  };
+  const auto complain = [&](const std::string& key, const std::string& name) {
+    std::string all;
+    for (const ParameterInfo& info : predictor.parameters())
+      all += (all.empty() ? "" : ", ") + info.name;
+    throw InputError(
+        fmt::format("[fit] {}: model '{}' has no parameter '{}'; it has {}, and those of losses "
+                    "named under [model]",
+                    key, predictor.model_name(), name, all));
+  };
+  for (const std::string& name : settings.free)
+    if (!known(name)) complain("free", name);
+  for (const auto& [name, value] : settings.fixed)
+    if (!known(name)) complain("fixed", name);
+  for (const auto& [name, bounds] : settings.bounds)
+    if (!known(name)) complain("bounds", name);
+}
+
+// A value the model cannot have would be refused at every attempt of the search. Attitudes are
+// folded into their range.
+void check_fixed(const model::Predictor& predictor, const data::FitSettings& settings) {
+  for (const ParameterInfo& info : predictor.parameters()) {
+    const double* value = said_of(info.name, settings.fixed);
+    if (value == nullptr || info.role == ParameterInfo::Role::initial) continue;
+    if (!(*value >= info.lower && *value <= info.upper))
+      throw InputError(fmt::format("[fit] fixed: {} = {} must lie between {} and {}", info.name,
+                                   *value, info.lower, info.upper));
+  }
+}
+
+Transform transform_of(const ParameterInfo& info, const std::string& model,
+                       const data::FitSettings& settings) {
+  if (const auto* bounds = said_of(info.name, settings.bounds)) {
+    const auto [lower, upper] = *bounds;
+    const bool low = std::isfinite(lower), high = std::isfinite(upper);
+    if (low && high) return {Transform::Kind::between, lower, upper};
+    if (low && !(info.logarithmic && lower <= 0.0)) return {Transform::Kind::above, lower, upper};
+    if (high) return {Transform::Kind::below, lower, upper};
+  }
+  // Beyond a coefficient of about 1.1 a disc on its rim has no consistent contact (Painleve).
+  constexpr double kMostFriction = 1.1;
+  if (info.name == "friction" && model == "sliding")
+    return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
+  if (info.name == kSlipScale)
+    return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
+  return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
+}
+
+bool is_pivot(const std::string& name) {
+  return name == "pivot_x_m" || name == "pivot_y_m";
+}
+
+bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
+  if (said_of(info.name, settings.fixed) != nullptr) return false;
+  for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
+    if (info.name == asked_for) return true;
+  if (is_pivot(info.name)) return settings.free_pivot || listed(settings.free, info.name);
+  if (info.name == kSlipScale && settings.prior.contains(info.name)) return true;
+  const bool chosen = !std::all_of(settings.free.begin(), settings.free.end(), leaves_choice);
+  if (!chosen || info.role == ParameterInfo::Role::initial)
+    return info.worth_fitting || listed(settings.free, info.name);
+  return listed(settings.free, info.name);
+}
+
+}  // namespace
+
+bool leaves_choice(const std::string& name) {
+  return is_pivot(name) || name == kReadout || name == kAngleDelay || name == kSlipScale;
+}
+
+Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
+                     const data::Scene& scene) {
+  check_names(predictor, scene.fit);
+  check_fixed(predictor, scene.fit);
+  Problem problem;
+  problem.predictor = &predictor;
+  problem.arcs = std::move(arcs);
+  const auto& parameters = predictor.parameters();
+  const int count = static_cast<int>(parameters.size());
+  Eigen::VectorXd values(count);
+  for (int i = 0; i < count; ++i) {
+    const double* fixed = said_of(parameters[i].name, scene.fit.fixed);
+    values[i] = fixed != nullptr ? *fixed : parameters[i].value;
+  }
+  problem.base.assign(problem.arcs.size(), values);
+  problem.row_weights.resize(problem.arcs.size());
+  problem.timing = timing_of(predictor, scene);
+  const auto add = [&](int index, int arc) {
+    const ParameterInfo& info = parameters[index];
+    FreeParameter parameter{
+        index, arc, transform_of(info, predictor.model_name(), scene.fit), {}, {}};
+    parameter.given = values[index];
+    if (const auto* prior = said_of(info.name, scene.fit.prior)) parameter.prior = *prior;
+    // What is known of the camera widens the error bars; a model that is not the whole truth must
+    // not bend it.
+    const bool camera = info.name == kScale || info.name == kTimeFactor;
+    if (camera && parameter.prior && !scene.fit.free_scale) {
+      parameter.held = true;
+      for (Eigen::VectorXd& base : problem.base) base[index] = parameter.prior->value;
+    }
+    problem.free.push_back(parameter);
+  };
+  for (int i = 0; i < count; ++i)
+    if (parameters[i].role != ParameterInfo::Role::initial && is_free(parameters[i], scene.fit))
+      add(i, -1);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    for (int i = 0; i < count; ++i)
+      if (parameters[i].role == ParameterInfo::Role::initial && is_free(parameters[i], scene.fit))
+        add(i, arc);
+  return problem;
+}
+
+void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen::VectorXd& sign) {
+  sign = Eigen::VectorXd::Ones(values.size());
+  const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
+  if (theta < 0 || phi < 0) return;
+  const double turn = 2.0 * std::numbers::pi;
+  double tilt = std::fmod(values[theta], turn);
+  if (tilt < 0.0) tilt += turn;
+  const bool folded = tilt > std::numbers::pi;
+  values[theta] = folded ? turn - tilt : tilt;
+  if (!folded) return;
+  // (-theta, phi) and (theta, phi + pi) point the axis the same way; the node line turns over.
+  values[phi] += std::numbers::pi;
+  sign[theta] = -1.0;
+  for (const char* rate : {"dtheta_rad_s", "w1_rad_s", "w2_rad_s"})
+    if (const int i = predictor.index_of(rate); i >= 0) {
+      values[i] = -values[i];
+      sign[i] = -1.0;
+    }
+  if (const int psi = predictor.index_of("psi_rad"); psi >= 0) values[psi] -= std::numbers::pi;
+}
+
+void name_attitudes(Problem& problem) {
+  const model::Predictor& predictor = *problem.predictor;
+  const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
+  if (theta < 0 || phi < 0) return;
+  const bool bound = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
+    return (p.index == theta || p.index == phi) &&
+           (p.prior || p.transform.kind != Transform::Kind::identity);
+  });
+  const auto fixed = [&](int index) {
+    return std::none_of(problem.free.begin(), problem.free.end(),
+                        [&](const FreeParameter& p) { return p.index == index; });
+  };
+  if (bound || fixed(theta) || fixed(phi)) return;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    Eigen::VectorXd& values = problem.base[arc];
+    const bool marked = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
+    if (problem.arcs[arc].folded && !marked && values[theta] > 0.5 * std::numbers::pi) {
+      values[theta] = std::numbers::pi - values[theta];
+      values[phi] += std::numbers::pi;
+      for (const char* rate : {"w1_rad_s", "w3_rad_s"})  // along axes that turn round
+        if (const int i = predictor.index_of(rate); i >= 0) values[i] = -values[i];
+    }
+    values[phi] = std::remainder(values[phi], 2.0 * std::numbers::pi);
+  }
+}
+
+namespace {
+
+// A step with up to eight derivatives costs about six plain ones.
+void count_work(const Problem& problem, std::size_t derivatives, int steps) {
+  if (!problem.work) return;
+  const double times = derivatives == 0 ? 1.0 : 6.0 * static_cast<double>((derivatives + 7) / 8);
+  *problem.work += times * steps;
+}
+
+// What the model says an arc would show at these values.
+model::PredictRequest request_of(const Problem& problem, const ArcData& data) {
+  model::PredictRequest request;
+  request.t_s = data.t_s;
+  request.start_s = data.start_s;
+  request.observables = data.observables;
+  request.tolerance = problem.tolerance;
+  request.max_steps = problem.max_steps();
+  request.lies_where_it_fell = true;
+  return request;
+}
+model::Prediction predicted(const Problem& problem, const ArcData& data,
+                            const Eigen::VectorXd& values, const model::PredictRequest& request) {
+  return has_timing(*problem.predictor)
+             ? predict_timed(*problem.predictor, values, request, data, problem.timing)
+             : problem.predictor->predict(values, request);
+}
+
+}  // namespace
+
+std::optional<double> falls_at_s(const Problem& problem, const Eigen::VectorXd& u) {
+  Eigen::VectorXd values = problem.values(0, u), sign;
+  if (!values.allFinite()) return std::nullopt;
+  fold_tilt(*problem.predictor, values, sign);
+  const ArcData& data = problem.arcs[0];
+  try {
+    const model::Prediction run = predicted(problem, data, values, request_of(problem, data));
+    count_work(problem, 0, run.steps);
+    if (run.outcome == model::Outcome::flat) return run.valid_until_s;
+  } catch (const Error&) {  // outside the model's range
+  }
+  return std::nullopt;
+}
+
+bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::VectorXd& residuals,
+              Eigen::MatrixXd* jacobian, bool held_too) {
+  const ArcData& data = problem.arcs[arc];
+  Eigen::VectorXd values = problem.values(arc, u);
+  if (!values.allFinite()) return false;
+  Eigen::VectorXd sign;
+  fold_tilt(*problem.predictor, values, sign);
+  const std::vector<int> columns = problem.columns_of(arc);
+  model::PredictRequest request = request_of(problem, data);
+  if (jacobian != nullptr)
+    for (const int i : columns)
+      if (held_too || !problem.free[i].held) request.derivatives.push_back(problem.free[i].index);
+  model::Prediction prediction;
+  try {
+    prediction = predicted(problem, data, values, request);
+  } catch (const Error&) {  // outside the model's range: a rejected step
+    if (problem.shortfalls) problem.shortfalls->count(model::Outcome::out_of_domain);
+    return false;
+  }
+  count_work(problem, request.derivatives.size(), prediction.steps);
+  if (jacobian != nullptr && request.derivatives.size() < columns.size()) {
+    Eigen::MatrixXd all =
+        Eigen::MatrixXd::Zero(prediction.values.size(), static_cast<int>(columns.size()));
+    for (int c = 0, from = 0; c < static_cast<int>(columns.size()); ++c)
+      if (!problem.free[columns[c]].held) all.col(c) = prediction.jacobian.col(from++);
+    prediction.jacobian = std::move(all);
+  }
+  whiten(data, prediction.values, prediction.jacobian, residuals, jacobian);
+  if (!residuals.allFinite()) {
+    if (problem.shortfalls) problem.shortfalls->count(prediction.outcome);
+    return false;
+  }
+  if (jacobian != nullptr) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const FreeParameter& parameter = problem.free[columns[c]];
+      jacobian->col(c) *= sign[parameter.index] * parameter.transform.slope(u[columns[c]]);
+    }
+    if (!jacobian->allFinite()) return false;
+  }
+  for (const Reading& reading : data.readings) {
+    const int width = reading.channel == Channel::position ? 2 : 1;
+    const double weight = robust_weight(problem, arc, reading) /
+                          problem.noise_scale[static_cast<int>(reading.channel)];
+    if (weight == 1.0) continue;
+    residuals.segment(reading.row, width) *= weight;
+    if (jacobian != nullptr) jacobian->middleRows(reading.row, width) *= weight;
+  }
+  return true;
+}
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,116 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "observe/smoothing.hpp"
+#include "problem/problem.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// Whitened residuals without weights and noise scales.
+struct RawResiduals {
+  std::vector<Eigen::VectorXd> per_arc;
+  bool ok = true;
+};
+
+RawResiduals raw_residuals(Problem problem, const Eigen::VectorXd& u) {
+  RawResiduals raw;
+  problem.noise_scale.fill(1.0);
+  for (auto& weights : problem.row_weights) weights.resize(0);
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    Eigen::VectorXd residuals;
+    raw.ok = raw.ok && evaluate(problem, arc, u, residuals, nullptr);
+    raw.per_arc.push_back(std::move(residuals));
+  }
+  return raw;
+}
+
+double length(const Reading& reading, const Eigen::VectorXd& residuals) {
+  return reading.channel == Channel::position ? residuals.segment<2>(reading.row).norm()
+                                              : std::abs(residuals[reading.row]);
+}
+
+// Scale of a channel from the weighted squares of its inliers; robust start from the median.
+double channel_scale(const Problem& problem, const RawResiduals& raw, Channel channel) {
+  std::vector<double> lengths;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings)
+      if (reading.channel == channel) lengths.push_back(length(reading, raw.per_arc[arc]));
+  if (lengths.size() < 5) return 1.0;
+  const bool planar = channel == Channel::position;
+  // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
+  double scale = median(lengths) / (planar ? 1.1774 : 0.6745);
+  for (int round = 0; round < 5; ++round) {
+    double squares = 0.0;
+    int inliers = 0;
+    for (const double d : lengths)
+      if (d <= kInlier * scale) {
+        squares += d * d;
+        ++inliers;
+      }
+    // Variance of what lies within kInlier sigmas.
+    constexpr double kHalfSquare = 0.5 * kInlier * kInlier;
+    const double beyond = std::exp(-kHalfSquare);
+    const double kept = planar ? 2.0 * (1.0 - beyond * (1.0 + kHalfSquare)) / (1.0 - beyond)
+                               : 1.0 - 2.0 * kInlier * beyond /
+                                           (std::sqrt(2.0 * std::numbers::pi) *
+                                            std::erf(kInlier / std::numbers::sqrt2));
+    scale = std::sqrt(squares / std::max(1.0, kept * inliers));
+  }
+  const double rows = static_cast<double>(lengths.size()) * (planar ? 2.0 : 1.0);
+  const double share = rows / std::max(1.0, static_cast<double>(problem.rows()));
+  const double used = share * static_cast<double>(problem.free.size());
+  return std::max(scale * std::sqrt(rows / std::max(1.0, rows - used)), 1e-12);
+}
+
+}  // namespace
+
+double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
+  const RawResiduals raw = raw_residuals(problem, u);
+  if (!raw.ok) return 0.0;
+  double change = 0.0;
+  std::array<double, kChannels> spread = problem.noise_scale;
+  for (int c = 0; c < kChannels; ++c)
+    spread[c] = channel_scale(problem, raw, static_cast<Channel>(c));
+  if (rescale) {
+    for (int c = 0; c < kChannels; ++c)
+      change = std::max(change, std::abs(std::log(spread[c] / problem.noise_scale[c])));
+    problem.noise_scale = spread;
+  }
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    Eigen::VectorXd weights = Eigen::VectorXd::Ones(problem.arcs[arc].rows);
+    for (const Reading& reading : problem.arcs[arc].readings) {
+      const double d =
+          length(reading, raw.per_arc[arc]) / spread[static_cast<int>(reading.channel)];
+      if (d <= kInlier) continue;
+      // Influence falls like 1/d^3: a glitch far away does not pull.
+      const double weight = kInlier * kInlier / (d * d);
+      weights.segment(reading.row, reading.channel == Channel::position ? 2 : 1)
+          .setConstant(weight);
+    }
+    const Eigen::VectorXd& before = problem.row_weights[arc];
+    change = std::max(change, before.size() == weights.size()
+                                  ? (before - weights).cwiseAbs().maxCoeff()
+                                  : (weights.array() - 1.0).abs().maxCoeff());
+    problem.row_weights[arc] = std::move(weights);
+  }
+  return change;
+}
+
+double robust_weight(const Problem& problem, int arc, const Reading& reading) {
+  const Eigen::VectorXd& weights = problem.row_weights[static_cast<std::size_t>(arc)];
+  return weights.size() > 0 ? weights[reading.row] : 1.0;
+}
+
+double cost_of_standing_out(const Problem& problem, Channel channel) {
+  double cost = 0.0;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings)
+      if (reading.channel == channel)
+        cost += 2.0 * kInlier * kInlier *
+                (1.0 - robust_weight(problem, static_cast<int>(arc), reading));
+  return cost;
+}
+
+}  // namespace trochoid::fitting
