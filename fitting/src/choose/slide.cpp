@@ -76,19 +76,24 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
     step_down(contest, rungs.emplace_back(rolling), rungs);
     return true;
   }
-  const Terms terms = with_last_resort(contest.ladder, rolling.terms);
-  if (terms.empty()) return false;  // no floor on which it may slide
-  Rung slides = rung_with(contest.ladder, terms);
-  fit_from_first_part(contest.tracks, rolling.first_part, options_for(slides, contest.options),
-                      slides);
-  if (!usable(slides.fit) || !slides.fit.converged) return false;
-  const Rung& added = rungs.emplace_back(std::move(slides));
-  // What follows the track to its end needs other losses, not another search.
-  if (explains(added))
-    step_down(contest, added, rungs);
-  else
-    creep(contest, rungs);
-  return true;
+  std::vector<std::pair<Terms, FirstPart>> ways{
+      {with_last_resort(contest.ladder, rolling.terms), rolling.first_part}};
+  if (rolling.terms != known.terms)
+    ways.emplace_back(all_that_usually_acts(contest.ladder, {}), known.first_part);
+  for (const auto& [terms, part] : ways) {
+    if (terms.empty()) continue;  // no floor on which it may slide
+    Rung slides = rung_with(contest.ladder, terms);
+    fit_from_first_part(contest.tracks, part, options_for(slides, contest.options), slides);
+    if (!usable(slides.fit) || !slides.fit.converged) continue;
+    const Rung& added = rungs.emplace_back(std::move(slides));
+    // What follows the track to its end needs other losses, not another search.
+    if (explains(added))
+      step_down(contest, added, rungs);
+    else
+      creep(contest, rungs);
+    return true;
+  }
+  return false;
 }
 
 }  // namespace trochoid::fitting

@@ -3,7 +3,8 @@
 
 namespace trochoid::fitting {
 
-/// A body that rolls first slides later, with what acts while it rolls.
+/// A body that rolls first slides later: with what acts while it rolls, then with all that usually
+/// acts.
 /// @param known  a rung that rolls and explains a first part of the track.
 /// @returns whether a rung was added that explains the track, or follows it to its end and is to go
 /// on from.
