@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 #include <set>
@@ -262,6 +263,30 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsAsFarAsItGoes) {
   EXPECT_NEAR(unusual.parameters[0].sigma, 0.25, 1e-12);
   EXPECT_NEAR(usual.parameters[0].sigma, std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * 2.4 * 2.4),
               1e-12);
+}
+
+TEST(Rivals, ThatAreOtherMinimaOfTheSameModelWidenErrorBarsWithinBounds) {
+  Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
+              rung_of({1}, {loss("pivoting_friction_m", 25.0, 0.1)}, 102.0, 108.0)};
+  rungs[0].fit.whiteness_p = 0.5;
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit, {1, 2});
+  EXPECT_NEAR(fit.parameters[0].sigma, 0.25, 1e-12);
+}
+
+TEST(Rivals, WithATermBesideWhichAnotherOneIsNotDeterminedAreTold) {
+  constexpr double kOpen = std::numeric_limits<double>::infinity();
+  Rungs rungs{
+      rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
+      rung_of({1, 2}, {loss("pivoting_friction_m", 5.0, kOpen), loss("air_N_m_s", 0.0, kOpen)},
+              104.0, 112.0)};
+  rungs[1].name = "with air";
+  data::Fit fit = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], fit, {1, 2});
+  ASSERT_FALSE(fit.warnings.empty());
+  EXPECT_EQ(fit.warnings.back(),
+            "with air is neither needed nor ruled out: with it, pivoting_friction_m would not be "
+            "determined; the 5 +- 0.1 given here is what holds without it");
 }
 
 // Nothing moves where none of the further loss fits best, and still it leaves another one open.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "choose/leave_out.hpp"
 #include "choose/slide.hpp"

@@ -1,6 +1,5 @@
 #pragma once
 #include <functional>
-#include <set>
 #include <span>
 #include <vector>
 

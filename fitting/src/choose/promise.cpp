@@ -165,6 +165,8 @@ Moved moved(const Tangent& at, const std::set<int>& before, const std::set<int>&
   const Least without = least(at, before, held, known), with = least(at, after, held, known);
   const Eigen::VectorXd narrow = variances(at, before, held), wide = variances(at, after, held);
   Moved all{0.0, Eigen::VectorXd::Ones(narrow.size()), wide.cwiseSqrt()};
+  constexpr double kOpen = std::numeric_limits<double>::infinity();
+  if (wide.isZero(0.0)) all.sigma.setConstant(kOpen);
   for (int i = 0; i < narrow.size(); ++i) {
     if (!(narrow[i] > 0.0)) continue;
     const double shift = with.step[i] - without.step[i];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "choose/rung.hpp"
@@ -25,9 +24,10 @@ bool in_question(const Rung& rung, const Rung& chosen) {
          (has_all_terms_of(rung, chosen) || rung.bic <= chosen.bic + kVeryStrong);
 }
 
-// Whether a rung's terms beyond the chosen one's are usual ones.
+// Whether a rung has terms beyond the chosen one's, all of them usual ones.
 bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual) {
-  return std::all_of(rung.terms.begin(), rung.terms.end(),
+  return rung.terms != chosen.terms &&
+         std::all_of(rung.terms.begin(), rung.terms.end(),
                      [&](int term) { return usual.contains(term) || chosen.terms.contains(term); });
 }
 
@@ -160,14 +160,20 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
       const data::FitParameter* other = rung.fit.find(parameter.name);
       if (parameter.status != data::ParameterStatus::free || other == nullptr) continue;
       const double shift = std::abs(shift_of(parameter, rung.fit));
-      const double bars =
-          std::max(shift, std::isfinite(other->sigma) ? other->sigma : 0.0) / parameter.sigma;
+      const double bars = std::max(shift, other->sigma) / parameter.sigma;
       if (!(bars > most)) continue;
       most = bars, moving = &rung, moved = &parameter, there = other;
     }
   }
   if (moving == nullptr) return;
   const double shift = std::abs(shift_of(*moved, moving->fit)) / moved->sigma;
+  if (!std::isfinite(there->sigma)) {
+    fit.warnings.push_back(fmt::format(
+        "{} is neither needed nor ruled out: with it, {} would not be determined; the {:.4g} +- "
+        "{:.2g} given here is what holds without it",
+        moving->name, moved->name, moved->value, moved->sigma));
+    return;
+  }
   fit.warnings.push_back(fmt::format(
       "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}; the {:.4g} +- "
       "{:.2g} given here is {}",

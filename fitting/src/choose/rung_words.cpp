@@ -56,7 +56,8 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
       chosen.held_back_rms_sigma);
   std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
   for (const Rung& rung : rungs) {
-    if (!rung.fitted || &rung == &chosen) continue;
+    // Of another minimum of the same model nothing is said.
+    if (!rung.fitted || rung.terms == chosen.terms) continue;
     const bool near = rung.bic - chosen.bic < kVeryStrong;
     (has_all_terms_of(rung, chosen) ? more : near ? alike : worse).push_back(&rung);
   }
