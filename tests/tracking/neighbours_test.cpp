@@ -108,6 +108,21 @@ TEST_F(Neighbours, AWrongFrameFromWhichWiderLooksLeadAwayIsMendedClosely) {
   EXPECT_LT(off_rad(), 0.01);
 }
 
+// The rim of a face beside that of the wall: hardly off the path, and no wide look would be made.
+TEST_F(Neighbours, AFrameALittleOffIsLookedAtClosely) {
+  constexpr double kOff_rad = 0.02;
+  const Oracle oracle([](int) { return 10.0; });
+  auto glimpses = tracked(oracle, [](int) { return false; });
+  glimpses[30].seen->pose->pose.phi_rad += kOff_rad;
+  const auto off_rad = [&] {
+    return std::abs(std::remainder(glimpses[30].pose().phi_rad - phi_at(0.5), kTurn));
+  };
+  mend_from_neighbours(background_, oracle, glimpses);
+  EXPECT_NEAR(off_rad(), kOff_rad, 1e-9);
+  mend_from_neighbours(background_, oracle, glimpses, true);
+  EXPECT_LT(off_rad(), 0.1 * kOff_rad);
+}
+
 // A fortieth of a turn would be nothing beside neighbours that scatter; these do not.
 TEST_F(Neighbours, OnASmoothPathLittleIsAContradiction) {
   constexpr double kOff_rad = 0.025 * kTurn;

@@ -334,7 +334,7 @@ class Mending {
 
   /// Looking right there cannot lead astray: less of a contradiction will do for that.
   [[nodiscard]] bool suspicious(double off_rad, const Expected& expected) const {
-    constexpr double kOfSuspicious = 0.5;
+    constexpr double kOfSuspicious = 0.1;
     return closely_ ? off_rad >= kOfSuspicious * usual_.suspicious_rad()
                     : expected.contradicts(off_rad, usual_.suspicious_rad());
   }
@@ -351,7 +351,7 @@ class Mending {
 
   /// What is seen where the body is expected, if that explains frame i better than what it has.
   [[nodiscard]] Found better(Measuring& measure, std::size_t i, const Expected& expected) const {
-    constexpr double kUsualShare = 0.5, kAsGood = 0.9, kBetter = 1.1;
+    constexpr double kUsualShare = 0.5, kAsGood = 0.9, kBetter = 1.05;
     const auto& before = was_[i].seen;
     const bool alike = finder_.faces_look_alike();
     const double off = before ? off_rad(*before, expected.seen, alike) : 0.0;
