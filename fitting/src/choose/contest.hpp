@@ -10,7 +10,7 @@
 // far does that best.
 namespace trochoid::fitting {
 
-/// Terms that are added beyond what usually acts, one at a time.
+/// The most terms that are added to a rung one at a time, or make up a first set.
 inline constexpr std::size_t kMostTerms = 3;
 
 /// What is to be explained, and by what.

@@ -66,8 +66,8 @@ void take(Draft draft, Rung& rung);
 /// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
 /// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
 /// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
-/// whose own error bars count too (not where residuals hang together: those terms may follow the
-/// tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
+/// whose own error bars count too (where residuals hang together only those for which BIC speaks:
+/// other terms may follow the tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
 /// Rungs with further terms against which BIC's evidence is strong, for their size, widen bars up
 /// to a bound; what one of them would change beyond that is said.
 /// @param usual  terms that act on nearly every body: rungs that add nothing else count without

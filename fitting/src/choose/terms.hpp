@@ -34,7 +34,7 @@ namespace trochoid::fitting {
 /// property of.
 [[nodiscard]] bool may_go(const Ladder& ladder, const Terms& terms, int index);
 
-/// What usually acts on a body that rolls.
+/// The losses that act on nearly every body of this kind.
 [[nodiscard]] Terms usual_losses(const Ladder& ladder);
 
 /// The terms and the last resort; empty where there is none.
