@@ -1,3 +1,4 @@
+#ifdef TROCHOID_HAS_TRACKING
 #include "common/track_options.hpp"
 
 #include <gmock/gmock.h>
@@ -40,3 +41,4 @@ TEST(CheckFound, AsksForOneFrameOfEachBodyThatIsNotDoubtful) {
 
 }  // namespace
 }  // namespace trochoid::tools
+#endif

@@ -1,3 +1,4 @@
+#ifdef TROCHOID_HAS_TRACKING
 #include "study/tracking_scores.hpp"
 
 #include <gtest/gtest.h>
@@ -58,3 +59,4 @@ TEST(TrackingScores, OfTwoAttitudesThatLookAlikeTheFoldedOnesAreCompared) {
 
 }  // namespace
 }  // namespace trochoid::tools
+#endif
