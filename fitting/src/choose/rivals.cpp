@@ -166,20 +166,16 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
     }
   }
   if (moving == nullptr) return;
+  const bool open = !std::isfinite(there->sigma);
   const double shift = std::abs(shift_of(*moved, moving->fit)) / moved->sigma;
-  if (!std::isfinite(there->sigma)) {
-    fit.warnings.push_back(fmt::format(
-        "{} is neither needed nor ruled out: with it, {} would not be determined; the {:.4g} +- "
-        "{:.2g} given here is what holds without it",
-        moving->name, moved->name, moved->value, moved->sigma));
-    return;
-  }
   fit.warnings.push_back(fmt::format(
-      "{} is neither needed nor ruled out: with it, {} would be {:.4g} +- {:.2g}; the {:.4g} +- "
-      "{:.2g} given here is {}",
-      moving->name, moved->name, there->value, there->sigma, moved->value, moved->sigma,
-      shift > kFar ? fmt::format("away from that by {:.2g} times its own error bar", shift)
-                   : "what holds without it"));
+      "{} is neither needed nor ruled out: with it, {} would {}; the {:.4g} +- {:.2g} given here "
+      "is {}",
+      moving->name, moved->name,
+      open ? "not be determined" : fmt::format("be {:.4g} +- {:.2g}", there->value, there->sigma),
+      moved->value, moved->sigma,
+      !open && shift > kFar ? fmt::format("away from that by {:.2g} times its own error bar", shift)
+                            : "what holds without it"));
 }
 
 }  // namespace
