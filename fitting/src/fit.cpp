@@ -448,7 +448,7 @@ data::Fit OneFit::described(Bars bars) {
   heed_pivot(problem_, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);
-  if (word_ == Word::last) doubt_if_drifting(problem_, error, fit);
+  if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;
     fit.outcome = fit.verdict = "unexplained";

@@ -106,6 +106,28 @@ TEST(Independent, ABodyThatRollsAtFirstHasTheVelocityOfItsSpin) {
   }
 }
 
+// Seen by its positions alone it rolls all but a twelfth of a second, and a body that only rolls
+// was given for it: good, the first samples given up as the tracker's errors, and the spin when the
+// record begins 2000 error bars off.
+TEST(Independent, ABodyThatSlipsForItsFirstSamplesIsNotTakenForOneThatOnlyRolls) {
+  const data::Fit fit = comparison_of("slips_at_first").fit;
+  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("does not explain its beginning"));
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("the body may slip before it rolls"));
+}
+
+// The first three of a tracker that had not found its feet: given up they change nothing, and are
+// told of.
+TEST(Independent, ABodyWhoseFirstPositionsAreClumsyIsFoundAllTheSame) {
+  data::Track track = track_of("unneeded_loss");
+  for (std::size_t i = 0; i < 3; ++i)
+    track.samples[i].centre_m +=
+        12.0 * Eigen::Vector2d(std::sqrt(track.samples[i].covariance_m2(0, 0)), 0.0);
+  const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
+  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")));
+}
+
 // A quadratic couple of the air, for which no evidence is strong, was not even tried, and the
 // linear one that stood for it too was 4 of its error bars off.
 TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {

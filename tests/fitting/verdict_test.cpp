@@ -144,9 +144,11 @@ TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
 }
 
-// What is said of a search that ended with these values and gave up these samples.
-std::string verdict_at(const data::Track& track, const std::map<std::string, double>& found,
-                       bool cut_short, const std::set<int>& given_up = {}) {
+constexpr double kGivenUp = 0.01, kStandsOut = 0.5;  // of the weight in full
+
+// What is said of a search that ended with these values, where these samples count for less.
+data::Fit fit_at(const data::Track& track, const std::map<std::string, double>& found,
+                 bool cut_short, const std::set<int>& given_up = {}, double weight = kGivenUp) {
   const auto predictor = model::make_predictor(top());
   FitOptions options;
   options.start = found;
@@ -154,13 +156,19 @@ std::string verdict_at(const data::Track& track, const std::map<std::string, dou
   problem.row_weights[0] = Eigen::VectorXd::Ones(problem.rows());
   for (const Reading& reading : problem.arcs[0].readings)
     if (given_up.contains(reading.sample))
-      problem.row_weights[0].segment<2>(reading.row).setConstant(0.01);
+      problem.row_weights[0].segment<2>(reading.row).setConstant(weight);
   Solution solution;
   solution.u = problem.start();
   solution.usable = solution.converged = true;
   data::Fit fit;
   judge(problem, solution, {}, cut_short, fit);
-  return fit.verdict;
+  doubt_as_a_whole(problem, solution.u, {}, fit);
+  return fit;
+}
+
+std::string verdict_at(const data::Track& track, const std::map<std::string, double>& found,
+                       bool cut_short, const std::set<int>& given_up = {}) {
+  return fit_at(track, found, cut_short, given_up).verdict;
 }
 
 // The same, less, where the search ended before anything passed: another valley may explain it.
@@ -188,7 +196,7 @@ Path pushed(double from_s) {
 TEST(Verdict, IsUnexplainedWhereTheModelGivesUpAPartOfThePath) {
   const data::Fit fit = fit_of(track_of(pushed(2.4), white(kSigma_m, 10)), top());
   EXPECT_EQ(fit.verdict, "unexplained") << fit.verdict_words;
-  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("s, lie too far from the model to count"));
+  EXPECT_THAT(fit.verdict_words, testing::HasSubstr("left out of the fit"));
 }
 
 TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
@@ -213,6 +221,42 @@ TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
   track.samples = few;
   EXPECT_EQ(verdict_at(track, kNutating, false, {4, 11}), "good");
   EXPECT_EQ(verdict_at(track, kNutating, false, {4, 5, 11}), "unexplained");
+}
+
+// Samples [from, to) that stand out, and what is said of that.
+data::Fit with_samples_off(int from, int to) {
+  std::set<int> off;
+  for (int i = from; i < to; ++i) off.insert(i);
+  const data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  return fit_at(track, kNutating, false, off, kStandsOut);
+}
+
+// What a body does there that the model does not let it costs little, as it is given up.
+TEST(Verdict, IsDoubtfulWhereTheModelMissesWhereTheRecordBeginsOrEnds) {
+  const data::Fit first = with_samples_off(0, 12);
+  EXPECT_EQ(first.verdict, "doubtful");
+  EXPECT_THAT(first.verdict_words, testing::HasSubstr("12 of the 12 first positions"));
+  EXPECT_THAT(first.verdict_words, testing::HasSubstr("the state given for 0 s"));
+  const data::Fit last = with_samples_off(kSamples - 12, kSamples);
+  EXPECT_EQ(last.verdict, "doubtful");
+  EXPECT_THAT(last.verdict_words, testing::HasSubstr("12 of the 12 last positions"));
+  EXPECT_EQ(with_samples_off(90, 102).verdict, "good");
+}
+
+// Those that noise hides do not make the others the tracker's.
+TEST(Verdict, IsDoubtfulWhereHalfOfTheFirstPositionsAreMissed) {
+  std::set<int> every_other;
+  for (int i = 0; i < 20; i += 2) every_other.insert(i);
+  const data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  EXPECT_EQ(fit_at(track, kNutating, false, every_other, kStandsOut).verdict, "doubtful");
+}
+
+TEST(Verdict, StandsAndIsRemarkedOnWhereATrackerMayHaveMissedTheFirstFewPositions) {
+  const data::Fit few = with_samples_off(0, 4), fewer = with_samples_off(0, 2);
+  EXPECT_EQ(few.verdict, "good");
+  EXPECT_THAT(few.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")));
+  EXPECT_EQ(fewer.verdict, "good");
+  EXPECT_THAT(fewer.warnings, testing::IsEmpty());
 }
 
 // Glitches anywhere in the picture are the tracker's, however many.

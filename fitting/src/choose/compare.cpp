@@ -111,7 +111,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   }
   if (result.fit.converged) {
     allow_for_rivals(rungs, *chosen, result.fit, usual_losses(ladder));
-    doubt_if_drifting(tracks, *chosen, contest.options, result.fit);
+    doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
   }
   result.fit.comparison = table_of(rungs, chosen);
   result.fit.recommendation = sentence(rungs, *chosen, ladder);

@@ -258,10 +258,10 @@ double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
   return widened * widened;
 }
 
-void doubt_if_drifting(std::span<const data::Track> tracks, const data::Scene& scene,
-                       const FitOptions& options, data::Fit& fit) {
+void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,
+                      const FitOptions& options, data::Fit& fit) {
   const Minimum at(tracks, scene, options);
-  doubt_if_drifting(at.problem, uncertainty(at.problem, at.u), fit);
+  doubt_as_a_whole(at.problem, at.u, uncertainty(at.problem, at.u), fit);
 }
 
 }  // namespace trochoid::fitting

@@ -51,8 +51,8 @@ struct Promise {
 [[nodiscard]] double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
                               const FitOptions& options);
 
-/// doubt_if_drifting() for a fit whose values `options.start` holds.
-void doubt_if_drifting(std::span<const data::Track> tracks, const data::Scene& scene,
-                       const FitOptions& options, data::Fit& fit);
+/// doubt_as_a_whole() (adequacy.hpp) for a fit whose values `options.start` holds.
+void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,
+                      const FitOptions& options, data::Fit& fit);
 
 }  // namespace trochoid::fitting

@@ -374,14 +374,13 @@ std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung&
   return std::nullopt;
 }
 
-void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
-                       const FitOptions& options, data::Fit& fit) {
-  if (!(fit.whiteness_p < kWhite)) return;
+void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
+                      const FitOptions& options, data::Fit& fit) {
   FitOptions at = options;
   at.rolls_at_first = rung.rolls_at_first;
   at.start = values_of_all_arcs(rung.fit);
   try {
-    doubt_if_drifting(tracks, rung.scene, at, fit);
+    doubt_as_a_whole(tracks, rung.scene, at, fit);
   } catch (const NumericalError&) {  // integrated as coarsely as a search does
   }
 }

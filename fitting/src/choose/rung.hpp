@@ -67,9 +67,9 @@ void take(Draft draft, Rung& rung);
 /// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
 /// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
 /// whose own error bars count too (where residuals hang together only those for which BIC speaks:
-/// other terms may follow the tracker's errors). A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
-/// Rungs with further terms against which BIC's evidence is strong, for their size, widen bars up
-/// to a bound; what one of them would change beyond that is said.
+/// other terms may follow the tracker's errors). A loss that a rung lacks is zero there. Warns
+/// where a bar grows noticeably. Rungs with further terms against which BIC's evidence is strong,
+/// for their size, widen bars up to a bound; what one of them would change beyond that is said.
 /// @param usual  terms that act on nearly every body: rungs that add nothing else count without
 /// that bound.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
@@ -99,10 +99,9 @@ void predict_held_back(std::span<const data::Track> tracks, const FitOptions& op
                                               const Rung& larger,
                                               const std::map<int, std::set<std::string>>& others);
 
-/// Doubts a fit of a rung's scene where halves of the record ask for different parameters
-/// (adequacy.hpp). Rungs are compared without that: there it is further terms that take it away.
-void doubt_if_drifting(std::span<const data::Track> tracks, const Rung& rung,
-                       const FitOptions& options, data::Fit& fit);
+/// Second thoughts about the fit of the rung that was chosen (adequacy.hpp).
+void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
+                      const FitOptions& options, data::Fit& fit);
 
 /// How many times less than its change a rung's chi-square tells, for what its residuals have in
 /// common.

@@ -131,6 +131,49 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   return worst;
 }
 
+// By how much each of an arc's positions counts, in the order of their times. Of those that lie on
+// no path with the others, a tracker's glitches, nothing is said.
+struct Counting {
+  double t_s = 0.0, weight = 1.0;
+};
+
+std::vector<Counting> counting(const Problem& problem, int arc, const Eigen::VectorXd& u) {
+  // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
+  constexpr double kNothing = 1e-5;
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
+  const ArcData& data = problem.arcs[arc];
+  Eigen::VectorXd residuals;
+  if (data.observable_index(model::Observable::x_m) < 0 ||
+      !evaluate(plain, arc, u, residuals, nullptr))
+    return {};
+  const Eigen::MatrixX2d xy = data.positions_m();
+  const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
+  const double nothing_m =
+      kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+  const std::vector<int> consistent = consistent_samples(data);
+  std::vector<Counting> all;
+  for (const Reading& reading : data.readings) {
+    if (reading.channel != Channel::position) continue;
+    const bool glitch = !std::binary_search(consistent.begin(), consistent.end(), reading.sample);
+    const bool means_something = off.row(reading.sample).norm() >= nothing_m;
+    if (!glitch)
+      all.push_back(
+          {data.t_s[reading.sample], means_something ? robust_weight(problem, arc, reading) : 1.0});
+  }
+  return all;
+}
+
+int positions_in(const Problem& problem) {
+  int count = 0;
+  for (const ArcData& arc : problem.arcs)
+    count += static_cast<int>(
+        std::count_if(arc.readings.begin(), arc.readings.end(),
+                      [](const Reading& reading) { return reading.channel == Channel::position; }));
+  return count;
+}
+
 // Positions the fit has given up although they lie on one path with the others: not the tracker's
 // glitches, but motion that the model does not have.
 struct GivenUp {
@@ -143,44 +186,58 @@ struct GivenUp {
   }
   [[nodiscard]] std::string words() const {
     return fmt::format(
-        "{} of its {} positions, between {:.4g} and {:.4g} s, lie too far from the model to count, "
-        "although they lie on one path with the others",
+        "{} of its {} positions, between {:.4g} and {:.4g} s, lie on one path with the others, but "
+        "so far from the model's that they were left out of the fit",
         samples, of, first_s, last_s);
   }
 };
 
 GivenUp given_up(const Problem& problem, const Solution& solution) {
   constexpr double kHardlyCounts = 0.1;  // beyond 11 times the noise
-  // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
-  constexpr double kNothing = 1e-5;
-  Problem plain = problem;
-  plain.noise_scale.fill(1.0);
-  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
   GivenUp all;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    const ArcData& data = problem.arcs[arc];
-    Eigen::VectorXd residuals;
-    if (data.observable_index(model::Observable::x_m) < 0 ||
-        !evaluate(plain, arc, solution.u, residuals, nullptr))
-      continue;
-    const Eigen::MatrixX2d xy = data.positions_m();
-    const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
-    const double nothing_m =
-        kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
-    const std::vector<int> consistent = consistent_samples(data);
-    for (const Reading& reading : data.readings) {
-      if (reading.channel != Channel::position) continue;
-      ++all.of;
-      if (robust_weight(problem, arc, reading) > kHardlyCounts ||
-          off.row(reading.sample).norm() < nothing_m ||
-          !std::binary_search(consistent.begin(), consistent.end(), reading.sample))
-        continue;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    for (const Counting& position : counting(problem, arc, solution.u)) {
+      if (position.weight > kHardlyCounts) continue;
       ++all.samples;
-      all.first_s = std::min(all.first_s, data.t_s[reading.sample]);
-      all.last_s = std::max(all.last_s, data.t_s[reading.sample]);
+      all.first_s = std::min(all.first_s, position.t_s);
+      all.last_s = std::max(all.last_s, position.t_s);
+    }
+  all.of = positions_in(problem);
+  return all;
+}
+
+// Positions at an end of an arc, at least half of which stand out, the last of them among those.
+struct MissedEnd {
+  int arc = 0;
+  bool beginning = true;
+  int standing_out = 0, of = 0;
+  double until_s = 0.0;  // where the explained part begins or ends
+};
+
+MissedEnd missed_end(const std::vector<Counting>& from_the_end, int arc, bool beginning) {
+  MissedEnd end{.arc = arc, .beginning = beginning};
+  int seen = 0, out = 0;
+  for (const Counting& position : from_the_end) {
+    ++seen;
+    if (!(position.weight < 1.0)) continue;
+    ++out;
+    if (2 * out >= seen) end.standing_out = out, end.of = seen, end.until_s = position.t_s;
+  }
+  return end;
+}
+
+// The end of which most stands out.
+MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u) {
+  MissedEnd worst;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    std::vector<Counting> positions = counting(problem, arc, u);
+    for (const bool beginning : {true, false}) {
+      const MissedEnd end = missed_end(positions, arc, beginning);
+      if (end.standing_out > worst.standing_out) worst = end;
+      std::reverse(positions.begin(), positions.end());
     }
   }
-  return all;
+  return worst;
 }
 
 // Chi-square of the positions about a polynomial in time, weighted as in the fit.
@@ -354,14 +411,18 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   accept(problem, solution, error, worst, lost, fit);
 }
 
+namespace {
+
+bool passed(const data::Fit& fit) {
+  return fit.verdict == "good" || fit.verdict == "good_correlated" || fit.verdict == "weak";
+}
+
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6, kNotWhite = 0.01;
   // Rendered recordings of rolling rings and discs came to 7.
   constexpr double kOfATracker = 20.0;
   const Drift& drift = error.drift;
-  const bool passed =
-      fit.verdict == "good" || fit.verdict == "good_correlated" || fit.verdict == "weak";
-  if (!passed || error.whiteness.p_value > kNotWhite) return;
+  if (!passed(fit) || error.whiteness.p_value > kNotWhite) return;
   if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
   if (is_tracked(problem) && drift.gain < kOfATracker) return;
   fit.verdict = "doubtful";
@@ -370,6 +431,59 @@ void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::F
       "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
       "model lacks something, and the error bars are too small",
       drift.gain);
+}
+
+// What becomes of the state at the first sample where the model misses the samples there, and what
+// may have happened to the body.
+std::string what_an_end_may_be(const Problem& problem, const MissedEnd& end) {
+  const bool rolls = problem.predictor->model_name() == "rolling";
+  if (!end.beginning)
+    return rolls ? "the body may slip or touch something there" : "it may be another motion";
+  return fmt::format(
+      "{}, and the state given for {:.4g} s is the model's path followed back to then, not how the "
+      "body began",
+      rolls ? "the body may slip before it rolls" : "it may be another motion",
+      problem.arcs[end.arc].start_s);
+}
+
+// Motion that the model lacks where a record begins or ends costs it little: what stands out is
+// given up, and the rest may be explained. A tracker that errs for a few frames does the same, so
+// of few it is told only.
+void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
+                               const Uncertainty& error, data::Fit& fit) {
+  constexpr int kWorthWords = 3, kNoTracker = 8;
+  constexpr double kIndependent = 3.0;  // one in 460 stands out by chance
+  if (!passed(fit)) return;
+  const MissedEnd end = worst_missed_end(problem, u);
+  if (end.standing_out < kWorthWords) return;
+  const ArcData& arc = problem.arcs[end.arc];
+  const double step_s =
+      arc.duration_s() / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
+  const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
+  const std::string where = fmt::format(
+      "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
+      end.standing_out, end.of, end.beginning ? "first" : "last",
+      problem.arcs.size() > 1 ? fmt::format(" of track {}", arc.track + 1) : "",
+      end.beginning ? "up to" : "from", end.until_s);
+  const std::string what = what_an_end_may_be(problem, end);
+  if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
+    fit.warnings.push_back(fmt::format(
+        "{}, and count for little, as if the tracker had erred; if it had not, {}", where, what));
+    return;
+  }
+  fit.verdict = "doubtful";
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain its {}: {}, more than a "
+      "tracker misses in a row, and count for little: {}",
+      end.beginning ? "beginning" : "end", where, what);
+}
+
+}  // namespace
+
+void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
+                      data::Fit& fit) {
+  doubt_if_drifting(problem, error, fit);
+  doubt_if_an_end_is_missed(problem, u, error, fit);
 }
 
 bool explains(const Problem& problem, const Solution& solution) {

@@ -27,7 +27,7 @@ struct Squares {
 ///                    well (BIC): nothing in them asks for the model
 ///   doubtful         followed, but residuals are beyond 2 times those measures, or a
 ///                    hundredth of the positions, three at least, given up, or
-///                    doubt_if_drifting() says so
+///                    doubt_as_a_whole() says so
 ///   weak             explained, but parameters of the motion are not determined
 ///   good_correlated  explained; residuals hang together, error bars are widened for that
 ///   good             explained; what is left looks like noise
@@ -38,11 +38,20 @@ struct Squares {
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
 
-/// Lowers a verdict of what is explained to doubtful where the second half of the record asks for
-/// other parameters than the first, its noise allowed for: the model then lacks something that the
-/// parameters stand in for, and their error bars do not know of it. A tracker's errors go with the
-/// motion a little, too: of filmed positions more is asked.
-void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit);
+/// Second thoughts about a fit that is what was asked for; models are compared without them, since
+/// further terms may take their reason away. Lowers a verdict of what is explained to doubtful
+/// where
+///   - the second half of the record asks for other parameters than the first, its noise allowed
+///     for: the model then lacks something that the parameters stand in for, and their error bars
+///     do not know of it. A tracker's errors go with the motion a little, too: of filmed positions
+///     more is asked;
+///   - at least half of the first or last positions of an arc stand out, eight of them or three
+///     times as many as hang together: the body moves there as the model does not let it, and the
+///     state at the first sample is the model's path followed back to it. Of three or more a
+///     tracker may have missed, and a warning tells.
+/// @param u  a minimum, by which the problem's weights are set.
+void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
+                      data::Fit& fit);
 
 /// Whether a path is neither unexplained nor doubtful for its residuals.
 [[nodiscard]] bool explains(const Problem& problem, const Solution& solution);
