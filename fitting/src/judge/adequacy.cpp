@@ -148,10 +148,8 @@ std::vector<Counting> counting(const Problem& problem, int arc, const Eigen::Vec
   if (data.observable_index(model::Observable::x_m) < 0 ||
       !evaluate(plain, arc, u, residuals, nullptr))
     return {};
-  const Eigen::MatrixX2d xy = data.positions_m();
-  const Eigen::MatrixX2d off = predicted_m(data, residuals) - xy;
-  const double nothing_m =
-      kNothing * (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+  const Eigen::MatrixX2d off = predicted_m(data, residuals) - data.positions_m();
+  const double nothing_m = kNothing * extent_m(data);
   const std::vector<int> consistent = consistent_samples(data);
   std::vector<Counting> all;
   for (const Reading& reading : data.readings) {

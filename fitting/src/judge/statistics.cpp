@@ -28,10 +28,8 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
     return duration / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
   if (info.unit == "rad/s" || info.unit == "1/s") return std::max(value, 1.0 / duration);
   double extent = 1.0;
-  if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1) {
-    const Eigen::MatrixX2d xy = arc.positions_m();
-    extent = std::max((xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff(), 1e-9);
-  }
+  if (arc.observable_index(model::Observable::x_m) >= 0 && arc.t_s.size() > 1)
+    extent = std::max(extent_m(arc), 1e-9);
   if (info.unit == "m") return std::max(value, extent);
   if (info.unit == "m/s") return std::max(value, extent / duration);
   return value > 0.0 ? value : 1.0;

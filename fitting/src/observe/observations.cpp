@@ -11,6 +11,7 @@
 #include "observe/direction.hpp"
 #include "observe/smoothing.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -34,10 +35,20 @@ Observable observable_of(Channel channel) {
   }
 }
 
-void add_angle(ArcData& arc, int sample, Channel channel,
-               const std::optional<data::MeasuredAngle>& angle) {
-  if (!angle || !(angle->sigma_rad > 0.0)) return;
-  Reading reading{.sample = sample, .channel = channel};
+std::string words_of(const data::TrackSample& sample) {
+  return fmt::format("the sample at t = {:g} s{}", sample.t_s,
+                     sample.frame >= 0 ? fmt::format(" (frame {})", sample.frame) : "");
+}
+
+void add_angle(ArcData& arc, int index, Channel channel, const data::TrackSample& sample,
+               const std::optional<data::MeasuredAngle>& angle, const char* name) {
+  if (!angle) return;
+  if (!(angle->sigma_rad > 0.0))
+    throw TrackError(fmt::format(
+        "sigma_{0}_rad of {1} is {2:g}: an angle without error, which no fit can weigh; give "
+        "sigma_{0}_rad > 0, or leave {0}_rad and sigma_{0}_rad empty",
+        name, words_of(sample), angle->sigma_rad));
+  Reading reading{.sample = index, .channel = channel};
   reading.value = {angle->value_rad, 0.0};
   reading.whitener(0, 0) = 1.0 / angle->sigma_rad;
   arc.readings.push_back(reading);
@@ -56,12 +67,24 @@ Eigen::Matrix2d whitener_of(const data::TrackSample& sample) {
   const Eigen::LLT<Eigen::Matrix2d> cholesky(sample.covariance_m2);
   if (cholesky.info() != Eigen::Success)
     throw TrackError(
-        fmt::format("the covariance of the sample at t = {:g} s leaves a direction without error, "
-                    "which no fit can weigh; give sxx_m2, syy_m2 > 0 and sxy_m2^2 < sxx_m2 syy_m2, "
-                    "or leave all three empty",
-                    sample.t_s));
+        fmt::format("sxx_m2, sxy_m2, syy_m2 of {} leave a direction without error, which no fit "
+                    "can weigh; give sxx_m2, syy_m2 > 0 and sxy_m2^2 < sxx_m2 syy_m2, or leave all "
+                    "three empty",
+                    words_of(sample)));
   const Eigen::Matrix2d lower = cholesky.matrixL();
   return lower.inverse().transpose();
+}
+
+// Farther away rounding is no longer small beside what a camera sees.
+void check_place(const data::TrackSample& sample) {
+  constexpr double kFarthest_m = 1e4;
+  const bool along_x = std::abs(sample.centre_m.x()) > kFarthest_m;
+  if (!along_x && !(std::abs(sample.centre_m.y()) > kFarthest_m)) return;
+  throw TrackError(fmt::format(
+      "{} lies at {} = {:g}, farther than {:g} km away; give metres, or leave the row out if the "
+      "tracker erred",
+      words_of(sample), along_x ? "x_m" : "y_m", sample.centre_m[along_x ? 0 : 1],
+      1e-3 * kFarthest_m));
 }
 
 void set_position_noise(ArcData& arc, double sigma_m) {
@@ -139,6 +162,7 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
     if (choice.position && !sample.has_metres()) continue;
     const int index = static_cast<int>(arc.t_s.size());
     if (choice.position) {
+      check_place(sample);
       Reading reading{.sample = index, .channel = Channel::position, .value = sample.centre_m};
       if (sample.has_covariance())
         reading.whitener = whitener_of(sample);
@@ -146,9 +170,9 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
         any_covariance_missing = true;
       arc.readings.push_back(reading);
     }
-    if (choice.theta) add_angle(arc, index, Channel::theta, sample.theta);
-    if (choice.phi) add_angle(arc, index, Channel::phi, sample.phi);
-    if (choice.psi) add_angle(arc, index, Channel::psi, sample.psi);
+    if (choice.theta) add_angle(arc, index, Channel::theta, sample, sample.theta, "theta");
+    if (choice.phi) add_angle(arc, index, Channel::phi, sample, sample.phi, "phi");
+    if (choice.psi) add_angle(arc, index, Channel::psi, sample, sample.psi, "psi");
     arc.filmed |= sample.centre_px.allFinite();
     arc.t_s.push_back(sample.t_s);
     arc.row_px.push_back(sample.centre_px.y());
@@ -269,6 +293,24 @@ std::vector<int> consistent_samples(const ArcData& arc) {
     if (!doubtful[i]) kept.push_back(i);
   }
   return 5 * kept.size() > 3 * all.size() ? kept : all;
+}
+
+double extent_m(const ArcData& arc) {
+  constexpr double kBeyondAnyMotion = 10.0;  // of what most of the samples extend over
+  const auto range = [](const Eigen::MatrixX2d& xy) {
+    return (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+  };
+  const Eigen::MatrixX2d xy = arc.positions_m();
+  if (xy.rows() == 0) return 0.0;
+  double most = 0.0;
+  for (const int axis : {0, 1}) {
+    const std::vector<double> along(xy.col(axis).begin(), xy.col(axis).end());
+    most = std::max(most, data::quantile(along, 0.9) - data::quantile(along, 0.1));
+  }
+  const double whole = range(xy);
+  // To look for glitches is dear, and most tracks have none so far away.
+  if (whole <= kBeyondAnyMotion * most) return whole;
+  return range(xy(consistent_samples(arc), Eigen::all));
 }
 
 double excess_scatter(const ArcData& arc, Channel channel) {

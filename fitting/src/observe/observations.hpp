@@ -58,6 +58,8 @@ struct ChannelChoice {
 
 /// Reads samples [first, last) of a track. Samples without metres are left out when positions are
 /// wanted. Unknown covariances are replaced by a guess from the scatter about a smooth curve.
+/// @throws TrackError naming the sample and the column for an error of nothing and for a place
+/// farther than 10 km away.
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
                                const ChannelChoice& choice, bool folded);
 
@@ -65,6 +67,10 @@ struct ChannelChoice {
 /// their neighbours on both sides let expect them: a tilt taken for its mirror image, or another
 /// body's outline, stands out by far. All of them if two fifths or more would go.
 [[nodiscard]] std::vector<int> consistent_samples(const ArcData& arc);
+
+/// How far an arc's positions reach along x or y, whichever is more [m]; 0 without any. What lies
+/// far outside and on no path with the others (consistent_samples) is left out of it.
+[[nodiscard]] double extent_m(const ArcData& arc);
 
 /// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their
 /// own sigmas say.

@@ -65,8 +65,7 @@ double tolerance_for(const std::vector<ArcData>& arcs, double share) {
   double least = 1e-5;
   for (const ArcData& arc : arcs) {
     if (arc.observable_index(model::Observable::x_m) < 0) continue;
-    const Eigen::MatrixX2d xy = arc.positions_m();
-    const double extent = (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
+    const double extent = extent_m(arc);
     std::vector<double> weights;
     for (const Reading& reading : arc.readings)
       if (reading.channel == Channel::position) weights.push_back(reading.whitener.norm());

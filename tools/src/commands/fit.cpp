@@ -106,9 +106,9 @@ void tell_odd_units(const std::string& path, const data::Track& track) {
   Eigen::AlignedBox2d box;
   for (const data::TrackSample& sample : track.samples)
     if (sample.has_metres()) box.extend(sample.centre_m);
-  if (!box.isEmpty() && box.diagonal().norm() > kWide_m)
-    note(fmt::format("{}: the path is {:.3g} m across; are x_m, y_m in metres?", path,
-                     box.diagonal().norm()));
+  const double across_m = box.isEmpty() ? 0.0 : box.diagonal().stableNorm();
+  if (across_m > kWide_m)
+    note(fmt::format("{}: the path is {:.3g} m across; are x_m, y_m in metres?", path, across_m));
   const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
                         static_cast<double>(track.samples.size() - 1);
   if (step_s > kSparse_s)
