@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "choose/terms.hpp"
@@ -49,6 +50,30 @@ TEST_F(Contested, ARungThatWasOnlyPromisedIsFittedBesideAnother) {
   EXPECT_TRUE(is_known(rungs, promised.terms));
   EXPECT_LT(promised.bic, rungs[1].bic);
   EXPECT_TRUE(add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs).empty());
+}
+
+// A later promise, beside another rung, had taken the place of a better one.
+TEST_F(Contested, OfTwoPromisesForTheSameTermsTheBetterOneStays) {
+  Rung promised = rung_with(ladder_, {term("air force")});
+  promised.fitted = promised.as_promised = true;
+  Rungs rungs;
+  for (const double bic : {20.0, 30.0, 10.0}) {
+    promised.bic = bic;
+    add_promised(promised, rungs);
+    ASSERT_EQ(rungs.size(), 1u);
+    EXPECT_EQ(rungs[0].bic, std::min(bic, 20.0));
+  }
+}
+
+TEST_F(Contested, APromiseTakesNoPlaceOfARungThatWasFitted) {
+  Rung known = rung_with(ladder_, {term("air force")}), promised = known;
+  known.fitted = promised.fitted = promised.as_promised = true;
+  known.bic = 20.0;
+  promised.bic = 10.0;
+  Rungs rungs{known};
+  add_promised(promised, rungs);
+  ASSERT_EQ(rungs.size(), 1u);
+  EXPECT_FALSE(rungs[0].as_promised);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "choose/softness.hpp"
-#include "start/first_guess.hpp"
+#include "judge/draft.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"

@@ -12,8 +12,8 @@
 #include "choose/rung_words.hpp"
 #include "choose/terms.hpp"
 #include "judge/adequacy.hpp"
+#include "judge/first_guess.hpp"
 #include "problem/problem.hpp"
-#include "start/first_guess.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {

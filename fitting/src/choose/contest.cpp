@@ -4,11 +4,32 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 #include "choose/terms.hpp"
 #include "trochoid/fitting/parallel.hpp"
 
 namespace trochoid::fitting {
+
+namespace {
+
+// Null where no rung with these terms is only promised.
+Rung* promised_before(Rungs& rungs, const Terms& terms) {
+  const auto found = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
+    return rung.terms == terms && rung.as_promised;
+  });
+  return found != rungs.end() ? &*found : nullptr;
+}
+
+// A rung with these terms, not fitted yet: a new one, or in the place of one that was only
+// promised.
+Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
+  Rung* const before = promised_before(rungs, terms);
+  Rung& rung = before != nullptr ? *before : rungs.emplace_back();
+  return rung = rung_with(ladder, terms);
+}
+
+}  // namespace
 
 FitOptions options_for(const Rung& rung, const FitOptions& options) {
   FitOptions own = options;
@@ -58,12 +79,13 @@ bool is_known(const Rungs& rungs, const Terms& terms) {
                      [&](const Rung& rung) { return rung.terms == terms && !rung.as_promised; });
 }
 
-Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
-  const auto promised = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
-    return rung.terms == terms && rung.as_promised;
-  });
-  Rung& rung = promised != rungs.end() ? *promised : rungs.emplace_back();
-  return rung = rung_with(ladder, terms);
+void add_promised(Rung promised, Rungs& rungs) {
+  if (is_known(rungs, promised.terms)) return;
+  Rung* const before = promised_before(rungs, promised.terms);
+  if (before == nullptr)
+    rungs.push_back(std::move(promised));
+  else if (promised.bic < before->bic)
+    *before = std::move(promised);
 }
 
 Nearby nearby(const Promise& promise, const Promise::Change& change) {

@@ -46,9 +46,9 @@ std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const 
 /// Whether there is a rung with these terms that is not only promised.
 [[nodiscard]] bool is_known(const Rungs& rungs, const Terms& terms);
 
-/// A rung with these terms, not fitted yet: a new one, or in the place of one that was only
-/// promised.
-[[nodiscard]] Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs);
+/// Adds a rung that is only promised (take_as_promised), unless one with its terms is known or was
+/// promised beside another rung with as little BIC.
+void add_promised(Rung promised, Rungs& rungs);
 
 /// What a promise lets expect of one of its changes.
 [[nodiscard]] Nearby nearby(const Promise& promise, const Promise::Change& change);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <utility>
 
 #include "choose/terms.hpp"
 
@@ -97,7 +98,9 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
     const double gained = gain(*promise, change(key)) / diluted;
     if (promises_nothing(known, gained, change(key).parameters, by)) {
-      take_as_promised(known, *promise, change(key), diluted, blank_rung(ladder, terms, rungs));
+      Rung rung = rung_with(ladder, terms);
+      take_as_promised(known, *promise, change(key), diluted, rung);
+      add_promised(std::move(rung), rungs);
       continue;
     }
     far += near ? 0 : 1;

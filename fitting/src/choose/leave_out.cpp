@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "choose/terms.hpp"
+#include "judge/first_guess.hpp"
 #include "problem/problem.hpp"
 
 namespace trochoid::fitting {

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "judge/adequacy.hpp"
+#include "judge/first_guess.hpp"
 #include "judge/statistics.hpp"
 #include "observe/observed.hpp"
 #include "problem/linearise.hpp"
 #include "problem/prepare.hpp"
 #include "problem/problem.hpp"
-#include "start/first_guess.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::fitting {

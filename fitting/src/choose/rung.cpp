@@ -9,12 +9,13 @@
 #include <numbers>
 
 #include "choose/softness.hpp"
+#include "judge/first_guess.hpp"
 #include "observe/arcs.hpp"
 #include "observe/observed.hpp"
 #include "observe/timing.hpp"
 #include "problem/prepare.hpp"
 #include "problem/problem.hpp"
-#include "start/first_guess.hpp"
+#include "start/strategy.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "choose/ladder.hpp"
 #include "choose/promise.hpp"
-#include "start/first_guess.hpp"
+#include "judge/draft.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::fitting {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "judge/draft.hpp"
 #include "problem/problem.hpp"
-#include "start/first_guess.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {

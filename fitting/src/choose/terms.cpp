@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "judge/first_guess.hpp"
 #include "problem/problem.hpp"
 
 namespace trochoid::fitting {

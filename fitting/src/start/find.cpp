@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "start/first_guess.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/parallel.hpp"
 

@@ -2,26 +2,14 @@
 #include <array>
 #include <functional>
 #include <map>
-#include <set>
 #include <span>
 #include <string>
 
 #include "observe/observations.hpp"
 #include "trochoid/fitting/fit.hpp"
 
+// Fits of one of several models, between which a comparison chooses; defined beside fit().
 namespace trochoid::fitting {
-
-/// Parameters a first guess for a fit of this scene may name.
-[[nodiscard]] std::set<std::string> parameters_of(const data::Scene& scene);
-
-/// @param whose  the model or models meant, as in "model 'top' has".
-/// @throws InputError naming a parameter of the guess that is not `known`, and those that are.
-void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
-                       const std::set<std::string>& known);
-
-/// The scene as its model takes it: with a start for a friction that is to be found, and with what
-/// priors say for what is given.
-[[nodiscard]] data::Scene completed(const data::Scene& given, const FitOptions& options);
 
 /// Which error bars are wanted: those of the values, or those by the curvature alone where
 /// chi-square has a flatter side that takes several minimisations to follow.
@@ -64,8 +52,5 @@ struct Draft {
 [[nodiscard]] Draft draft_one_of_several(std::span<const data::Track> tracks,
                                          const data::Scene& scene, const FitOptions& options,
                                          FirstPart* first_part = nullptr, const Settled& near = {});
-
-/// Strategy of a sliding model whose given start is that of a body that rolls at first.
-inline constexpr const char* kRollsFirst = "rolls_first";
 
 }  // namespace trochoid::fitting

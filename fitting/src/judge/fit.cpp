@@ -12,6 +12,8 @@
 #include "judge/body_doubt.hpp"
 #include "judge/bootstrap.hpp"
 #include "judge/describe.hpp"
+#include "judge/draft.hpp"
+#include "judge/first_guess.hpp"
 #include "judge/leaning.hpp"
 #include "judge/profile.hpp"
 #include "judge/statistics.hpp"
@@ -19,7 +21,6 @@
 #include "observe/smoothing.hpp"
 #include "problem/prepare.hpp"
 #include "start/find.hpp"
-#include "start/first_guess.hpp"
 #include "start/starter.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/idle_keys.hpp"
@@ -334,15 +335,6 @@ void tell_idle_terms(const data::Scene& scene, data::Fit& fit) {
                       key.substr(kTerm.size()), fit.model));
 }
 
-// A coefficient that is to be found needs no first value.
-void give_friction_a_start(data::Scene& scene) {
-  constexpr double kTypical = 0.2;
-  const std::string& name = scene.model.name;
-  const bool needed = name == "sliding" || name == "puck" ||
-                      (name == "auto" && scene.support.kind == data::SupportKind::flat);
-  if (needed && !scene.model.friction) scene.model.friction = kTypical;
-}
-
 /// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
 /// has its own doubts.
 enum class Word { last, one_of_several };
@@ -461,14 +453,6 @@ data::Fit OneFit::described(Bars bars) {
   return fit;
 }
 
-std::set<std::string> names_in(const model::Predictor& plain, data::Scene scene) {
-  const auto wrapped = observed(plain, scene, 0.0);
-  std::set<std::string> names;
-  for (const model::ParameterInfo& info : (wrapped ? *wrapped : plain).parameters())
-    names.insert(info.name);
-  return names;
-}
-
 void check_given_start(const FitOptions& options, const model::Predictor& predictor,
                        const data::Scene& scene) {
   if (options.start.empty()) return;
@@ -509,27 +493,6 @@ class CompletedFit {
 };
 
 }  // namespace
-
-data::Scene completed(const data::Scene& given, const FitOptions& options) {
-  data::Scene scene = given;
-  if (!options.model.empty()) scene.model.name = options.model;
-  give_friction_a_start(scene);
-  take_priors_for_given(scene);
-  return scene;
-}
-
-std::set<std::string> parameters_of(const data::Scene& given) {
-  const data::Scene scene = completed(given, {});
-  return names_in(*model::make_predictor(scene), scene);
-}
-
-void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
-                       const std::set<std::string>& known) {
-  for (const auto& [name, value] : guess)
-    if (!known.contains(name))
-      throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
-                                   fmt::join(known, ", ")));
-}
 
 data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
               const data::Scene& scene, const FitOptions& options) {

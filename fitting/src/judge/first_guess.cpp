@@ -1,0 +1,53 @@
+#include "judge/first_guess.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "judge/body_doubt.hpp"
+#include "observe/observed.hpp"
+#include "trochoid/data/error.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+// A coefficient that is to be found needs no first value.
+void give_friction_a_start(data::Scene& scene) {
+  constexpr double kTypical = 0.2;
+  const std::string& name = scene.model.name;
+  const bool needed = name == "sliding" || name == "puck" ||
+                      (name == "auto" && scene.support.kind == data::SupportKind::flat);
+  if (needed && !scene.model.friction) scene.model.friction = kTypical;
+}
+
+}  // namespace
+
+std::set<std::string> names_in(const model::Predictor& plain, data::Scene scene) {
+  const auto wrapped = observed(plain, scene, 0.0);
+  std::set<std::string> names;
+  for (const model::ParameterInfo& info : (wrapped ? *wrapped : plain).parameters())
+    names.insert(info.name);
+  return names;
+}
+
+data::Scene completed(const data::Scene& given, const FitOptions& options) {
+  data::Scene scene = given;
+  if (!options.model.empty()) scene.model.name = options.model;
+  give_friction_a_start(scene);
+  take_priors_for_given(scene);
+  return scene;
+}
+
+std::set<std::string> parameters_of(const data::Scene& given) {
+  const data::Scene scene = completed(given, {});
+  return names_in(*model::make_predictor(scene), scene);
+}
+
+void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
+                       const std::set<std::string>& known) {
+  for (const auto& [name, value] : guess)
+    if (!known.contains(name))
+      throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
+                                   fmt::join(known, ", ")));
+}
+
+}  // namespace trochoid::fitting
