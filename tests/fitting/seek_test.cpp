@@ -143,6 +143,22 @@ TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
   }
 }
 
+// A loss known to no tenth of its given value was taken to bend nothing. Of 1492 draws of `study
+// fits --model rolling` the 235 with such a loss had a mean squared distance of 11.6 from the truth
+// for 9 parameters, the others 8.8.
+TEST(Bend, OfALossThatIsHardlySeenIsInTheErrorBars) {
+  constexpr double kSigma = 1.0, kNothing = 1e-6, kGiven = 1.0;
+  const double s = kSigma / std::sqrt(kSamples);
+  Bent bent(10.0);
+  bent.make_the_first_a_loss(kGiven);
+  const Problem problem = problem_of(bent, kSigma, kNothing);
+  const Uncertainty error = uncertainty(problem, Eigen::Vector2d(std::log(kNothing), 0.0));
+  EXPECT_FALSE(error.identifiable[0]);
+  constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
+  const double bend = std::sqrt(3.0) * s * s;
+  EXPECT_NEAR(std::sqrt(error.covariance(1, 1)), bend, 2.0 * kFew * bend);
+}
+
 // A narrow valley: the bend is a hundred and fifty times as long as the valley is wide. It had been
 // believed up to five times.
 TEST(Bend, OfManyTimesTheValleysWidthIsInTheErrorBars) {

@@ -204,6 +204,21 @@ Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const No
   return covariance;
 }
 
+// How far along each direction its surroundings are looked at. A step of more than a parameter's
+// natural size is none to its surroundings, but a loss that hardly acts is small beside what it may
+// be, and what it bends the others by goes with the square of that.
+Eigen::VectorXd farthest_along(const Problem& problem, const Eigen::MatrixXd& axes) {
+  constexpr double kOrdinary = 1.0, kOfLosses = 30.0;
+  std::vector<Eigen::Index> losses, others;
+  for (Eigen::Index i = 0; i < axes.rows(); ++i)
+    (problem.free[i].transform.is_over_decades() ? losses : others).push_back(i);
+  Eigen::VectorXd farthest(axes.cols());
+  for (Eigen::Index k = 0; k < farthest.size(); ++k)
+    farthest[k] =
+        std::min(kOrdinary / axes.col(k)(others).norm(), kOfLosses / axes.col(k)(losses).norm());
+  return farthest;
+}
+
 // Median over the parameters of how many times wider the error bars are than those of independent
 // residuals.
 double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& plain) {
@@ -232,8 +247,13 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const Eigen::VectorXd sd =
       (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
   const Eigen::MatrixXd to_sizes = seen.axes * seen.inverse.asDiagonal();
-  const Valley valley{problem,     u, all, scaled * seen.axes, size.asDiagonal() * seen.axes,
-                      seen.inverse};
+  const Valley valley{problem,
+                      u,
+                      all,
+                      scaled * seen.axes,
+                      size.asDiagonal() * seen.axes,
+                      seen.inverse,
+                      farthest_along(problem, seen.axes)};
   covariance += to_sizes * valley.bends(sd) * to_sizes.transpose();
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();

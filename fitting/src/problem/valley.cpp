@@ -5,12 +5,6 @@
 #include <vector>
 
 namespace trochoid::fitting {
-namespace {
-
-constexpr double kNearlyUnseen = 1.0;  // of a natural size: no small step
-
-}  // namespace
-
 // Residuals of a displaced solution; false where a parameter leaves its range or the model ends.
 bool Valley::displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const {
   Eigen::VectorXd at = u;
@@ -50,7 +44,7 @@ Eigen::MatrixXd Valley::bends(const Eigen::VectorXd& sd) const {
   Eigen::MatrixXd alone = Eigen::MatrixXd::Zero(count, count), single = alone;
   std::vector<Eigen::Index> directions;
   for (Eigen::Index k = 0; k < count; ++k) {
-    if (!(sd[k] > 0.0 && inverse[k] > 0.0 && sd[k] <= kNearlyUnseen)) continue;
+    if (!(sd[k] > 0.0 && inverse[k] > 0.0 && sd[k] <= farthest[k])) continue;
     const auto own = bend(along(k));
     if (!own) continue;
     alone.col(k) = *own;

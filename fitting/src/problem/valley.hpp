@@ -14,6 +14,7 @@ struct Valley {
   Eigen::MatrixXd tangents;  ///< derivatives of the residuals per unit of each direction
   Eigen::MatrixXd values;    ///< of the parameters per unit of each direction
   Eigen::VectorXd inverse;   ///< standard deviation of independent residuals; 0: unseen
+  Eigen::VectorXd farthest;  ///< units along each direction beyond which nothing is looked at
 
   /// Second moment of how far bends take the solution aside, in the standard deviations of
   /// independent residuals along the directions. When the solution is moved to either side by `sd`
