@@ -121,7 +121,7 @@ TEST_F(Readings, APictureLookedAtInAnotherReadingIsDoubtedAsFarAsItLeadsThere) {
 
 // A stretch of a long recording has few frames that are looked at.
 TEST_F(Readings, WhatALongRecordingTellsApartAStretchOfItMayNot) {
-  const ReadingTally stretch{.looked_at = 2.0, .found = 2.0, .gain = -0.4, .square = 2.0};
+  const ReadingTally stretch{.looked_at = 2.0, .found = 2.0, .gain = -0.8, .square = 2.0};
   ReadingTally recording;
   for (int i = 0; i < 50; ++i) recording.add(stretch);
   EXPECT_GT(stretch.may_be(), 1.5 * recording.may_be());
@@ -129,7 +129,7 @@ TEST_F(Readings, WhatALongRecordingTellsApartAStretchOfItMayNot) {
 }
 
 TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {
-  const TwoReadings finder([](int) { return 40.0; });
+  const TwoReadings finder([](int) { return 80.0; });
   EXPECT_LT(doubted_rad(finder), 0.02 * kOff_rad);
 }
 

@@ -125,7 +125,7 @@ class Chain {
       node.weighed = true;
       const Glimpse& glimpse = glimpses_[node.at];
       if (auto again = measured(measure, chosen[k], 0);
-          again && again->pose->evidence > glimpse.seen->pose->evidence)
+          again && again->pose->speaks() > glimpse.seen->pose->speaks())
         node.again = std::move(again);
       node.other = measured(measure, chosen[k], 1);
       if (!node.other) {
@@ -133,7 +133,7 @@ class Chain {
         return;
       }
       const Sighting& own = first_of(node);
-      const double ours = own.pose->evidence, theirs = node.other->pose->evidence;
+      const double ours = own.pose->speaks(), theirs = node.other->pose->speaks();
       const double share = (ours - theirs) / std::max({ours, theirs, 1e-9});
       node.shows = node.wall() * std::clamp(kPerShare * share, -kMost, kMost);
     });

@@ -52,7 +52,7 @@ double shadow_speaks_more(const Sighting& one, const Sighting& other) {
 
 double speaks_more(const Sighting& one, const Sighting& other) {
   constexpr double kLeast = 1e-9;
-  return std::log(std::max(kLeast, one.pose->evidence) / std::max(kLeast, other.pose->evidence)) +
+  return std::log(std::max(kLeast, one.pose->speaks()) / std::max(kLeast, other.pose->speaks())) +
          shadow_speaks_more(one, other);
 }
 

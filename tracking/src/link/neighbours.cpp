@@ -323,13 +323,11 @@ class Mending {
     return 1.0 / (1.0 + off * off);
   }
 
-  /// How much more speaks for one sighting than for another. From where the body is expected a
-  /// close look finds no longer outline of another thing: how plainly it is seen need not count.
+  /// How many times more speaks for one sighting than for another. From where the body is expected
+  /// a close look finds no longer outline of another thing: how plainly it is seen need not count.
   [[nodiscard]] double speaks_for(const Sighting& one, const Sighting& other) const {
-    const double of_worth = worth(one) / worth(other);
-    const double of_edges = one.pose->evidence / other.pose->evidence;
-    return std::exp(shadow_speaks_more(one, other)) *
-           (closely_ ? std::max(of_worth, of_edges) : of_worth);
+    const double plainer = one.accepted / other.accepted;
+    return std::exp(speaks_more(one, other)) * (closely_ ? std::max(plainer, 1.0) : plainer);
   }
 
   /// Looking right there cannot lead astray: less of a contradiction will do for that.

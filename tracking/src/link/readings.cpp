@@ -452,7 +452,7 @@ void ReadingTally::add(const ReadingTally& other) {
 double ReadingTally::may_be() const {
   // Between recordings, and between pictures. The spread over what is hardly likely is no error
   // bar: it would be as wide as nothing that was seen.
-  constexpr double kShared = 0.12, kOfOne = 0.1, kHardly = 0.02;
+  constexpr double kShared = 0.2, kOfOne = 0.2, kHardly = 0.02;
   if (found == 0.0) return 0.0;
   const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / found);
   const double likely =

@@ -58,8 +58,11 @@ struct Fitted {
   double blur_px = kUsualBlurPx;
   double score = 0.0;     ///< outline_score of the pose
   double evidence = 0.0;  ///< evidence_of the fit
+  double evenness = 1.0;  ///< evenness_of the fit
   /// Covariance of a step by which other attitudes explain the picture about as well; or empty.
   Eigen::MatrixXd attitudes{};
+
+  [[nodiscard]] double speaks() const { return evidence * evenness; }
 };
 
 // The last stage, from a pose that is right to about the blur of the picture. Too sharp or too wide
@@ -81,12 +84,13 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
   }
   out.score = outline_score(out.refined);
   out.evidence = evidence_of(out.refined);
+  out.evenness = evenness_of(out.refined);
   return out;
 }
 
 std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
   if (!a || !b) return a ? a : b;
-  return a->evidence * a->score >= b->evidence * b->score ? a : b;
+  return a->speaks() >= b->speaks() ? a : b;
 }
 
 // @param near the scenery blurred by kNearBlurPx.
@@ -147,7 +151,7 @@ std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted
   std::vector<Fitted> others;
   const auto mirror = mirrored(scenery.camera, scenery.motion, pose);
   if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px)) {
-    if (cosine > std::cos(kNearly_rad) && other->evidence > kNoticeably * fitted->evidence)
+    if (cosine > std::cos(kNearly_rad) && other->speaks() > kNoticeably * fitted->speaks())
       std::swap(*fitted, *other);
     others.push_back(std::move(*other));
   }
@@ -199,8 +203,8 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
     if (!other) continue;
     const bool right_size =
         too_small && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx;
-    if (other->evidence > (right_size ? kAsGood : kBetter) * fitted->evidence &&
-        (!best || other->evidence > best->evidence))
+    if (other->speaks() > (right_size ? kAsGood : kBetter) * fitted->speaks() &&
+        (!best || other->speaks() > best->speaks()))
       best = std::move(other);
   }
   return best ? std::move(best) : std::move(fitted);
@@ -305,6 +309,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.colour_information = r.solution.colour_information;
   m.accepted = fitted.score;
   m.evidence = fitted.evidence;
+  m.evenness = fitted.evenness;
   m.larger_px = larger_px(r);
   ShadingMemory shading;
   for (size_t i = 0; i < r.equations.size(); ++i) {
@@ -428,7 +433,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
       best->score < kDoubtful) {
     const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);
     auto turned = fit_from(scenery, scenery.blurred(kNearBlurPx), other);
-    if (turned && turned->evidence > kClearlyBetter * best->evidence) best = std::move(turned);
+    if (turned && turned->speaks() > kClearlyBetter * best->speaks()) best = std::move(turned);
   }
   if (!best) return std::nullopt;
   find_uncertainty(scenery, *best);

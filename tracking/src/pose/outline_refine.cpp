@@ -261,6 +261,13 @@ double certainty(const ProfileEdge& edge, double off_px, double tolerance_px) {
   return std::clamp((edge.gain - misfit) / kCertain, 0.0, 1.0);
 }
 
+// So much of the outline speaks for a fit by this edge of it.
+double certain_px(const Refined& refined, size_t i) {
+  constexpr double kTolerancePx = 0.1;
+  const EdgeEquation& e = refined.equations[i];
+  return e.arc_px * certainty(refined.edges[i], e.residual_px, kTolerancePx);
+}
+
 void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquation& equation,
           Refined& out) {
   out.samples.push_back(sample);
@@ -593,7 +600,6 @@ double larger_px(const Refined& refined) {
 }
 
 double evidence_of(const Refined& refined) {
-  constexpr double kTolerancePx = 0.1;
   // A residual of this size halves what an edge says, however clear it is, if it claims to be
   // exact.
   constexpr double kHalvesPx = 0.3;
@@ -602,12 +608,26 @@ double evidence_of(const Refined& refined) {
     const EdgeEquation& e = refined.equations[i];
     const double off2 = e.residual_px * e.residual_px /
                         (kHalvesPx * kHalvesPx + e.variance_px2 + e.model_px * e.model_px);
-    evidence += e.arc_px * certainty(refined.edges[i], e.residual_px, kTolerancePx) / (1.0 + off2);
+    evidence += certain_px(refined, i) / (1.0 + off2);
   }
   // Told right from wrong readings of 20 recordings by logistic regression, half a pixel of size is
   // worth about a quarter of the edges.
   constexpr double kPerPx = 0.55, kMostPx = 0.45;
   return evidence * std::exp(-kPerPx * std::min(kMostPx, std::abs(larger_px(refined))));
+}
+
+double evenness_of(const Refined& refined) {
+  // By logistic regression on 4983 pairs of a right and a wrong pose in one picture, from 61 of the
+  // independent clips.
+  constexpr double kPerPx2 = 5.0, kMostPx2 = 1.0;
+  double sum_px3 = 0.0, luma_px = 0.0;
+  for (size_t i = 0; i < refined.edges.size(); ++i) {
+    if (refined.equations[i].colour) continue;
+    const double certain = certain_px(refined, i);
+    sum_px3 += certain * std::min(kMostPx2, refined.edges[i].shading_variance_px2);
+    luma_px += certain;
+  }
+  return luma_px > 0.0 ? std::exp(-kPerPx2 * sum_px3 / luma_px) : 1.0;
 }
 
 }  // namespace trochoid::tracking

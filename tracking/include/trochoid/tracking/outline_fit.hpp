@@ -59,8 +59,12 @@ struct PoseMeasurement {
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
   double accepted = 0.0;  ///< fraction of the predicted outline with an accepted edge
   /// Sum over the outline [px] of how much better its edges explain the picture than none would,
-  /// less their misfit: compares fits to one picture.
+  /// less their misfit: how much of the body is seen.
   double evidence = 0.0;
+  /// 0..1: how little of where its edges lie hangs on how the light changes beside them.
+  double evenness = 1.0;
+  /// What speaks for this pose rather than for another one in the same picture.
+  [[nodiscard]] double speaks() const { return evidence * evenness; }
   double blur_px = 0.0;  ///< of the edges of this picture, for the next one
   /// How far what colours show lies off what luma does, either coordinate by itself, and the
   /// inverse of its variance [px^-2]; 0 where they do not tell.
