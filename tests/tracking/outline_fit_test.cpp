@@ -841,6 +841,9 @@ TEST(OutlineFitter, ABodyThatIsSaidToBeThereIsNotSoughtElsewhere) {
   ASSERT_TRUE(sought);
   EXPECT_LT((sought->centre_px - scene.centre).norm(), 0.3);
   EXPECT_TRUE(!there || (there->centre_px - scene.centre).norm() > 0.3 * kOff_px);
+  const auto near = scene.measure(0.2, true);
+  ASSERT_TRUE(near);
+  EXPECT_LT((near->centre_px - scene.centre).norm(), 0.3);
 }
 
 // Where the light falls off beside the edges, by another slope at each place, it explains wrong

@@ -466,13 +466,13 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
   const std::string what = what_an_end_may_be(problem, end);
   if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
     fit.warnings.push_back(fmt::format(
-        "{}, and count for little, as if the tracker had erred; if it had not, {}", where, what));
+        "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
     return;
   }
   fit.verdict = "doubtful";
   fit.verdict_words = fmt::format(
       "the model follows the track, but does not explain its {}: {}, more than a "
-      "tracker misses in a row, and count for little: {}",
+      "tracker misses in a row, and count for less: {}",
       end.beginning ? "beginning" : "end", where, what);
 }
 
@@ -480,8 +480,9 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
 
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit) {
-  doubt_if_drifting(problem, error, fit);
+  // A body that slips at first makes the halves differ, too: that it slips says more.
   doubt_if_an_end_is_missed(problem, u, error, fit);
+  doubt_if_drifting(problem, error, fit);
 }
 
 bool explains(const Problem& problem, const Solution& solution) {

@@ -300,8 +300,8 @@ double extent_m(const ArcData& arc) {
   const auto range = [](const Eigen::MatrixX2d& xy) {
     return (xy.colwise().maxCoeff() - xy.colwise().minCoeff()).maxCoeff();
   };
+  if (arc.t_s.empty() || arc.observable_index(Observable::x_m) < 0) return 0.0;
   const Eigen::MatrixX2d xy = arc.positions_m();
-  if (xy.rows() == 0) return 0.0;
   double most = 0.0;
   for (const int axis : {0, 1}) {
     const std::vector<double> along(xy.col(axis).begin(), xy.col(axis).end());

@@ -69,7 +69,8 @@ struct ChannelChoice {
 [[nodiscard]] std::vector<int> consistent_samples(const ArcData& arc);
 
 /// How far an arc's positions reach along x or y, whichever is more [m]; 0 without any. What lies
-/// far outside and on no path with the others (consistent_samples) is left out of it.
+/// far outside and on no path with the others (consistent_samples) is left out of it, unless that
+/// is a tenth of the samples or more.
 [[nodiscard]] double extent_m(const ArcData& arc);
 
 /// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their

@@ -5,6 +5,7 @@
 #include <vector>
 
 namespace trochoid::fitting {
+
 // Residuals of a displaced solution; false where a parameter leaves its range or the model ends.
 bool Valley::displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) const {
   Eigen::VectorXd at = u;

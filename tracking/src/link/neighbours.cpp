@@ -96,8 +96,8 @@ struct Neighbours {
   }
 };
 
-/// What speaks for a fit. A wrong pose may have the longer outline and so the more evidence: how
-/// much of it is plainly seen counts as well.
+/// How plainly a body is seen in its pose. A wrong pose may have the longer outline and so the more
+/// evidence: how much of it is plainly seen counts as well.
 double worth(const Sighting& seen) {
   return seen.pose->evidence * seen.accepted;
 }
@@ -326,7 +326,8 @@ class Mending {
   /// How many times more speaks for one sighting than for another. From where the body is expected
   /// a close look finds no longer outline of another thing: how plainly it is seen need not count.
   [[nodiscard]] double speaks_for(const Sighting& one, const Sighting& other) const {
-    const double plainer = one.accepted / other.accepted;
+    constexpr double kLeast = 1e-9;
+    const double plainer = std::max(kLeast, one.accepted) / std::max(kLeast, other.accepted);
     return std::exp(speaks_more(one, other)) * (closely_ ? std::max(plainer, 1.0) : plainer);
   }
 

@@ -8,7 +8,7 @@
 
 namespace trochoid::data {
 
-/// A measured angle with its standard deviation [rad].
+/// A measured angle with its standard deviation [rad], which a fit wants larger than 0.
 struct MeasuredAngle {
   double value_rad = 0.0;
   double sigma_rad = 0.0;
