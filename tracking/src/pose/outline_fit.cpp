@@ -114,6 +114,7 @@ double steepest_alike(const data::Body& body) {
 // they are apart.
 void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
   // From start to start the evidence of one attitude differs by up to a tenth.
+  // Evenness differs by more, and would leave out attitudes that the edges alone do not tell apart.
   constexpr double kAsGood = 0.9;
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(motion.count(), motion.count());
   double count = 1.0;
