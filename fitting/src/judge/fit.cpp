@@ -28,15 +28,19 @@
 namespace trochoid::fitting {
 namespace {
 
-// The search leaves aside what stands out; the polish weighs every sample by its residual. Writes
-// the values found into problem.base. Half a turn off, a direction lies across the pole, where no
-// step leads back: where the path has to be looked for, angles are compared each by itself.
+// Until weights are known, what stands out is left aside: a single glitch far away would lead every
+// step astray.
+Problem without_outliers(Problem problem) {
+  for (ArcData& arc : problem.arcs) arc = arc.keep(consistent_samples(arc));
+  return problem;
+}
+
+// The polish weighs every sample by its residual, the search does not. Writes the values found into
+// problem.base. Half a turn off, a direction lies across the pole, where no step leads back: where
+// the path has to be looked for, angles are compared each by itself.
 Found search_without_outliers(Problem& problem, const Quest& quest) {
-  Problem search = problem;
-  for (ArcData& arc : search.arcs) {
-    arc = arc.keep(consistent_samples(arc));
-    arc.angles_apart = quest.options->strategy != "single";
-  }
+  Problem search = without_outliers(problem);
+  for (ArcData& arc : search.arcs) arc.angles_apart = quest.options->strategy != "single";
   Found found = find(search, quest);
   problem.base = search.base;
   return found;
@@ -156,7 +160,8 @@ Solution recall_vanished(Problem& problem, Solution solution) {
 
 // From where the search ended to the minimum; the values are then in problem.base as well.
 Solution polish(Problem& problem, Solution solution, const FitOptions& options, data::Fit& fit) {
-  if (hold_vanished(problem, solution.u)) solution = seek(problem, problem.start());
+  if (hold_vanished(problem, solution.u))
+    solution = seek(without_outliers(problem), problem.start());
   solution = settle_weights(problem, std::move(solution), options.tolerance);
   solution = recall_vanished(problem, std::move(solution));
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);
