@@ -93,6 +93,19 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
   EXPECT_LT(friction->sigma, 0.01 * kFriction);
 }
 
+// "The last positions of track 1" were those before an impact in its middle.
+TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
+  Throw thrown(1);
+  thrown.slide({0.0, 0.0}, 0.2).slide({1.0, 0.3}, 0.3).slide({-0.2, 0.5}, 0.6);
+  data::Track track = thrown.track();
+  constexpr double kOff = 5.0;  // sigma; of more of them, or farther ones, another stretch is made
+  for (std::size_t i = 114; i < 117; ++i) track.samples[i].centre_m.y() += kOff * kSigma_m;
+  const data::Fit fit = fitting::fit(std::span(&track, 1), puck_scene());
+  ASSERT_EQ(fit.arcs.size(), 2u);
+  EXPECT_THAT(fit.warnings,
+              testing::Contains(testing::HasSubstr("last positions of the stretch from 0.2")));
+}
+
 TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
   Throw thrown(5);
   thrown.slide({1.0, 0.3}, 0.3).slide({-0.2, 0.6}, 0.2).slide({0.7, -0.4}, 0.3);

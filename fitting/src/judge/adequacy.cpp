@@ -444,6 +444,19 @@ std::string what_an_end_may_be(const Problem& problem, const MissedEnd& end) {
       problem.arcs[end.arc].start_s);
 }
 
+// Which of several arcs: a puck's track is divided into stretches.
+std::string which_of_several(const Problem& problem, const ArcData& arc) {
+  const auto& arcs = problem.arcs;
+  const auto of_same_track = std::count_if(
+      arcs.begin(), arcs.end(), [&](const ArcData& other) { return other.track == arc.track; });
+  std::string words;
+  if (of_same_track > 1)
+    words +=
+        fmt::format(" of the stretch from {:.4g} to {:.4g} s", arc.t_s.front(), arc.t_s.back());
+  if (of_same_track < std::ssize(arcs)) words += fmt::format(" of track {}", arc.track + 1);
+  return words;
+}
+
 // Motion that the model lacks where a record begins or ends costs it little: what stands out is
 // given up, and the rest may be explained. A tracker that errs for a few frames does the same, so
 // of few it is told only.
@@ -460,8 +473,7 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
   const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
   const std::string where = fmt::format(
       "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
-      end.standing_out, end.of, end.beginning ? "first" : "last",
-      problem.arcs.size() > 1 ? fmt::format(" of track {}", arc.track + 1) : "",
+      end.standing_out, end.of, end.beginning ? "first" : "last", which_of_several(problem, arc),
       end.beginning ? "up to" : "from", end.until_s);
   const std::string what = what_an_end_may_be(problem, end);
   if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
@@ -471,9 +483,9 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
   }
   fit.verdict = "doubtful";
   fit.verdict_words = fmt::format(
-      "the model follows the track, but does not explain its {}: {}, more than a "
+      "the model follows the track, but does not explain {} {}: {}, more than a "
       "tracker misses in a row, and count for less: {}",
-      end.beginning ? "beginning" : "end", where, what);
+      problem.arcs.size() > 1 ? "one" : "its", end.beginning ? "beginning" : "end", where, what);
 }
 
 }  // namespace
