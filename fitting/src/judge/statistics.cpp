@@ -211,7 +211,7 @@ Eigen::VectorXd farthest_along(const Problem& problem, const Eigen::MatrixXd& ax
   constexpr double kOrdinary = 1.0, kOfLosses = 30.0;
   std::vector<Eigen::Index> losses, others;
   for (Eigen::Index i = 0; i < axes.rows(); ++i)
-    (problem.free[i].transform.is_over_decades() ? losses : others).push_back(i);
+    (is_loss(problem, problem.free[i]) ? losses : others).push_back(i);
   Eigen::VectorXd farthest(axes.cols());
   for (Eigen::Index k = 0; k < farthest.size(); ++k)
     farthest[k] =
