@@ -136,6 +136,21 @@ INSTANTIATE_TEST_SUITE_P(Independent, GlitchOf,
                                          Glitch{"FiveInARow", {60, 61, 62, 63, 64}, 9999.0}),
                          [](const auto& glitch) { return glitch.param.name; });
 
+// Far away in the middle it had taken all losses with it, pivoting friction a hundredfold.
+TEST(Independent, AGlitchIsNoReasonForOtherLosses) {
+  data::Track track = track_of("unneeded_loss");
+  track.samples[track.samples.size() / 2].centre_m.x() = 1000.0;
+  const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
+  const data::Fit clean = comparison_of("unneeded_loss").fit;
+  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  constexpr double kOfASigma = 0.3;  // one sample of 124
+  for (const char* name : {"pivoting_friction_m", "air_linear_N_m_s[1]", "w3_rad_s"}) {
+    const data::FitParameter *found = fit.find(name), *known = clean.find(name);
+    ASSERT_NE(found, nullptr) << name;
+    EXPECT_NEAR(found->value, known->value, kOfASigma * known->sigma) << name;
+  }
+}
+
 // Seen by its positions alone it rolls all but a twelfth of a second, and a body that only rolls
 // was given for it: good, the first samples given up as the tracker's errors, and the spin when the
 // record begins 2000 error bars off.
