@@ -130,6 +130,28 @@ template <class S>
   return {in.phi, in.theta, in.psi, in.w1, in.w2, in.w3, in.x, in.y, un, ut};
 }
 
+/// The same of a body that rolls: its contact point rests, or creeps under friction that sets in
+/// softly (S22).
+template <class Roll, class S>
+[[nodiscard]] State<S, 10> rolling_state(const RimModel& model, RimInput<S> input) {
+  State<S, 10> y = rim_state(model.body, input);
+  y[Rim::un] = y[Rim::ut] = S(0.0);
+  if (!(value_of(input.eps_v) > 0.0)) return y;
+  Roll roll;
+  place(model, input, roll);
+  const auto q = roll.motion(rolling_part(y));
+  const ContactForce<S> needed = roll.contact_force(q, roll.acceleration(q));
+  const S most = input.friction * needed.normal;
+  const S spare = most * most - needed.along_n * needed.along_n - needed.along_mh * needed.along_mh;
+  constexpr double kLeastSpare = 0.01;  // beyond, nothing holds the body: it begins to slide
+  const double least = kLeastSpare * value_of(most) * value_of(most);
+  if (!(value_of(needed.normal) > 0.0) || !(least > 0.0)) return y;
+  const S creep = -input.eps_v / sqrt(value_of(spare) > least ? spare : S(least));
+  y[Rim::un] = creep * needed.along_n;
+  y[Rim::ut] = creep * needed.along_mh;
+  return y;
+}
+
 /// Runs one floor with one list of terms and keeps the path.
 template <class S, template <class> class Friction, template <class> class... Terms>
 [[nodiscard]] RimPath<S> rim_path(const RimModel& model, const RimInput<S>& input,
@@ -142,7 +164,10 @@ template <class S, template <class> class Friction, template <class> class... Te
   RimRun<S, Friction, Terms...> run(model.body, make_losses<Losses<S, Terms...>>(input.losses),
                                     friction, friction_limit, options, t_s);
   int reached = 0;
-  path.end = run.run(rim_state(model.body, input), regime, [&](auto& stepper, int first, int last) {
+  State<S, 10> start = rim_state(model.body, input);
+  if constexpr (decltype(run)::kCoulomb)
+    if (options.rolls_at_first) start = rolling_state<Rolling<S, Terms...>>(model, input);
+  path.end = run.run(start, regime, [&](auto& stepper, int first, int last) {
     for (int n = first; n < last; ++n) {
       const double u = stepper.fraction(t_s[static_cast<std::size_t>(n)]);
       for (int c = 0; c < 5; ++c) {

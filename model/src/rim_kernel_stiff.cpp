@@ -8,6 +8,9 @@ namespace {
 template <class S>
 using Stiff = Sliding<S, Coulomb, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
                       PivotingFriction, ContourFriction>;
+template <class S>
+using Held = Rolling<S, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                     PivotingFriction, ContourFriction>;
 constexpr int kStates = Stiff<double>::kStates;
 
 template <class S, class From>
@@ -102,7 +105,8 @@ RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimR
   constexpr double kAsGood = 1e-3, kReasonable = 1e-11;
   RimRunOptions options = given;
   options.tolerance = std::min(given.tolerance, std::max(kAsGood * given.tolerance, kReasonable));
-  const State<S, kStates> start = rim_state(model.body, input);
+  const State<S, kStates> start =
+      options.rolls_at_first ? rolling_state<Held<S>>(model, input) : rim_state(model.body, input);
   Ode ode = rim_ode(stiff_system<double>(model, input), stiff_system<Dual<16>>(model, input));
   if constexpr (std::is_same_v<S, Dual8>) ode.sensitivities = sensitivities_of(model, input, start);
   StepControl<kStates> control = rim_control<kStates>(model.body, options);

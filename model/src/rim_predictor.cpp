@@ -304,6 +304,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   constexpr double kFinest = 1e-7;
   call.options.stick_factor = std::max(1.0, request.tolerance / kFinest);
   call.options.skips_onset = true;
+  call.options.rolls_at_first = request.rolls_at_first;
 
   Prediction out = unknown_prediction(request);
   if (request.want_end_state) out.end_state_jacobian.resize(initial_count(), out.jacobian.cols());

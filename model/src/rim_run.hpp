@@ -25,6 +25,7 @@ struct RimRunOptions {
   /// A slip begins with what it comes to a little later, by a series (S21): a fraction of the
   /// steps, and a force a per cent beyond friction's in between.
   bool skips_onset = false;
+  bool rolls_at_first = false;  ///< as PredictRequest::rolls_at_first
 };
 
 /// How a run went; `y` is the state at `end_s`, of `regime` (rolling: the last two are 0). Where

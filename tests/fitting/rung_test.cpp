@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <random>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
 
@@ -654,6 +656,67 @@ TEST_F(SlidesLater, SlipsAtFirstWhereThatIsSeen) {
   EXPECT_FALSE(rung.rolls_at_first);
   const data::FitParameter* speed = rung.fit.find("vx_m_s");
   EXPECT_NEAR(speed->value, start_.at("vx_m_s") + kSlip_m_s, 4.0 * speed->sigma);
+}
+
+// Rows of s08, between two skids and on: a disc that creeps at first, as softly as friction sets
+// in.
+data::Track creeping_first(const data::Table& reference) {
+  constexpr Eigen::Index kFrom = 31, kTo = 79;
+  constexpr double kSigma_m = 2e-5, kSigma_rad = 2e-3;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (Eigen::Index i = kFrom; i < kTo; ++i) {
+    const auto at = [&](const char* name, double sigma) {
+      return reference.column(name)[i] + sigma * normal(generator);
+    };
+    data::TrackSample& sample = track.samples.emplace_back();
+    sample.t_s = reference.column("t")[i];
+    sample.centre_m = {at("x", kSigma_m), at("y", kSigma_m)};
+    sample.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix2d::Identity();
+    sample.theta = data::MeasuredAngle{at("theta", kSigma_rad), kSigma_rad};
+    sample.phi = data::MeasuredAngle{at("phi", kSigma_rad), kSigma_rad};
+  }
+  return track;
+}
+
+// A slip that friction ends within a millisecond is not seen, and what goes with it was uncertain
+// by whole turns a second.
+TEST(SlidingRung, OfABodyThatCreepsAtFirstHasTheRatesItIsSeenWith) {
+  const std::string file = TROCHOID_SOURCE_DIR "/data/reference/s08_slide_disc";
+  const data::Table reference = data::read_table(file + ".csv");
+  const data::Track track = creeping_first(reference);
+  Rung rung;
+  rung.scene = data::read_reference_case(file + ".json").scene;
+  rung.scene.start = {};
+  rung.scene.fit.free.emplace_back("slip_regularisation_m_s");
+  std::map<std::string, double> truth;
+  for (const auto& [name, column] : {std::pair{"theta_rad", "theta"},
+                                     {"phi_rad", "phi"},
+                                     {"w1_rad_s", "w1"},
+                                     {"w2_rad_s", "w2"},
+                                     {"w3_rad_s", "w3"},
+                                     {"x_m", "x"},
+                                     {"y_m", "y"},
+                                     {"vx_m_s", "vx"},
+                                     {"vy_m_s", "vy"}})
+    truth[name] = reference.column(column)[31];
+  Rung below = rung;
+  fit_from_values(std::span(&track, 1), truth, {}, below);
+  ASSERT_TRUE(below.fit.converged) << below.reason;
+  fit_rung(std::span(&track, 1), &below, nullptr, {}, rung);
+  ASSERT_TRUE(rung.fit.converged) << rung.reason;
+  EXPECT_TRUE(rung.rolls_at_first);
+  EXPECT_EQ(rung.fit.find("vx_m_s")->status, data::ParameterStatus::derived);
+  for (const auto& [name, value] : truth) {
+    const data::FitParameter* found = rung.fit.find(name);
+    ASSERT_NE(found, nullptr) << name;
+    const double off = std::remainder(found->value - value, 2.0 * std::numbers::pi);
+    EXPECT_LT(std::abs(off), 4.0 * found->sigma) << name;
+    if (name.ends_with("_s")) {
+      EXPECT_LT(found->sigma, 0.3 * below.fit.find(name)->sigma) << name;
+    }
+  }
 }
 
 // Integrated more coarsely its path has its minimum elsewhere: the way there and back took most of

@@ -327,5 +327,46 @@ TEST(RimPredictor, AsksForTheMassOnlyWhenATermNeedsIt) {
   EXPECT_THROW((void)make_predictor(scene), InputError);
 }
 
+Eigen::VectorXd start_of(const Predictor& predictor, const Eigen::VectorXd& values) {
+  constexpr double kStart_s[] = {0.0};
+  PredictRequest request;
+  request.t_s = kStart_s;
+  request.want_end_state = request.rolls_at_first = true;
+  return predictor.predict(values, request).end_state;
+}
+
+// s08 creeps, under friction that sets in softly, once its skid has ended.
+TEST(ABodyThatRollsAtFirst, CreepsAsFastAsTheReferenceDoesAtTheSameAttitudeAndRates) {
+  const data::Table table = data::read_table(reference_path("s08_slide_disc", ".csv"));
+  const auto predictor = make_predictor(reference_scene("s08_slide_disc"));
+  Eigen::VectorXd values = defaults(*predictor);
+  const auto set = [&](const char* name, double value) {
+    values[predictor->index_of(name)] = value;
+  };
+  const int vx = predictor->index_of("vx_m_s"), vy = predictor->index_of("vy_m_s");
+  constexpr double kCreeps_m_s = 2e-3;  // twice eps_v; a faster slip follows late
+  constexpr double kOfSlip = 0.06;
+  int rows = 0;
+  for (Eigen::Index n = 1; n < table.column("t").size(); ++n) {
+    const auto at = [&](const char* name) { return table.column(name)[n]; };
+    const double slip_m_s = at("slip");
+    if (slip_m_s > kCreeps_m_s || table.column("slip")[n - 1] > kCreeps_m_s) continue;
+    for (const auto& [name, column] : {std::pair{"theta_rad", "theta"},
+                                       {"phi_rad", "phi"},
+                                       {"w1_rad_s", "w1"},
+                                       {"w2_rad_s", "w2"},
+                                       {"w3_rad_s", "w3"},
+                                       {"x_m", "x"},
+                                       {"y_m", "y"}})
+      set(name, at(column));
+    set("vx_m_s", 1e3), set("vy_m_s", -1e3);  // do not count
+    const Eigen::VectorXd start = start_of(*predictor, values);
+    EXPECT_NEAR(start[vx], at("vx"), kOfSlip * slip_m_s) << "row " << n;
+    EXPECT_NEAR(start[vy], at("vy"), kOfSlip * slip_m_s) << "row " << n;
+    ++rows;
+  }
+  EXPECT_GT(rows, 15);
+}
+
 }  // namespace
 }  // namespace trochoid::model

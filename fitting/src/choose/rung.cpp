@@ -297,27 +297,47 @@ namespace {
 // Whether a slip at the start ends within so few samples that the body may as well have rolled.
 bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung) {
   constexpr double kFewSamples = 8.0;
-  if (!rung.fitted || !rung.fit.converged || rung.fit.arcs.size() != 1 || !softness_is_open(rung) ||
-      rung.rolls_at_first)
+  if (!rung.fitted || !rung.fit.converged || rung.fit.arcs.size() != 1 ||
+      rung.scene.model.name != "sliding" || rung.rolls_at_first)
     return false;
   Values at = values_of(rung.fit);
-  const RollsAtFirst rim{rung.scene.body->radius_m, rung.scene.body->half_thickness_m()};
-  const Eigen::Vector2d rolls = rim.velocity_m_s(at["theta_rad"], at["phi_rad"], at["w1_rad_s"],
-                                                 at["w2_rad_s"], at["w3_rad_s"]);
-  const double slip_m_s = (Eigen::Vector2d(at["vx_m_s"], at["vy_m_s"]) - rolls).norm();
+  const auto predictor = model::make_predictor(rung.scene);
+  const auto& parameters = predictor->parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    values[static_cast<Eigen::Index>(i)] = at[parameters[i].name];
+  const Eigen::Vector2d slips =
+      Eigen::Vector2d(at["vx_m_s"], at["vy_m_s"]) - rolling_velocity(*predictor, values).m_s;
+  const double slip_m_s = slips.norm();
   const double brake_m_s2 = at["friction"] * rung.scene.model.gravity_m_s2;
   return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
 }
 
-// A slip at the start is left out unless there is strong evidence for it.
+void fit_from(std::span<const data::Track> tracks, const Values& values,
+              const std::string& strategy, const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  own.start = values;
+  own.strategy = strategy;
+  own.rolls_at_first = rung.rolls_at_first;
+  try_rung(rung, [&] {
+    take(draft_one_of_several(tracks, rung.scene, own), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+// A slip at the start is left out unless there is strong evidence for it. Where its end is all that
+// is known of the first samples, they have to be followed anew.
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
-  Rung rolls = rung;
-  rolls.rolls_at_first = true;
-  rolls.fitted = false;
-  rolls.fit = {}, rolls.full = {};
-  fit_from_values(tracks, values_of(rung.fit), options, rolls);
-  if (rolls.fitted && rolls.fit.converged && rolls.bic < rung.bic + kStrong)
-    rung = std::move(rolls);
+  for (const char* strategy : {"single", "growing"}) {
+    Rung rolls = rung;
+    rolls.rolls_at_first = true;
+    rolls.fitted = false;
+    rolls.fit = {}, rolls.full = {};
+    fit_from(tracks, values_of(rung.fit), strategy, options, rolls);
+    if (!rolls.fitted || !rolls.fit.converged) continue;
+    if (rolls.bic < rung.bic + kStrong) rung = std::move(rolls);
+    return;
+  }
 }
 
 }  // namespace
@@ -413,14 +433,7 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung) {
-  FitOptions own = options;
-  own.start = values;
-  own.strategy = "single";
-  own.rolls_at_first = rung.rolls_at_first;
-  try_rung(rung, [&] {
-    take(draft_one_of_several(tracks, rung.scene, own), rung);
-    rung.fitted = usable(rung.fit);
-  });
+  fit_from(tracks, values, "single", options, rung);
 }
 
 void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,

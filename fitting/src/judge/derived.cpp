@@ -142,18 +142,12 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
 void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
                           const Eigen::MatrixXd& covariance, data::Fit& fit) {
   if (!problem.rolls_at_first) return;
-  const Propagation propagate(problem, u, covariance);
-  const auto index = [&](const char* name) { return problem.predictor->index_of(name); };
-  const int theta = index("theta_rad"), phi = index("phi_rad"), w1 = index("w1_rad_s"),
-            w2 = index("w2_rad_s"), w3 = index("w3_rad_s");
-  const RollsAtFirst rim = *problem.rolls_at_first;
+  std::vector<int> free;
+  for (const FreeParameter& parameter : problem.free) free.push_back(parameter.index);
+  const RollingVelocity v = rolling_velocity(*problem.predictor, problem.values(0, u), free);
+  const Eigen::Matrix2d variance = v.by * covariance * v.by.transpose();
   for (const auto& [name, axis] : {std::pair{"vx_m_s", 0}, {"vy_m_s", 1}})
-    add(fit, name, "m/s",
-        propagate(
-            [=, axis = axis](const Eigen::VectorXd& v, const auto&) {
-              return rim.velocity_m_s(v[theta], v[phi], v[w1], v[w2], v[w3])[axis];
-            },
-            {}),
+    add(fit, name, "m/s", {true, v.m_s[axis], std::sqrt(variance(axis, axis))},
         "velocity of the centre; the body rolls at first, so it follows from the spin");
 }
 

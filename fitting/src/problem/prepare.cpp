@@ -160,15 +160,6 @@ bool says_something_of(const data::FitSettings& fit, const std::string& name) {
          std::find(fit.free.begin(), fit.free.end(), name) != fit.free.end();
 }
 
-// Friction that sets in softly lets a body slip a little however it moves: to roll is no state of
-// its own there, and derivatives by the attitude do not hold what the velocity changes by.
-bool sets_in_softly(const data::Scene& scene, const Problem& problem) {
-  const int softness = problem.predictor->index_of(kSlipScale);
-  return scene.model.slip_regularisation_m_s.value_or(0.0) > 0.0 ||
-         std::any_of(problem.free.begin(), problem.free.end(),
-                     [&](const FreeParameter& p) { return p.index == softness; });
-}
-
 // The velocity of a body that is known to roll when its record begins follows from its spin, unless
 // the scene says otherwise.
 void tie_to_spin(const data::Scene& scene, Problem& problem) {
@@ -176,11 +167,10 @@ void tie_to_spin(const data::Scene& scene, Problem& problem) {
     const std::string& name = problem.predictor->parameters()[index].name;
     return name == "vx_m_s" || name == "vy_m_s";
   };
-  if (problem.predictor->model_name() != "sliding" || problem.arcs.size() > 1 || !scene.body ||
-      says_something_of(scene.fit, "vx_m_s") || says_something_of(scene.fit, "vy_m_s") ||
-      sets_in_softly(scene, problem))
+  if (problem.predictor->model_name() != "sliding" || problem.arcs.size() > 1 ||
+      says_something_of(scene.fit, "vx_m_s") || says_something_of(scene.fit, "vy_m_s"))
     return;
-  problem.rolls_at_first = {scene.body->radius_m, scene.body->half_thickness_m()};
+  problem.rolls_at_first = true;
   std::erase_if(problem.free, [&](const FreeParameter& p) { return is_velocity(p.index); });
 }
 

@@ -2,8 +2,8 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -100,33 +100,23 @@ Eigen::VectorXd Problem::start() const {
   return u;
 }
 
-Eigen::Vector2d RollsAtFirst::velocity_m_s(double theta_rad, double phi_rad, double w1_rad_s,
-                                           double w2_rad_s, double w3_rad_s) const {
-  const double s = std::sin(theta_rad), c = std::cos(theta_rad);
-  const double h = std::copysign(half_thickness_m, c), z = radius_m * s + h * c;
-  const Eigen::Vector2d node(h * w2_rad_s - radius_m * w3_rad_s, -z * w1_rad_s);
-  return Eigen::Rotation2Dd(phi_rad) * node;
+RollingVelocity rolling_velocity(const model::Predictor& predictor, const Eigen::VectorXd& values,
+                                 const std::vector<int>& derivatives) {
+  constexpr std::array<double, 1> kStart_s{0.0};
+  model::PredictRequest request;
+  request.t_s = kStart_s;
+  request.derivatives = derivatives;
+  request.want_end_state = request.rolls_at_first = true;
+  const model::Prediction start = predictor.predict(values, request);
+  const std::vector<int> velocity{predictor.index_of("vx_m_s"), predictor.index_of("vy_m_s")};
+  RollingVelocity result{start.end_state(velocity), {}};
+  if (!derivatives.empty()) result.by = start.end_state_jacobian(velocity, Eigen::all);
+  return result;
 }
-
-namespace {
-
-void let_roll(const RollsAtFirst& rim, const model::Predictor& predictor, Eigen::VectorXd& values) {
-  const int vx = predictor.index_of("vx_m_s"), vy = predictor.index_of("vy_m_s");
-  if (vx < 0 || vy < 0) return;
-  const auto value = [&](const char* name) { return values[predictor.index_of(name)]; };
-  const Eigen::Vector2d v =
-      rim.velocity_m_s(value("theta_rad"), value("phi_rad"), value("w1_rad_s"), value("w2_rad_s"),
-                       value("w3_rad_s"));
-  values[vx] = v.x();
-  values[vy] = v.y();
-}
-
-}  // namespace
 
 Eigen::VectorXd Problem::values(int arc, const Eigen::VectorXd& u) const {
   Eigen::VectorXd values = base[arc];
   for (const int i : columns_of(arc)) values[free[i].index] = free[i].transform.value(u[i]);
-  if (rolls_at_first) let_roll(*rolls_at_first, *predictor, values);
   return values;
 }
 
@@ -139,6 +129,11 @@ void Problem::set_base(const Eigen::VectorXd& u) {
     Eigen::VectorXd sign;
     base[arc] = values(arc, u);
     fold_tilt(*predictor, base[arc], sign);
+    const int vx = predictor->index_of("vx_m_s"), vy = predictor->index_of("vy_m_s");
+    if (!rolls_at_first || vx < 0) continue;  // an easier model may have none
+    const Eigen::Vector2d v_m_s = rolling_velocity(*predictor, base[arc]).m_s;
+    base[arc][vx] = v_m_s.x();
+    base[arc][vy] = v_m_s.y();
   }
 }
 
@@ -403,6 +398,7 @@ model::PredictRequest request_of(const Problem& problem, const ArcData& data) {
   request.tolerance = problem.tolerance;
   request.max_steps = problem.max_steps();
   request.lies_where_it_fell = true;
+  request.rolls_at_first = problem.rolls_at_first;
   return request;
 }
 model::Prediction predicted(const Problem& problem, const ArcData& data,

@@ -65,14 +65,16 @@ struct FreeParameter {
   bool held = false;   ///< stays where it is for now
 };
 
-/// A disc or ring on its rim whose contact point rests when the record begins: the velocity of its
-/// centre there follows from its spin and is no parameter.
-struct RollsAtFirst {
-  double radius_m = 0.0, half_thickness_m = 0.0;
-  /// Velocity of the centre for an attitude and rates [m/s].
-  [[nodiscard]] Eigen::Vector2d velocity_m_s(double theta_rad, double phi_rad, double w1_rad_s,
-                                             double w2_rad_s, double w3_rad_s) const;
+/// Velocity of the centre of a body that may slide and rolls.
+struct RollingVelocity {
+  Eigen::Vector2d m_s;
+  Eigen::Matrix2Xd by;  ///< derivatives by the parameters asked for
 };
+
+/// @param values of all parameters; the velocity among them does not count.
+[[nodiscard]] RollingVelocity rolling_velocity(const model::Predictor& predictor,
+                                               const Eigen::VectorXd& values,
+                                               const std::vector<int>& derivatives = {});
 
 /// A predictor, the arcs it has to explain and what may vary. The vector u holds one entry per free
 /// parameter, shared ones first.
@@ -85,8 +87,8 @@ struct Problem {
   std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
   double tolerance = 1e-8;
   Timing timing;
-  std::optional<RollsAtFirst> rolls_at_first;  ///< of a sliding body; its velocity is not free
-  bool rough = false;  ///< a search may end near the minimum: only a start is wanted
+  bool rolls_at_first = false;  ///< of a sliding body, whose velocity is not free then
+  bool rough = false;           ///< a search may end near the minimum: only a start is wanted
   std::function<void(const std::string& line)> log;  ///< may be empty
   /// Integration steps taken so far, one with derivatives counted by its cost; null: not counted.
   std::shared_ptr<double> work;

@@ -23,6 +23,7 @@ Eigen::VectorXd predicted_angles(const Problem& problem, int arc, const Eigen::V
   request.t_s = data.t_s;
   request.start_s = data.start_s;
   request.observables = {model::Observable::theta_rad, model::Observable::psi_rad};
+  request.rolls_at_first = problem.rolls_at_first;
   return problem.predictor->predict(values, request).values;
 }
 

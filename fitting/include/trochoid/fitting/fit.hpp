@@ -29,8 +29,8 @@ struct FitOptions {
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   /// A sliding body rolls when the record begins: its velocity there follows from its spin. What a
   /// slip that friction has ended by the second sample was is not seen, and what goes with it is
-  /// not known either. For one arc, friction that sets in at once, and a scene that says nothing of
-  /// that velocity; else nothing changes.
+  /// not known either. Where friction sets in softly it creeps at first as it would later. For one
+  /// arc and a scene that says nothing of that velocity; else nothing changes.
   bool rolls_at_first = false;
   /// What is being done now, with every minimisation. Called from several threads.
   std::function<void(const std::string& stage)> progress;

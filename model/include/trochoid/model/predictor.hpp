@@ -44,6 +44,9 @@ struct PredictRequest {
   bool want_end_state = false;
   /// After a body has fallen flat it lies there: rows go on, without tilt, where it fell.
   bool lies_where_it_fell = false;
+  /// A body that may slide rolls at start_s: vx_m_s and vy_m_s do not count. Where friction sets in
+  /// softly it creeps, as fast as the friction that holds it asks for (S22).
+  bool rolls_at_first = false;
 };
 
 /// Row n * observables.size() + o belongs to time n, observable o. After an early end the remaining
