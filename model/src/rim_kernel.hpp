@@ -144,9 +144,9 @@ template <class Roll, class S>
   const S most = input.friction * needed.normal;
   const S spare = most * most - needed.along_n * needed.along_n - needed.along_mh * needed.along_mh;
   constexpr double kLeastSpare = 0.01;  // beyond, nothing holds the body: it begins to slide
-  const double least = kLeastSpare * value_of(most) * value_of(most);
-  if (!(value_of(needed.normal) > 0.0) || !(least > 0.0)) return y;
-  const S creep = -input.eps_v / sqrt(value_of(spare) > least ? spare : S(least));
+  const S least = kLeastSpare * most * most;
+  if (!(value_of(most) > 0.0)) return y;
+  const S creep = -input.eps_v / sqrt(value_of(spare) > value_of(least) ? spare : least);
   y[Rim::un] = creep * needed.along_n;
   y[Rim::ut] = creep * needed.along_mh;
   return y;

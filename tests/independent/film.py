@@ -3,7 +3,7 @@
 
     film.py TROCHOID OUT FOLDER... [--jobs N]
 
-FOLDER: a recording with truth as `trochoid study tracking` reads them. OUT/PARENT-FOLDER gets `track.csv`, `scene.toml`, which
+FOLDER: a recording of one body with truth as `trochoid study tracking` reads them (others are passed over). OUT/PARENT-FOLDER gets `track.csv`, `scene.toml`, which
 knows nothing of the motion's law, and `truth.json`: the coefficients object.json has under `dynamics`, and of the state at the
 track's first sample what truth.csv (or, at the first frame, object.json) says of it.
 """
@@ -90,8 +90,9 @@ def main():
     parser.add_argument("folders", nargs="+", type=lambda name: Path(name).resolve())
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
+    filmed = [folder for folder in given.folders if (folder / "truth.csv").exists()]
     with ThreadPoolExecutor(given.jobs) as pool:
-        for words in pool.map(lambda f: make_case(given.program, f, given.out), given.folders):
+        for words in pool.map(lambda f: make_case(given.program, f, given.out), filmed):
             print(words, flush=True)
 
 

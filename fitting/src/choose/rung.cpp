@@ -106,6 +106,24 @@ ArcData seen_at(const std::vector<const data::TrackSample*>& samples) {
   return arc;
 }
 
+// Values of all parameters of a predictor for an arc of a fit.
+Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Scene& scene,
+                              const data::Fit& fit, int arc) {
+  const auto& parameters = predictor.parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::string& name = parameters[i].name;
+    const data::FitParameter* fitted =
+        arc > 0 ? fit.find(fmt::format("{}@{}", name, arc)) : nullptr;
+    if (fitted == nullptr) fitted = fit.find(name);
+    const auto fixed = scene.fit.fixed.find(name);
+    values[static_cast<Eigen::Index>(i)] = fitted != nullptr                ? fitted->value
+                                           : fixed != scene.fit.fixed.end() ? fixed->second
+                                                                            : parameters[i].value;
+  }
+  return values;
+}
+
 // Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
 Squares squares_of(const data::Track& track, int first, int last, int track_index,
                    const data::Scene& scene, const data::Fit& fit) {
@@ -118,14 +136,7 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   data::Scene measured = scene;
   const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
   const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
-  const auto& parameters = predictor->parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const std::string own = arc > 0 ? fmt::format("{}@{}", parameters[i].name, arc) : "";
-    const data::FitParameter* fitted = own.empty() ? nullptr : fit.find(own);
-    if (fitted == nullptr) fitted = fit.find(parameters[i].name);
-    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
-  }
+  const Eigen::VectorXd values = fitted_values(*predictor, scene, fit, arc);
   std::vector<double> t_s;
   std::vector<const data::TrackSample*> samples;
   for (int i = first; i < last; ++i) {
@@ -300,16 +311,12 @@ bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung
   if (!rung.fitted || !rung.fit.converged || rung.fit.arcs.size() != 1 ||
       rung.scene.model.name != "sliding" || rung.rolls_at_first)
     return false;
-  Values at = values_of(rung.fit);
   const auto predictor = model::make_predictor(rung.scene);
-  const auto& parameters = predictor->parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t i = 0; i < parameters.size(); ++i)
-    values[static_cast<Eigen::Index>(i)] = at[parameters[i].name];
-  const Eigen::Vector2d slips =
-      Eigen::Vector2d(at["vx_m_s"], at["vy_m_s"]) - rolling_velocity(*predictor, values).m_s;
-  const double slip_m_s = slips.norm();
-  const double brake_m_s2 = at["friction"] * rung.scene.model.gravity_m_s2;
+  const Eigen::VectorXd values = fitted_values(*predictor, rung.scene, rung.fit, 0);
+  const auto value = [&](const char* name) { return values[predictor->index_of(name)]; };
+  const Eigen::Vector2d v_m_s(value("vx_m_s"), value("vy_m_s"));
+  const double slip_m_s = (v_m_s - rolling_velocity(*predictor, values).m_s).norm();
+  const double brake_m_s2 = value("friction") * rung.scene.model.gravity_m_s2;
   return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
 }
 

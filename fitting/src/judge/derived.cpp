@@ -145,7 +145,10 @@ void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
   std::vector<int> free;
   for (const FreeParameter& parameter : problem.free) free.push_back(parameter.index);
   const RollingVelocity v = rolling_velocity(*problem.predictor, problem.values(0, u), free);
-  const Eigen::Matrix2d variance = v.by * covariance * v.by.transpose();
+  Eigen::MatrixXd known = covariance;
+  for (Eigen::Index i = 0; i < known.rows(); ++i)
+    if (!std::isfinite(known(i, i))) known.row(i).setZero(), known.col(i).setZero();
+  const Eigen::Matrix2d variance = v.by * known * v.by.transpose();
   for (const auto& [name, axis] : {std::pair{"vx_m_s", 0}, {"vy_m_s", 1}})
     add(fit, name, "m/s", {true, v.m_s[axis], std::sqrt(variance(axis, axis))},
         "velocity of the centre; the body rolls at first, so it follows from the spin");

@@ -72,6 +72,7 @@ struct RollingVelocity {
 };
 
 /// @param values of all parameters; the velocity among them does not count.
+/// @throws InputError if one lies outside its range.
 [[nodiscard]] RollingVelocity rolling_velocity(const model::Predictor& predictor,
                                                const Eigen::VectorXd& values,
                                                const std::vector<int>& derivatives = {});
