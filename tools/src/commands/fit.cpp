@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -19,6 +19,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/moment.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
@@ -99,16 +100,35 @@ void print(const data::Fit& fit) {
   print_notes(fit);
 }
 
+// Positions farther from the middle of the path than a laboratory is wide: most of them, if they
+// are not in metres; a few, if the tracker erred.
+void tell_far_positions(const std::string& path, const data::Track& track) {
+  constexpr double kWide_m = 20.0, kFew = 0.2;
+  std::vector<double> x_m, y_m;
+  for (const data::TrackSample& sample : track.samples)
+    if (sample.has_metres()) x_m.push_back(sample.centre_m.x()), y_m.push_back(sample.centre_m.y());
+  if (x_m.empty()) return;
+  const std::size_t seen = x_m.size();
+  const Eigen::Vector2d middle_m(data::median(std::move(x_m)), data::median(std::move(y_m)));
+  std::vector<double> far_s;
+  for (const data::TrackSample& sample : track.samples)
+    if (sample.has_metres() && (sample.centre_m - middle_m).stableNorm() > kWide_m)
+      far_s.push_back(sample.t_s);
+  if (far_s.empty()) return;
+  const bool few = static_cast<double>(far_s.size()) <= kFew * static_cast<double>(seen);
+  note(fmt::format("{}: {} of {} positions are more than {:g} m from the middle of the path{}",
+                   path, far_s.size(), seen, kWide_m,
+                   few ? fmt::format(", the first at t = {:.4g} s; where the tracker erred, leave "
+                                     "the row out",
+                                     far_s.front())
+                       : "; are x_m, y_m in metres?"));
+}
+
 // No unit can be told from numbers alone, but these are no laboratory's.
 void tell_odd_units(const std::string& path, const data::Track& track) {
-  constexpr double kWide_m = 20.0, kSparse_s = 1.0;
+  constexpr double kSparse_s = 1.0;
   if (track.samples.size() < 2) return;
-  Eigen::AlignedBox2d box;
-  for (const data::TrackSample& sample : track.samples)
-    if (sample.has_metres()) box.extend(sample.centre_m);
-  const double across_m = box.isEmpty() ? 0.0 : box.diagonal().stableNorm();
-  if (across_m > kWide_m)
-    note(fmt::format("{}: the path is {:.3g} m across; are x_m, y_m in metres?", path, across_m));
+  tell_far_positions(path, track);
   const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
                         static_cast<double>(track.samples.size() - 1);
   if (step_s > kSparse_s)
