@@ -10,6 +10,7 @@
 #include "choose/exchange.hpp"
 #include "choose/leave_out.hpp"
 #include "choose/rung_words.hpp"
+#include "choose/softness.hpp"
 #include "choose/terms.hpp"
 #include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
@@ -60,12 +61,31 @@ std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {
 }
 
 // Of the others the comparison does not need to know.
-void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const Rung& chosen) {
+std::vector<Rung*> near_ones(Rungs& rungs, const Rung& chosen) {
   std::vector<Rung*> near;
   for (Rung& rung : rungs)
     if (rung.bic < chosen.bic + most_evidence_against(chosen)) near.push_back(&rung);
+  return near;
+}
+
+void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const Rung& chosen) {
+  side_by_side(contest, near_ones(rungs, chosen),
+               [&](std::size_t, Rung& rung, const FitOptions& options) {
+                 predict_held_back(contest.tracks, options, rung);
+               });
+}
+
+// What a slip that friction ends within a few samples was is not seen, and under friction that sets
+// in softly it is looked into only now: on the way it makes many more sets of losses alike.
+void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& chosen) {
+  if (chosen.rolls_at_first || softness_is_open(chosen)) return;
+  const std::vector<Rung*> near = near_ones(rungs, chosen);
+  const auto own = std::find(near.begin(), near.end(), &chosen);
+  if (own == near.end()) return;
+  let_roll_at_first(contest.tracks, contest.options, **own);
+  if (!chosen.rolls_at_first) return;
   side_by_side(contest, near, [&](std::size_t, Rung& rung, const FitOptions& options) {
-    predict_held_back(contest.tracks, options, rung);
+    if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);
   });
 }
 
@@ -95,6 +115,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     none.fit.comparison = table_of(rungs, nullptr);
     return none;
   }
+  let_chosen_roll_at_first(contest, rungs, *chosen);
   predict_held_back_by_near_ones(contest, rungs, *chosen);
   Comparison result{with_full_bars(*chosen), chosen->scene};
   if (options.profile || options.bootstrap > 0) {

@@ -332,9 +332,11 @@ void fit_from(std::span<const data::Track> tracks, const Values& values,
   });
 }
 
-// A slip at the start is left out unless there is strong evidence for it. Where its end is all that
-// is known of the first samples, they have to be followed anew.
+}  // namespace
+
+// Where its end is all that is known of the first samples, they have to be followed anew.
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
+  if (!slips_unseen_at_first(tracks, rung)) return;
   for (const char* strategy : {"single", "growing"}) {
     Rung rolls = rung;
     rolls.rolls_at_first = true;
@@ -346,8 +348,6 @@ void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& op
     return;
   }
 }
-
-}  // namespace
 
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung, Reach reach) {
@@ -378,7 +378,22 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     }
     rung.fitted = usable(rung.fit);
   });
-  if (slips_unseen_at_first(tracks, rung)) let_roll_at_first(tracks, options, rung);
+  if (softness_is_open(rung)) let_roll_at_first(tracks, options, rung);
+}
+
+void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+              Rung& rung) {
+  if (rung.scene.model.name != "sliding" || rung.rolls_at_first || !usable(rung.fit)) return;
+  Values start = values_of(rung.fit);
+  const auto predictor = model::make_predictor(rung.scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (const data::FitParameter* begins = known.fit.find(info.name);
+        info.role == model::ParameterInfo::Role::initial && begins != nullptr)
+      start[info.name] = begins->value;
+  Rung rolls = rung;
+  rolls.rolls_at_first = true;
+  fit_from(tracks, start, "single", options, rolls);
+  if (rolls.fitted && rolls.fit.converged) rung = std::move(rolls);
 }
 
 std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung& known,

@@ -87,6 +87,15 @@ enum class Reach { search, from_below };
 void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term* term,
               const FitOptions& options, Rung& rung, Reach reach = Reach::search);
 
+/// Lets a sliding body roll where its record begins (FitOptions::rolls_at_first) if the slip found
+/// there ends within a few samples, unless there is strong evidence for it.
+void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
+
+/// The same for a rung beside one that rolls at first, from where that begins: what it says of the
+/// start is comparable then. As it is where that leads nowhere.
+void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+              Rung& rung);
+
 /// Predicts the last third of the tracks from a fit of the others.
 void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 
