@@ -3,9 +3,9 @@
 
     film.py TROCHOID OUT FOLDER... [--jobs N]
 
-FOLDER: a recording of one body with truth as `trochoid study tracking` reads them (others are passed over). OUT/PARENT-FOLDER gets `track.csv`, `scene.toml`, which
-knows nothing of the motion's law, and `truth.json`: the coefficients object.json has under `dynamics`, and of the state at the
-track's first sample what truth.csv (or, at the first frame, object.json) says of it.
+FOLDER: a recording of one body with truth as `trochoid study tracking` reads them (others are passed over). OUT/PARENT-FOLDER gets
+`track.csv`, `scene.toml`, which knows nothing of the motion's law, and `truth.json`: the coefficients object.json has under
+`dynamics`, and of the state at the track's first sample what truth.csv (or, at the first frame, object.json) says of it.
 """
 import argparse
 import csv

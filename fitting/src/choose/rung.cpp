@@ -332,16 +332,21 @@ void fit_from(std::span<const data::Track> tracks, const Values& values,
   });
 }
 
+// The same rung, not yet fitted.
+Rung rolling_at_first(Rung rung) {
+  rung.rolls_at_first = true;
+  rung.fitted = false;
+  rung.fit = {}, rung.full = {};
+  return rung;
+}
+
 }  // namespace
 
 // Where its end is all that is known of the first samples, they have to be followed anew.
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
   if (!slips_unseen_at_first(tracks, rung)) return;
   for (const char* strategy : {"single", "growing"}) {
-    Rung rolls = rung;
-    rolls.rolls_at_first = true;
-    rolls.fitted = false;
-    rolls.fit = {}, rolls.full = {};
+    Rung rolls = rolling_at_first(rung);
     fit_from(tracks, values_of(rung.fit), strategy, options, rolls);
     if (!rolls.fitted || !rolls.fit.converged) continue;
     if (rolls.bic < rung.bic + kStrong) rung = std::move(rolls);
@@ -390,8 +395,7 @@ void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitO
     if (const data::FitParameter* begins = known.fit.find(info.name);
         info.role == model::ParameterInfo::Role::initial && begins != nullptr)
       start[info.name] = begins->value;
-  Rung rolls = rung;
-  rolls.rolls_at_first = true;
+  Rung rolls = rolling_at_first(rung);
   fit_from(tracks, start, "single", options, rolls);
   if (rolls.fitted && rolls.fit.converged) rung = std::move(rolls);
 }
