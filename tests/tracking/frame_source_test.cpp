@@ -220,6 +220,31 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
   EXPECT_NE(sha256_of_recording(folder_), digest);
 }
 
+TEST_F(FrameSourceTest, APhotographTakenWithTheCameraTurnedComesUpright) {
+  cv::Mat upright(kHeight, kWidth, CV_8UC1, cv::Scalar(40));
+  upright(cv::Rect(0, 0, 16, 16)) = 220;  // its upper left corner
+  cv::Mat as_stored;
+  cv::rotate(upright, as_stored, cv::ROTATE_90_COUNTERCLOCKWISE);
+  std::vector<uchar> jpeg;
+  cv::imencode(".jpg", as_stored, jpeg);
+  // Exif 2.32, 4.6.4: Orientation 6, the stored picture is to be turned clockwise.
+  const std::vector<uchar> exif{0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0,    'M', 'M',
+                                0,    42,   0, 0,  0,   8,   0,   1,   1, 0x12, 0,   3,
+                                0,    0,    0, 1,  0,   6,   0,   0,   0, 0,    0,   0};
+  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+  std::ofstream(folder_ / "turned.jpg", std::ios::binary)
+      .write(reinterpret_cast<const char*>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
+  const auto source = open_video(folder_ / "turned.jpg");
+  EXPECT_EQ(source->info().width_px, kWidth);
+  EXPECT_EQ(source->info().height_px, kHeight);
+  const auto frame = source->next();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->luma.size(), upright.size());
+  EXPECT_NEAR(frame->luma.at<uchar>(4, 4), 220, 6);
+  EXPECT_NEAR(frame->luma.at<uchar>(kHeight - 4, 4), 40, 6);
+  EXPECT_FALSE(source->next());
+}
+
 TEST_F(FrameSourceTest, BadFilesAreRefusedInOneLineThatNamesThem) {
   const fs::path empty = folder_ / "empty.mp4", words = folder_ / "words.mp4";
   std::ofstream(empty).close();

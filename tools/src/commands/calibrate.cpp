@@ -5,15 +5,15 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "commands.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/validators.hpp"
-#include "draw/canvas.hpp"
+#include "draw/encoded_file.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/calibration.hpp"
@@ -64,14 +64,16 @@ struct Views {
   }
 };
 
-// A video shows the board in hundreds of frames: two per second are looked at, and of those found
-// only the ones where it has moved.
-void look_through_video(const fs::path& path, const tracking::BoardPattern& pattern, Views& views) {
+// A picture, or a video: that shows the board in hundreds of frames, so two per second are looked
+// at, and of those found only the ones where it has moved.
+void look_into(const fs::path& path, const tracking::BoardPattern& pattern, Views& views) {
   constexpr double kEvery_s = 0.5, kMoved = 0.03;
   constexpr std::size_t kMost = 40;
   const auto source = tracking::open_video(path);
+  auto frame = source->next(), following = source->next();
+  if (!following) return views.look(frame->luma, path.string(), pattern);
   double next_s = 0.0;
-  while (auto frame = source->next()) {
+  for (; frame; frame = std::exchange(following, following ? source->next() : std::nullopt)) {
     if (frame->t_s < next_s) continue;
     next_s = frame->t_s + kEvery_s;
     const std::size_t before = views.found.size();
@@ -95,11 +97,7 @@ Views look_at_inputs(const Options& options, const tracking::BoardPattern& patte
     if (fs::is_directory(path))
       throw InputError(fmt::format("{}: is a folder; give its pictures, e.g. {}", path.string(),
                                    (path / "*.png").string()));
-    const cv::Mat picture = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
-    if (!picture.empty())
-      views.look(picture, path.string(), pattern);
-    else
-      look_through_video(path, pattern, views);
+    look_into(path, pattern, views);
     progress.update(++done, static_cast<std::int64_t>(options.inputs.size()));
   }
   if (views.found.size() < 3) {

@@ -3,14 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <csignal>
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <utility>
 
 #include "commands.hpp"
 #include "common/json_summary.hpp"
@@ -18,6 +13,7 @@
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
 #include "common/validators.hpp"
+#include "draw/encoded_file.hpp"
 #include "draw/render_picture.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -120,75 +116,6 @@ data::Camera camera_of(const Options& options, const data::Scene& scene, const M
                                     *scene.camera.scale_px_per_m);
   return camera_over(motion, *scene.body, options.width_px, options.height_px);
 }
-
-/// A folder for what another process writes. Once it is gone, by its end or by Ctrl-C, a process
-/// that was only just starting can leave nothing behind.
-class Workshop {
- public:
-  explicit Workshop(const fs::path& target) : folder_(data::pending_neighbour(target)) {
-    std::error_code code;
-    if (fs::create_directory(folder_, code)) return;
-    data::discard_pending(folder_);
-    throw InputError(fmt::format("{}: cannot be written: {}", target.string(), code.message()));
-  }
-  ~Workshop() { data::discard_pending(folder_); }
-  Workshop(const Workshop&) = delete;
-  Workshop& operator=(const Workshop&) = delete;
-  [[nodiscard]] fs::path file(const fs::path& name) const { return folder_ / name; }
-
- private:
-  fs::path folder_;
-};
-
-// Frames to an encoder process; libavcodec's own would tie us to one version of its options.
-class Encoder {
- public:
-  /// Writes into `file`; messages name `target`, which it is to become.
-  Encoder(const fs::path& file, const fs::path& target, const data::Camera& camera, double rate_hz,
-          int quality, bool lossless)
-      : target_(target.string()), log_(file.string() + ".log") {
-    const std::string coding = lossless
-                                   ? "-c:v ffv1 -pix_fmt bgr0"
-                                   : fmt::format("-c:v libx264 -crf {} -pix_fmt yuv420p", quality);
-    const std::string command = fmt::format(
-        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt bgr24 -s {}x{} -r {:.9g} -i - {} {} "
-        "2>{}",
-        camera.width_px, camera.height_px, rate_hz, coding, shell_quoted(file.string()),
-        shell_quoted(log_.string()));
-    std::signal(SIGPIPE, SIG_IGN);  // a missing encoder is told by write()
-    pipe_ = popen(command.c_str(), "w");
-    if (pipe_ == nullptr) fail();
-  }
-  ~Encoder() { close(); }
-  Encoder(const Encoder&) = delete;
-  Encoder& operator=(const Encoder&) = delete;
-  void write(const cv::Mat& picture) {
-    const std::size_t size = picture.total() * picture.elemSize();
-    if (std::fwrite(picture.data, 1, size, pipe_) != size) fail();
-  }
-  void finish() {
-    if (close() != 0) fail();
-  }
-
- private:
-  int close() {
-    FILE* pipe = std::exchange(pipe_, nullptr);
-    return pipe != nullptr ? pclose(pipe) : 0;
-  }
-  /// With what the encoder itself has to say, which it has said when it has ended.
-  [[noreturn]] void fail() {
-    close();
-    std::ifstream log(log_);
-    std::string words;
-    std::getline(log, words);
-    throw InputError(fmt::format(
-        "{}: cannot be encoded: {}", target_,
-        words.empty() ? "ffmpeg does not say why; is the disk full?" : "ffmpeg: " + words));
-  }
-  std::string target_;
-  fs::path log_;
-  FILE* pipe_ = nullptr;
-};
 
 std::string truth_row(int frame, double t_s, const data::Pose<>& pose, const data::Camera& camera) {
   const Eigen::Quaterniond q(Eigen::AngleAxisd(pose.phi_rad, Eigen::Vector3d::UnitZ()) *
@@ -334,7 +261,7 @@ std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double
 
 // Draws every frame. @returns the table of the truth.
 std::string draw(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
-                 const RenderStyle& style, int frames, Encoder& encoder) {
+                 const RenderStyle& style, int frames, EncodedFile& video) {
   const double rate_hz = scene.run.rate_hz;
   const PictureRenderer renderer(*scene.body, camera, style);
   std::string truth =
@@ -344,7 +271,7 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
     const double t_s = frame / rate_hz;
     const double brightness = 1.0 + style.flicker * std::sin(2.0 * std::numbers::pi * 100.0 * t_s);
     const auto poses = exposed_poses(motion, t_s, rate_hz, style);
-    encoder.write(renderer.picture(renderer.light(poses), frame, brightness));
+    video.write(renderer.picture(renderer.light(poses), frame, brightness));
     truth += truth_row(frame, t_s, motion.at(t_s), camera);
     progress.update(frame + 1, frames);
   }
@@ -375,14 +302,10 @@ void run(const Options& options) {
   const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
 
   if (options.output.extension().empty()) make_folder(options.output);
-  data::PendingFile video(targets.video);
-  const Workshop workshop(targets.video);
-  const fs::path encoded = workshop.file(targets.video.filename());
-  Encoder encoder(encoded, targets.video, camera, rate_hz, options.quality, options.lossless);
-  const std::string truth = draw(motion, scene, camera, style_of(options), frames, encoder);
-  encoder.finish();
-  check_written_video(encoded, frames, targets.video);
-  fs::rename(encoded, video.path());
+  EncodedFile video(targets.video, {camera.width_px, camera.height_px}, rate_hz,
+                    options.lossless ? coding::kLossless : coding::h264(options.quality));
+  const std::string truth = draw(motion, scene, camera, style_of(options), frames, video);
+  video.finish();
   data::write_text(truth, targets.truth);
   data::write_camera(camera, targets.camera);
   data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);

@@ -5,9 +5,6 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#ifdef TROCHOID_HAS_TRACKING
-#include "trochoid/tracking/frame_source.hpp"
-#endif
 
 namespace trochoid::tools {
 
@@ -87,24 +84,6 @@ void check_length(const std::string& scene, double until_s, double rate_hz, doub
         "run.until_s (--until)",
         scene, until_s, rate_hz, count, rows, most));
 }
-
-#ifdef TROCHOID_HAS_TRACKING
-void check_written_video(const fs::path& written, std::int64_t frames, const fs::path& target) {
-  std::int64_t promised = -1;
-  try {
-    const auto source = tracking::open_video(written);
-    promised = source->info().frames;
-    if (promised == 0)  // a container that does not count: Matroska
-      while (source->next()) ++promised;
-  } catch (const InputError&) {  // told below, with the name the user knows
-  }
-  if (promised != frames)
-    throw InputError(
-        fmt::format("{}: cannot be written whole: {} (is the disk full?)", target.string(),
-                    promised < 0 ? "what the encoder left holds no video"
-                                 : fmt::format("{} of {} pictures are in it", promised, frames)));
-}
-#endif
 
 std::string shell_quoted(const std::string& word) {
   const bool plain = word.find_first_of(" \t\n\"'\\$`!*?[](){}<>|&;#~") == std::string::npos;

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -27,12 +26,5 @@ void check_length(const std::string& scene, double until_s, double rate_hz, doub
 
 /// A word as a shell would take it: with anything but plain characters it goes into quotes.
 [[nodiscard]] std::string shell_quoted(const std::string& word);
-
-#ifdef TROCHOID_HAS_TRACKING
-/// The encoder behind cv::VideoWriter tells nobody when the disk is full: looks at the file again.
-/// @throws InputError naming `target` unless `written` opens and promises so many frames.
-void check_written_video(const std::filesystem::path& written, std::int64_t frames,
-                         const std::filesystem::path& target);
-#endif
 
 }  // namespace trochoid::tools

@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
-#include "common/outputs.hpp"
 #include "common/progress.hpp"
+#include "draw/encoded_file.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/data/io.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -57,12 +55,7 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
   const int frames = std::max(2, static_cast<int>(span_s / speed * kFrameRate_hz));
   const View view(x, y);
 
-  data::PendingFile pending(path);
-  cv::VideoWriter video(pending.path().string(), cv::CAP_FFMPEG,
-                        cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kFrameRate_hz,
-                        {kSize_px, kSize_px});
-  if (!video.isOpened())
-    throw InputError(fmt::format("{}: cannot be written as H.264 in mp4", path.string()));
+  EncodedFile video(path, {kSize_px, kSize_px}, kFrameRate_hz, coding::kForViewing);
   Progress progress("animate");
   cv::Mat trace(kSize_px, kSize_px, CV_8UC3, cv::Scalar::all(255));
   Eigen::Index row = 0, tail = 0;
@@ -82,9 +75,8 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
     video.write(picture);
     progress.update(frame + 1, frames);
   }
-  video.release();
-  check_written_video(pending.path(), frames, path);
-  pending.commit();
+  video.finish();
+  video.commit();
 }
 
 }  // namespace trochoid::tools

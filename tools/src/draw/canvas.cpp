@@ -4,12 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
-
-#include "trochoid/data/error.hpp"
-#include "trochoid/data/io.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -220,17 +216,6 @@ double text_width_px(const std::string& text, double height_px) {
   return static_cast<double>(
              cv::getTextSize(plain_letters(text), kFont, scale, 1, &baseline).width) /
          kSupersample;
-}
-
-void write_picture(const cv::Mat& picture, const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg")
-    throw InputError(fmt::format("{}: a picture is a .png or .jpg file", path.string()));
-  // Coded in memory: the coders print their own complaints when the disk is full.
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(extension, picture, bytes))
-    throw InputError(fmt::format("{}: the picture cannot be coded", path.string()));
-  data::write_text({bytes.begin(), bytes.end()}, path);
 }
 
 }  // namespace trochoid::tools

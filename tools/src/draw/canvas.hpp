@@ -65,8 +65,4 @@ void draw_text_with_halo(cv::Mat& picture, const std::string& text, const cv::Po
                          double height_px, const cv::Scalar& colour, Align align = Align::left);
 [[nodiscard]] double text_width_px(const std::string& text, double height_px);
 
-/// Writes a picture whole or not at all. @throws InputError unless it is named .png or .jpg and can
-/// be written.
-void write_picture(const cv::Mat& picture, const std::filesystem::path& path);
-
 }  // namespace trochoid::tools

@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
+#include "draw/encoded_file.hpp"
 #include "draw/overlay_drawing.hpp"
 #include "draw/residual_strip.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/data/io.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tools {
@@ -182,17 +181,6 @@ void OverlayPainter::mark_missing(cv::Mat& picture) const {
                       palette::yellow, Align::centre);
 }
 
-cv::VideoWriter open_writer(const std::filesystem::path& path, double frame_rate_hz,
-                            cv::Size size) {
-  cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                         frame_rate_hz, size, true);
-  if (!writer.isOpened())
-    throw InputError(fmt::format(
-        "{}: cannot be written as H.264 in mp4; name a .mp4 file, and see that ffmpeg has libx264",
-        path.string()));
-  return writer;
-}
-
 }  // namespace
 
 OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& options,
@@ -212,22 +200,20 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   OverlayPainter painter(content, info, written.slowed);
   written.width_px = painter.size().width;
   written.height_px = painter.size().height;
-  data::PendingFile pending(path);
-  cv::VideoWriter writer = open_writer(pending.path(), written.frame_rate_hz, painter.size());
+  EncodedFile overlay(path, painter.size(), written.frame_rate_hz, coding::kForViewing);
   Progress progress("overlay");
   while (const auto frame = source->next()) {
     if (options.between_pictures) options.between_pictures();
     const double t_s = content.time_of_frame(frame->index, frame->t_s);
-    writer.write(painter.paint(*frame, t_s));
+    overlay.write(painter.paint(*frame, t_s));
     written.frame.push_back(frame->index);
     written.t_s.push_back(t_s);
     progress.update(static_cast<std::int64_t>(written.frame.size()), info.frames);
   }
-  writer.release();
   if (written.frame.empty())
     throw InputError(fmt::format("{}: no frame between from and to", input.video.string()));
-  check_written_video(pending.path(), static_cast<std::int64_t>(written.frame.size()), path);
-  pending.commit();
+  overlay.finish();
+  overlay.commit();
   return written;
 }
 

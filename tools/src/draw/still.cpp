@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "draw/canvas.hpp"
+#include "draw/encoded_file.hpp"
 #include "draw/overlay.hpp"
 #include "draw/overlay_drawing.hpp"
 #include "draw/residual_strip.hpp"

@@ -29,12 +29,16 @@ bool after(const std::optional<data::Moment>& to, const Frame& frame) {
          ((to->frame && frame.index > *to->frame) || (to->t_s && frame.t_s > *to->t_s + 1e-9));
 }
 
-/// Counter-clockwise quarter turns that make the picture upright, 0..3.
-int quarter_turns(const AVStream& stream) {
-  const auto* matrix = reinterpret_cast<const std::int32_t*>(
-      av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+/// Counter-clockwise quarter turns that make a picture upright, 0..3: a video's container tells, of
+/// photographs the picture itself (Exif).
+int quarter_turns(const AVStream& stream, const AVFrame& first) {
+  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  if (const auto* own = av_frame_get_side_data(&first, AV_FRAME_DATA_DISPLAYMATRIX);
+      matrix == nullptr && own != nullptr)
+    matrix = own->data;
   if (matrix == nullptr) return 0;
-  const double angle_deg = av_display_rotation_get(matrix);  // counter-clockwise, may be NaN
+  const double angle_deg =  // counter-clockwise, may be NaN
+      av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix));
   if (!std::isfinite(angle_deg)) return 0;
   return ((static_cast<int>(std::lround(angle_deg / 90.0)) % 4) + 4) % 4;
 }
@@ -66,6 +70,7 @@ class LibavSource final : public FrameSource {
     av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
     open_container(path);
     open_decoder();
+    first_is_decoded_ = decoder_->codec_id == AV_CODEC_ID_MJPEG && decode_one();
     describe();
   }
 
@@ -73,7 +78,7 @@ class LibavSource final : public FrameSource {
 
   [[nodiscard]] std::optional<Frame> next() override {
     while (!finished_) {
-      if (!decode_one()) break;
+      if (!std::exchange(first_is_decoded_, false) && !decode_one()) break;
       Frame frame{.luma = {}, .bgr = {}, .index = frames_read_++, .t_s = 0.0, .damaged = false};
       frame.t_s = presentation_time_s(frame.index);
       if (after(window_.to, frame)) {
@@ -129,7 +134,7 @@ class LibavSource final : public FrameSource {
   }
 
   void describe() {
-    quarters_ = quarter_turns(*stream_);
+    quarters_ = quarter_turns(*stream_, *picture_);
     info_.width_px = decoder_->width;
     info_.height_px = decoder_->height;
     if (info_.width_px <= 0 || info_.height_px <= 0) fail("no picture size: not a readable video");
@@ -251,6 +256,7 @@ class LibavSource final : public FrameSource {
   AVStream* stream_ = nullptr;
   VideoInfo info_;
   int quarters_ = 0;
+  bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   std::int64_t decode_errors_ = 0;
