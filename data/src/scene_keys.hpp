@@ -39,7 +39,8 @@ constexpr Words<2> kTransfers{"sRGB", "linear"};
 constexpr Words<4> kSupportKinds{"floor", "flat", "pivot", "none"};
 constexpr Words<9> kModels{"free",    "top",  "top-euler", "smooth", "rolling",
                            "sliding", "puck", "pivot",     "auto"};
-constexpr Words<6> kIntegrators{"auto", "dop853", "taylor", "cvode-adams", "cvode-bdf", "arkode"};
+constexpr Words<7> kIntegrators{"auto",        "dop853",    "taylor", "radau",
+                                "cvode-adams", "cvode-bdf", "arkode"};
 constexpr Words<2> kRimSwitches{"end", "impact"};
 
 struct AnyText {};      ///< free text

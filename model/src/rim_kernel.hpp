@@ -9,7 +9,6 @@
 #include "rim_run.hpp"
 #include "rim_setup.hpp"
 #include "trochoid/data/scene.hpp"
-#include "trochoid/model/sundials.hpp"
 
 /// The compiled models of a body with rim contact: one function per floor, for numbers and for
 /// numbers with eight derivatives. Each picks the compiled list of loss terms.
@@ -49,26 +48,14 @@ template <class S>
 RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input,
                        const RimRunOptions& options, std::span<const double> t_s);
 
-/// Regularised friction too stiff for explicit steps: CVODE's BDF, with its forward sensitivities
-/// where S has derivatives. Runs up to the first event.
-template <class S>
-RimPath<S> run_stiff(const RimModel& model, const RimInput<S>& input, const RimRunOptions& options,
-                     std::span<const double> t_s);
-
 /// Steps an explicit method would need for the regularised law over `duration_s`: its stability
 /// limit times the fastest rate, at most (S19) while N = m g; 0 for the exact law.
 [[nodiscard]] double explicit_steps(const RimModel& model, const Coulomb<double>& friction,
                                     double duration_s);
 
-/// Absolute tolerances of a sliding body's slip: stick lives at slips below the regularisation,
-/// which have to be resolved whatever the tolerance.
-template <int N>
-void resolve_stick(double eps_v_m_s, StepControl<N>& control) {
-  constexpr double kOfRegularisation = 1e-4;
-  if (eps_v_m_s > 0.0)
-    for (const int c : {Rim::un, Rim::ut})
-      control.atol[c] = std::min(control.atol[c], kOfRegularisation * eps_v_m_s);
-}
+/// Whether implicit steps are faster than so many explicit ones for a body that turns so fast.
+[[nodiscard]] bool asks_for_implicit_steps(const RimModel& model, double explicit_bound,
+                                           double turning_rad_s, const RimRunOptions& options);
 
 /// Body and losses of a system over S from an input over From.
 template <class System, class From>
@@ -87,36 +74,6 @@ void place(const RimModel& model, const RimInput<From>& input, System& system) {
   losses.quadratic_ratio = input.losses.quadratic_ratio;
   losses.eps_w = input.losses.eps_w;
   system.losses = make_losses<typename System::LossList>(losses);
-}
-
-/// The system for SUNDIALS, its Jacobian from `duals`, its events included.
-template <class System, class DualSystem>
-[[nodiscard]] Ode rim_ode(const System& system, const DualSystem& duals) {
-  constexpr int n = System::kStates;
-  Ode ode = make_ode(duals);
-  ode.events = System::kEvents;
-  ode.event_functions = [system](double t, const double* y, double* g) {
-    State<double, n> state;
-    State<double, System::kEvents> value;
-    for (int i = 0; i < n; ++i) state[i] = y[i];
-    system.events(t, state, value);
-    for (int i = 0; i < System::kEvents; ++i) g[i] = value[i];
-  };
-  return ode;
-}
-
-/// How such a run went, in our own words.
-template <class S>
-void note_end(const SundialsRun& run, RimRunEnd<S>& end) {
-  end.outcome = run.outcome;
-  end.end_s = run.end_s;
-  end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
-                    static_cast<int>(run.evaluations)};
-  constexpr Outcome kOutcomes[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
-                                   Outcome::inconsistent_contact};
-  if (run.event < 0 || run.event >= 4) return;
-  end.outcome = kOutcomes[run.event];
-  end.events.push_back({run.end_s, std::string(name(end.outcome))});
 }
 
 /// State from the input; the slip from the velocity of the centre (S1).

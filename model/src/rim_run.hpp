@@ -7,6 +7,7 @@
 
 #include "trochoid/model/events.hpp"
 #include "trochoid/model/outcome.hpp"
+#include "trochoid/model/radau.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/sliding.hpp"
 
@@ -25,6 +26,7 @@ struct RimRunOptions {
   /// A slip begins with what it comes to a little later, by a series (S21): a fraction of the
   /// steps, and a force a per cent beyond friction's in between.
   bool skips_onset = false;
+  bool stiff = false;           ///< friction that sets in softly asks for implicit steps
   bool rolls_at_first = false;  ///< as PredictRequest::rolls_at_first
 };
 
@@ -55,6 +57,16 @@ template <int N>
     control.atol[i] = options.tolerance * size;
   }
   return control;
+}
+
+/// Absolute tolerances of a sliding body's slip: stick lives at slips below the regularisation,
+/// which have to be resolved whatever the tolerance.
+template <int N>
+void resolve_stick(double eps_v_m_s, StepControl<N>& control) {
+  constexpr double kOfRegularisation = 1e-4;
+  if (eps_v_m_s > 0.0)
+    for (const int c : {Rim::un, Rim::ut})
+      control.atol[c] = std::min(control.atol[c], kOfRegularisation * eps_v_m_s);
 }
 
 /// Slip speed at which the exact Coulomb law takes sticking for possible, and the slip a new
@@ -254,13 +266,22 @@ class RimRun {
 
   template <class Sink>
   void sliding_phase(Sink& sink) {
-    static constexpr EventRule kRules[] = {{-1}, {-1}, {-1}, {-1}, {-1}};
     if (!starts_inside(slide_, end_.y)) return;
     StepControl<10> limits = control<10>(slide_.body);
     // Under the exact law the direction of a slow slip is drawn in at the rate mu g/u. A path that
     // keeps to it shows no error even where a step is too long for that; derivatives blow up there.
     limits.control_derivatives = exact();
-    DormandPrince<Slide> stepper(slide_, limits);
+    if constexpr (kCoulomb) {
+      if (options_.stiff) {
+        resolve_stick(value_of(slide_.friction.eps_v), limits);
+        return sliding_phase(Radau<Slide>(slide_, limits), sink);
+      }
+    }
+    sliding_phase(DormandPrince<Slide>(slide_, limits), sink);
+  }
+  template <class Stepper, class Sink>
+  void sliding_phase(Stepper stepper, Sink& sink) {
+    static constexpr EventRule kRules[] = {{-1}, {-1}, {-1}, {-1}, {-1}};
     stepper.start(end_.end_s, end_.y);
     const auto result = phase(stepper, sink, kRules, options_.end_s);
     end_.y = result.y;

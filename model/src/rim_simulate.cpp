@@ -9,6 +9,7 @@
 #include "solve.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/inertia.hpp"
+#include "trochoid/model/sundials.hpp"
 
 // Whole runs of bodies with rim contact as tables: state, contact point, and with a known mass
 // energy and contact force.
@@ -89,6 +90,7 @@ struct RimJob {
     options.end_s = t_s.back();
     options.impact_at_rim = impact;
     options.stick_factor = stick;
+    options.stiff = method == Method::radau;
     return options;
   }
   [[nodiscard]] Coulomb<double> friction() const { return {input.friction, input.eps_v}; }
@@ -110,6 +112,36 @@ RimRecord run_phases(const RimJob& job, const Friction<double>& friction, double
                          }
                        });
   return record;
+}
+
+/// The system for SUNDIALS, its Jacobian from `duals`, its events included.
+template <class System, class DualSystem>
+[[nodiscard]] Ode rim_ode(const System& system, const DualSystem& duals) {
+  constexpr int n = System::kStates;
+  Ode ode = make_ode(duals);
+  ode.events = System::kEvents;
+  ode.event_functions = [system](double t, const double* y, double* g) {
+    State<double, n> state;
+    State<double, System::kEvents> value;
+    for (int i = 0; i < n; ++i) state[i] = y[i];
+    system.events(t, state, value);
+    for (int i = 0; i < System::kEvents; ++i) g[i] = value[i];
+  };
+  return ode;
+}
+
+/// How such a run went, in our own words.
+template <class S>
+void note_end(const SundialsRun& run, RimRunEnd<S>& end) {
+  end.outcome = run.outcome;
+  end.end_s = run.end_s;
+  end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
+                    static_cast<int>(run.evaluations)};
+  constexpr Outcome kOutcomes[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
+                                   Outcome::inconsistent_contact};
+  if (run.event < 0 || run.event >= 4) return;
+  end.outcome = kOutcomes[run.event];
+  end.events.push_back({run.end_s, std::string(name(end.outcome))});
 }
 
 /// One phase without change of regime by SUNDIALS, up to its first event.
@@ -168,7 +200,7 @@ RimRecord run_rolling_by(const RimJob& job, double tolerance) {
 RimRecord run_job(const RimJob& job, double tolerance, double stick) {
   const data::ModelSettings& terms = job.model.terms;
   const RimRunOptions options = job.options(tolerance, stick);
-  const bool own = job.method == Method::dop853;
+  const bool own = job.method == Method::dop853 || job.method == Method::radau;
   if (job.law == "rolling") {
     if (!own) return run_rolling_by(job, tolerance);
     return with_terms(terms, [&](auto list) {
@@ -193,16 +225,16 @@ struct ContactChoice {
   std::string name = "dop853", reason;
 };
 
-ContactChoice choose(const RimJob& job, const std::string& asked) {
-  constexpr double kManySteps = 2e5;
+ContactChoice choose(const RimJob& job, const std::string& asked, double tolerance) {
   const bool exact = job.law == "sliding" && job.input.eps_v == 0.0;
   if (asked == "auto") {
     if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
     const double steps =
         job.law == "sliding" ? explicit_steps(job.model, job.friction(), job.t_s.back()) : 0.0;
-    if (steps > kManySteps)
+    const double turning_rad_s = std::abs(job.input.w2 / std::sin(job.input.theta));
+    if (asks_for_implicit_steps(job.model, steps, turning_rad_s, job.options(tolerance, 1.0)))
       return {
-          Method::cvode_bdf, "cvode-bdf",
+          Method::radau, "radau",
           fmt::format("stiff friction: an explicit method would take about {:.0e} steps", steps)};
     return {Method::dop853, "dop853",
             job.input.eps_v > 0.0
@@ -212,13 +244,19 @@ ContactChoice choose(const RimJob& job, const std::string& asked) {
   if (asked == "taylor")
     throw InputError(
         "run.integrator = \"taylor\" needs polynomial equations; contact models take auto, dop853, "
-        "cvode-adams, cvode-bdf or arkode");
+        "radau, cvode-adams, cvode-bdf or arkode");
   const Choice choice = choose_integrator(asked);
-  if (choice.method != Method::dop853 && (exact || job.impact))
+  const bool own = choice.method == Method::dop853 || choice.method == Method::radau;
+  if (!own && (exact || job.impact))
     throw InputError(fmt::format(
         "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
         "impacts take auto or dop853",
         asked));
+  if (choice.method == Method::radau && !(job.input.eps_v > 0.0))
+    throw InputError(
+        "run.integrator = \"radau\" is for friction that sets in softly "
+        "(model.slip_regularisation_m_s); other contact models take auto, dop853, cvode-adams, "
+        "cvode-bdf or arkode");
   return {choice.method, choice.name, choice.reason};
 }
 
@@ -279,7 +317,7 @@ void estimate_error(const RimRecord& a, const RimRecord& b, Trajectory& run) {
 
 Trajectory simulate_rim(const data::Scene& scene, const std::string& law) {
   RimJob job = rim_job(scene, law);
-  const ContactChoice choice = choose(job, scene.run.integrator);
+  const ContactChoice choice = choose(job, scene.run.integrator, scene.run.tolerance);
   job.method = choice.method;
   const double tolerance = scene.run.tolerance;
   RimRecord record = run_job(job, tolerance, 1.0);

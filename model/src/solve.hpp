@@ -6,6 +6,7 @@
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/events.hpp"
+#include "trochoid/model/radau.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/sundials.hpp"
 #include "trochoid/model/taylor.hpp"
@@ -21,7 +22,7 @@ struct Solution {
   Statistics statistics;
 };
 
-enum class Method { taylor, dop853, cvode_adams, cvode_bdf, arkode };
+enum class Method { taylor, dop853, radau, cvode_adams, cvode_bdf, arkode };
 
 /// What a scene's run.integrator means for a smooth polynomial model, with the reason in words.
 struct Choice {
@@ -71,6 +72,7 @@ template <class System, class DualSystem>
                              const StepControl<System::kStates>& control, Method method) {
   if (method == Method::taylor) return solve_stepwise<Taylor>(system, start, t_s, control);
   if (method == Method::dop853) return solve_stepwise<DormandPrince>(system, start, t_s, control);
+  if (method == Method::radau) return solve_stepwise<Radau>(system, start, t_s, control);
   constexpr int n = System::kStates;
   const Eigen::VectorXd y0 = Eigen::Map<const Eigen::VectorXd>(start.v, n);
   return from_sundials(integrate_sundials(make_ode(duals), t_s.front(), y0, t_s,

@@ -488,7 +488,7 @@ def simulate(scene: Union[Path, Mapping, Scene], *, until_s: Optional[float] = N
 
     until_s, rate_hz  end time [s] and output rate [Hz]
     tolerance         of the integration
-    integrator        auto, dop853, taylor, cvode-adams, cvode-bdf or arkode
+    integrator        auto, dop853, taylor, radau, cvode-adams, cvode-bdf or arkode
     output            write the trajectory into this CSV
     """
     value = Scene(scene)._value.with_run(

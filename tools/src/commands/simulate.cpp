@@ -207,7 +207,7 @@ void add_simulate_command(CLI::App& app) {
       ->check(number_within(1e-15, 0.1));
   command->add_option("--model", options->model, "Model, instead of the scene's");
   command->add_option("--integrator", options->integrator,
-                      "auto, dop853, taylor, cvode-adams, cvode-bdf or arkode");
+                      "auto, dop853, taylor, radau, cvode-adams, cvode-bdf or arkode");
   command->add_flag("--thesis", options->thesis,
                     "Add body rates, angular momentum, wrapped angles and running integrals");
   command->add_option("--plots", options->plots,
