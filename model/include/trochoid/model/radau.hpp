@@ -349,7 +349,7 @@ class Radau {
   /// Whether the last change of every derivative is small beside the derivative, each component
   /// measured by its size.
   [[nodiscard]] bool derivatives_rest() const {
-    constexpr double kRest = 1e-6;
+    constexpr double kRest = 1e-4;  // what the next change would leave is far less
     if constexpr (requires { S::kLanes; }) {
       typename S::Lanes changed{}, all{};
       for (int c = 0; c < kN; ++c) {
