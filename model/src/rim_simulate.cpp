@@ -245,18 +245,19 @@ ContactChoice choose(const RimJob& job, const std::string& asked, double toleran
     throw InputError(
         "run.integrator = \"taylor\" needs polynomial equations; contact models take auto, dop853, "
         "radau, cvode-adams, cvode-bdf or arkode");
-  const Choice choice = choose_integrator(asked);
-  const bool own = choice.method == Method::dop853 || choice.method == Method::radau;
-  if (!own && (exact || job.impact))
-    throw InputError(fmt::format(
-        "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
-        "impacts take auto or dop853",
-        asked));
-  if (choice.method == Method::radau && !(job.input.eps_v > 0.0))
+  if (asked == "radau") {
+    if (job.input.eps_v > 0.0) return {Method::radau, asked, "asked for"};
     throw InputError(
         "run.integrator = \"radau\" is for friction that sets in softly "
         "(model.slip_regularisation_m_s); other contact models take auto, dop853, cvode-adams, "
         "cvode-bdf or arkode");
+  }
+  const Choice choice = choose_integrator(asked);
+  if (choice.method != Method::dop853 && (exact || job.impact))
+    throw InputError(fmt::format(
+        "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
+        "impacts take auto or dop853",
+        asked));
   return {choice.method, choice.name, choice.reason};
 }
 

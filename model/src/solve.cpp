@@ -14,13 +14,11 @@ Choice choose_integrator(const std::string& asked) {
   }
   if (asked == "taylor") return {Method::taylor, asked, "asked for"};
   if (asked == "dop853") return {Method::dop853, asked, "asked for"};
-  if (asked == "radau") return {Method::radau, asked, "asked for"};
   if (asked == "cvode-adams") return {Method::cvode_adams, asked, "asked for"};
   if (asked == "cvode-bdf") return {Method::cvode_bdf, asked, "asked for"};
   if (asked == "arkode") return {Method::arkode, asked, "asked for"};
   throw InputError(fmt::format(
-      "run.integrator = \"{}\" must be auto, taylor, dop853, radau, cvode-adams, cvode-bdf or "
-      "arkode",
+      "run.integrator = \"{}\" must be auto, taylor, dop853, cvode-adams, cvode-bdf or arkode",
       asked));
 }
 

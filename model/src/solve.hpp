@@ -6,7 +6,6 @@
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/events.hpp"
-#include "trochoid/model/radau.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/sundials.hpp"
 #include "trochoid/model/taylor.hpp"
@@ -72,7 +71,6 @@ template <class System, class DualSystem>
                              const StepControl<System::kStates>& control, Method method) {
   if (method == Method::taylor) return solve_stepwise<Taylor>(system, start, t_s, control);
   if (method == Method::dop853) return solve_stepwise<DormandPrince>(system, start, t_s, control);
-  if (method == Method::radau) return solve_stepwise<Radau>(system, start, t_s, control);
   constexpr int n = System::kStates;
   const Eigen::VectorXd y0 = Eigen::Map<const Eigen::VectorXd>(start.v, n);
   return from_sundials(integrate_sundials(make_ode(duals), t_s.front(), y0, t_s,

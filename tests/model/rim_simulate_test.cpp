@@ -126,6 +126,31 @@ TEST(RimSimulation, AgreesBetweenItsIntegrators) {
   }
 }
 
+// Implicit steps damp what grows slowly, a top that falls asleep as well: they are for what is
+// stiff.
+TEST(RimSimulation, TakesImplicitStepsWhereFrictionIsStiffAndRefusesThemElsewhere) {
+  data::Scene scene = reference_scene("s08_slide_disc");
+  scene.run.until_s = 0.1;
+  scene.model.slip_regularisation_m_s = 1e-5;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.integrator, "radau");
+  EXPECT_LE(run.error_estimate_rad, 1e-8);
+  scene.model.slip_regularisation_m_s = 1.0;
+  EXPECT_EQ(simulate(scene).integrator, "dop853");
+  for (const char* name : {"s10_stick_slip_event", "s06_roll_disc", "s05_smooth_disc",
+                           "s03_top_thesis_base", "s02_free_symmetric"}) {
+    data::Scene other = reference_scene(name);
+    other.run.integrator = "radau";
+    try {
+      (void)simulate(other);
+      ADD_FAILURE() << name;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("run.integrator = \"radau\""), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
 // With 0 the contact couples are 0/0 where a rate is zero.
 TEST(RimSimulation, RefusesCouplesWithoutRegularisation) {
   data::Scene scene = reference_scene("s06_roll_disc");

@@ -27,8 +27,8 @@ struct Options {
   fs::path out = "study-stability";
 };
 
-constexpr std::array<const char*, 5> kIntegrators{"auto", "dop853", "taylor", "cvode-adams",
-                                                  "cvode-bdf"};
+constexpr std::array<const char*, 6> kIntegrators{"auto",  "dop853",      "taylor",
+                                                  "radau", "cvode-adams", "cvode-bdf"};
 constexpr std::array<double, 2> kTolerances{1e-6, 1e-10};
 
 struct Extreme {
