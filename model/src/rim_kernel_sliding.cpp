@@ -25,7 +25,7 @@ double explicit_steps(const RimModel& model, const Coulomb<double>& friction, do
 // nothing in a path that keeps to a slow creep tells that they are about to run away.
 bool asks_for_implicit_steps(const RimModel& model, double explicit_bound, double turning_rad_s,
                              const RimRunOptions& options) {
-  constexpr double kStepsPerTime = 45.0;  // of the fastest turn
+  constexpr double kStepsPerTime = 80.0;  // of the fastest turn
   constexpr double kAtTolerance = 1e-7, kPower = 1.0 / 6.0;
   const double fastest_rad_s = std::max(std::sqrt(model.body.g / model.body.R), turning_rad_s);
   return explicit_bound > kStepsPerTime * options.end_s * fastest_rad_s *

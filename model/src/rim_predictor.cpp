@@ -215,7 +215,7 @@ void RimPredictor::fill_values(const RimPath<S>& path, Call& call, Prediction& o
           value_of(path.rows[n][row_component(wanted[o])]);
   out.outcome = path.end.outcome;
   out.valid_until_s = call.request.start_s + path.end.end_s;
-  out.steps = path.end.statistics.steps;
+  out.steps = path.end.work;
   // Local errors add up; those of the angles act on the path through its size.
   const double reach_m = model_.body.R + std::hypot(value_of(path.end.y[Rim::x]) - call.values[kX],
                                                     value_of(path.end.y[Rim::y]) - call.values[kY]);

@@ -41,6 +41,7 @@ struct RimRunEnd {
   double side = 1.0;
   std::vector<Event> events;
   Statistics statistics;
+  int work = 0;  ///< steps, each implicit one, which takes so much longer, counted as three
   double error_sum = 0.0;  ///< local errors in units of the tolerance
 };
 
@@ -206,6 +207,7 @@ class RimRun {
         options_.components & Stepper::kAll, rules);
     const StepCounts& counts = stepper.counts();
     end_.statistics.steps += counts.steps;
+    end_.work += counts.steps * Stepper::kWork;
     end_.statistics.rejected += counts.rejected;
     end_.statistics.evaluations += counts.evaluations;
     end_.error_sum += counts.error_sum;

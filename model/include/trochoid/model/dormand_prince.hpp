@@ -76,6 +76,7 @@ class DormandPrince {
   static constexpr int kN = System::kStates;
   using Y = State<S, kN>;
   static constexpr unsigned kAll = (kN >= 32) ? ~0u : (1u << kN) - 1u;
+  static constexpr int kWork = 1;  ///< of a step, to compare steppers by
 
   DormandPrince(const System& system, const StepControl<kN>& control)
       : system_(system), control_(control) {}

@@ -59,7 +59,7 @@ struct Prediction {
   Outcome outcome = Outcome::reached_end;
   double valid_until_s = 0.0;
   double error_estimate = 0.0;  ///< largest estimated global error of x, y [m]
-  int steps = 0;
+  int steps = 0;  ///< that took the time of an explicit one: an implicit one counts as three
 };
 
 /// A model bound to a scene's geometry and terms, as a function of its parameters. Thread-safe:

@@ -107,8 +107,8 @@ struct ComplexSide {
   }
 };
 
-/// Coefficients of the method [HairerWanner1996] (IV.5.9) and, of the transformation that makes its
-/// matrix block diagonal, (IV.8.4).
+/// Coefficients of the method, [HairerWanner1996] table IV.5.6, and of the transformation that
+/// makes the inverse of its matrix block diagonal (IV.8.4).
 namespace radau {
 inline constexpr double kRoot6 = 2.449489742783178098197284074705891;
 inline constexpr double kC1 = (4.0 - kRoot6) / 10.0, kC2 = (4.0 + kRoot6) / 10.0;
@@ -136,10 +136,12 @@ class Radau {
   static constexpr int kN = System::kStates;
   using Y = State<S, kN>;
   static constexpr unsigned kAll = (kN >= 32) ? ~0u : (1u << kN) - 1u;
+  static constexpr int kWork = 3;  ///< of a step, in those of DormandPrince
 
   /// The local error is estimated at third order, far above that of the step taken: held to a lower
   /// power of the tolerance, as in [HairerWanner1996]'s own program, it leaves an error of the size
   /// asked for.
+  /// @param control  every absolute tolerance above 0: they tell the components' sizes.
   Radau(const System& system, const StepControl<kN>& control)
       : system_(system), plain_(plain(system)), control_(control) {
     const double looser = 0.03 * __builtin_pow(control.rtol, 2.0 / 3.0) / control.rtol;
