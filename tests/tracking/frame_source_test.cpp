@@ -245,6 +245,15 @@ TEST_F(FrameSourceTest, APhotographTakenWithTheCameraTurnedComesUpright) {
   EXPECT_FALSE(source->next());
 }
 
+TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {
+  cv::imwrite((folder_ / "half.png").string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)));
+  fs::rename(folder_ / "half.png", folder_ / "50%d.png");
+  const auto source = open_video(folder_ / "50%d.png");
+  const auto frame = source->next();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->luma.at<uchar>(3, 3), 90);
+}
+
 TEST_F(FrameSourceTest, BadFilesAreRefusedInOneLineThatNamesThem) {
   const fs::path empty = folder_ / "empty.mp4", words = folder_ / "words.mp4";
   std::ofstream(empty).close();

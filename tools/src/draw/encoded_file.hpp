@@ -15,8 +15,9 @@ namespace coding {
 /// The same, coded fast, for what is drawn to be looked at.
 inline constexpr const char* kForViewing = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p";
 inline constexpr const char* kLossless = "-c:v ffv1 -pix_fmt bgr0";
-inline constexpr const char* kPng = "-c:v png";
-inline constexpr const char* kJpeg = "-c:v mjpeg -q:v 2 -pix_fmt yuvj444p";
+/// One picture, whatever a % in its path may look like.
+inline constexpr const char* kPng = "-update 1 -c:v png -pred mixed";
+inline constexpr const char* kJpeg = "-update 1 -c:v mjpeg -q:v 2 -pix_fmt yuvj444p";
 }  // namespace coding
 
 /// A folder for what another process writes. Once it is gone, by its end or by Ctrl-C, a process

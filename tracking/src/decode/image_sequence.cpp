@@ -117,7 +117,8 @@ InputHandle open_input(const ImageSequence& sequence, std::optional<double> fram
     av_dict_set(&options, "pattern_type", numbered ? "sequence" : "glob", 0);
     if (numbered) av_dict_set_int(&options, "start_number", sequence.first_number, 0);
   } else {
-    url = "file:" + url;  // a colon in a file name is not a protocol
+    url = "file:" + url;                               // a colon in a file name is not a protocol,
+    av_dict_set(&options, "pattern_type", "none", 0);  // nor is %d in a picture's a series
   }
   AVFormatContext* raw = nullptr;
   const int status = avformat_open_input(&raw, url.c_str(), format, &options);
