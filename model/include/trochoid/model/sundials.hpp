@@ -8,8 +8,8 @@
 #include "trochoid/model/dormand_prince.hpp"
 #include "trochoid/model/outcome.hpp"
 
-/// SUNDIALS' CVODE and ARKODE behind one call: the independent check of our own steppers, and the
-/// solver of choice where the equations are stiff (regularised friction).
+/// SUNDIALS' CVODE and ARKODE behind one call: the independent check of our own steppers, the stiff
+/// one and its derivatives included.
 namespace trochoid::model {
 
 /// Forward sensitivities s = dy/dp carried beside the states: s' = (df/dy) s + df/dp. They take
