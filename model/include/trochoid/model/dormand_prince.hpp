@@ -2,6 +2,7 @@
 #include "trochoid/model/dormand_prince_tableau.hpp"
 #include "trochoid/model/dual.hpp"
 #include "trochoid/model/isa.hpp"
+#include "trochoid/model/stepping.hpp"
 #include "trochoid/model/widely.hpp"
 
 /// Explicit Runge-Kutta integration of order 8(5,3) with dense output of order 7 (DOP853,
@@ -37,40 +38,8 @@ struct State {
   TROCHOID_INLINE const S& operator[](int i) const { return v[i]; }
 };
 
-/// What a step may cost. The error of component i is measured in rtol |y_i| + atol_i. Leave atol_i
-/// at the size where the component stops to matter, times rtol: a fast spin has its own scale and
-/// must not set that of a slow angle.
-template <int N>
-struct StepControl {
-  double rtol = 1e-10;
-  double atol[N] = {};
-  double first_step_s = 0.0;  ///< 0: chosen from the derivatives
-  double max_step_s = 0.0;    ///< 0: unlimited
-  int max_steps = 1000000;
-  /// Dual only: lanes must meet the tolerance as well, down to 1e-11.
-  bool control_derivatives = false;
-};
-
-/// The same tolerance for every component, relative and absolute.
-template <int N>
-[[nodiscard]] TROCHOID_INLINE StepControl<N> uniform_control(double tolerance) {
-  StepControl<N> control;
-  control.rtol = tolerance;
-  for (int i = 0; i < N; ++i) control.atol[i] = tolerance;
-  return control;
-}
-
-enum class StepEnd { accepted, step_limit, rounding_limit, not_finite };
-
-struct StepCounts {
-  int steps = 0;
-  int rejected = 0;
-  int evaluations = 0;
-  double error_sum = 0.0;  ///< accepted local errors in units of the tolerance, added up
-};
-
 template <class System>
-class DormandPrince {
+class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
  public:
   using S = typename System::Scalar;
   static constexpr int kN = System::kStates;
@@ -79,62 +48,19 @@ class DormandPrince {
   static constexpr int kWork = 1;  ///< of a step, to compare steppers by
 
   DormandPrince(const System& system, const StepControl<kN>& control)
-      : system_(system), control_(control) {}
+      : Steps(control), system_(system) {}
 
   /// Starts, or starts again after an event, at (t_s, y). Statistics go on.
   void start(double t_s, const Y& y) {
-    t_ = t_previous_ = t_s;
+    this->stand_at(t_s);
     y_ = y_previous_ = y;
-    step_ = 0.0;
     dense_ready_ = 0;
-    rejected_before_ = false;
     evaluate(t_, y_, k_[0]);
-    h_ = control_.first_step_s > 0.0 ? control_.first_step_s : 0.0;
   }
 
-  /// One accepted step forward, never beyond t_limit_s.
-  [[nodiscard]] StepEnd step(double t_limit_s) {
-    if (h_ <= 0.0) h_ = first_step(t_limit_s);
-    int attempts_not_finite = 0;
-    while (true) {
-      if (counts_.steps + counts_.rejected >= control_.max_steps) return StepEnd::step_limit;
-      double h = h_;
-      if (control_.max_step_s > 0.0 && h > control_.max_step_s) h = control_.max_step_s;
-      const bool last = t_ + 1.01 * h >= t_limit_s;
-      if (last) h = t_limit_s - t_;
-      if (!(h > 0.0) || (!last && h <= 1e-15 * __builtin_fabs(t_))) {
-        return attempts_not_finite > 0 ? StepEnd::not_finite : StepEnd::rounding_limit;
-      }
-      const double error = attempt(h);
-      if (!__builtin_isfinite(error)) {
-        ++counts_.rejected;
-        if (++attempts_not_finite > 40) return StepEnd::not_finite;
-        h_ = 0.1 * h;
-        rejected_before_ = true;
-        continue;
-      }
-      const double factor = step_factor(error);
-      if (error <= 1.0) {
-        accept(h, last ? t_limit_s : t_ + h, error);
-        // A step cut short by the limit says little about the next one: keep the longer of the two.
-        const double next = h * (rejected_before_ && factor > 1.0 ? 1.0 : factor);
-        h_ = last && next < h_ ? h_ : next;
-        rejected_before_ = false;
-        return StepEnd::accepted;
-      }
-      ++counts_.rejected;
-      rejected_before_ = true;
-      h_ = h * factor;
-    }
-  }
-
-  [[nodiscard]] double t_s() const { return t_; }
-  [[nodiscard]] double t_previous_s() const { return t_previous_; }
-  [[nodiscard]] double step_s() const { return step_; }
   [[nodiscard]] const Y& y() const { return y_; }
   /// dy/dt at t_s() (the next step's first stage).
   [[nodiscard]] const Y& derivative() const { return k_[0]; }
-  [[nodiscard]] const StepCounts& counts() const { return counts_; }
   [[nodiscard]] const System& system() const { return system_; }
   /// Parameters may change at an event, before start().
   [[nodiscard]] System& system() { return system_; }
@@ -189,9 +115,6 @@ class DormandPrince {
     y = (y + value_of(r_[0][c])) * u;
     return y + value_of(y_previous_[c]);
   }
-  [[nodiscard]] double fraction(double t_s) const {
-    return step_ > 0.0 ? (t_s - t_previous_) / step_ : 0.0;
-  }
   [[nodiscard]] Y dense_state(double u) const {
     Y y;
     for (int c = 0; c < kN; ++c) y[c] = dense(c, u);
@@ -199,6 +122,10 @@ class DormandPrince {
   }
 
  private:
+  using Steps = Stepping<DormandPrince, System::kStates>;
+  friend Steps;
+  using Steps::control_, Steps::counts_, Steps::step_, Steps::t_, Steps::t_previous_;
+
   TROCHOID_INLINE void evaluate(double t_s, const Y& y, Y& dy) {
     system_.derivative(t_s, y, dy);
     ++counts_.evaluations;
@@ -228,11 +155,13 @@ class DormandPrince {
       run_stages<Row + 1>(h);
     }
   }
+  void get_ready() {}
   /// Stages, new state in y_next_ and the scaled error of a step h.
-  [[nodiscard]] double attempt(double h) {
+  [[nodiscard]] Attempt attempt(double h) {
     run_stages<1>(h);
     widely<S>([&]() TROCHOID_LAMBDA_INLINE { stage_state<dop853::kStages>(h, y_next_); });
-    return error_norm(h);
+    const double error = error_norm(h);
+    return {__builtin_isfinite(error) ? Attempt::End::done : Attempt::End::not_finite, error};
   }
 
   template <int J = 0>
@@ -309,18 +238,13 @@ class DormandPrince {
     return factor < 0.333 ? 0.333 : (factor > 6.0 ? 6.0 : factor);
   }
 
-  void accept(double h, double t_new, double error) {
+  void accept(double /*h*/, double t_new) {
     evaluate(t_new, y_next_, k_[dop853::kStages]);
     y_previous_ = y_;
     first_stage_ = k_[0];
     y_ = y_next_;
-    t_previous_ = t_;
-    t_ = t_new;
-    step_ = h;
     dense_ready_ = 0;
     k_[0] = k_[dop853::kStages];
-    ++counts_.steps;
-    counts_.error_sum += error;
   }
 
   /// Stage of the dense output. k_[0] already belongs to the next step, so its weight is applied to
@@ -394,10 +318,6 @@ class DormandPrince {
   }
 
   System system_;
-  StepControl<kN> control_;
-  StepCounts counts_;
-  double t_ = 0.0, t_previous_ = 0.0, step_ = 0.0, h_ = 0.0;
-  bool rejected_before_ = false;
   unsigned dense_ready_ = 0;
   Y y_, y_previous_, y_next_, first_stage_;
   Y k_[dop853::kAllStages];

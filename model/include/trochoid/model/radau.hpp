@@ -130,7 +130,7 @@ inline constexpr double kError[3] = {-(13.0 + 7.0 * kRoot6) / 3.0, (-13.0 + 7.0 
 }  // namespace radau
 
 template <class System>
-class Radau {
+class Radau : public Stepping<Radau<System>, System::kStates> {
  public:
   using S = typename System::Scalar;
   static constexpr int kN = System::kStates;
@@ -143,7 +143,7 @@ class Radau {
   /// asked for.
   /// @param control  every absolute tolerance above 0: they tell the components' sizes.
   Radau(const System& system, const StepControl<kN>& control)
-      : system_(system), plain_(plain(system)), control_(control) {
+      : Steps(control), system_(system), plain_(plain(system)) {
     const double looser = 0.03 * __builtin_pow(control.rtol, 2.0 / 3.0) / control.rtol;
     control_.rtol *= looser;
     for (int i = 0; i < kN; ++i) {
@@ -156,60 +156,17 @@ class Radau {
 
   /// Starts, or starts again after an event, at (t_s, y). Statistics go on.
   void start(double t_s, const Y& y) {
-    t_ = t_previous_ = t_s;
+    this->stand_at(t_s);
     y_ = y;
     for (int c = 0; c < kN; ++c) {
       for (Y& row : dense_) row[c] = S(0.0);
       bend_[c] = S(0.0);
     }
-    step_ = 0.0;
-    rejected_before_ = false;
     evaluate(t_, y_, slope_);
-    h_ = control_.first_step_s > 0.0 ? control_.first_step_s : 0.0;
   }
 
-  /// One accepted step forward, never beyond t_limit_s.
-  [[nodiscard]] StepEnd step(double t_limit_s) {
-    if (h_ <= 0.0) h_ = first_step(t_limit_s);
-    find_jacobian();
-    int attempts_not_finite = 0;
-    while (true) {
-      if (counts_.steps + counts_.rejected >= control_.max_steps) return StepEnd::step_limit;
-      double h = h_;
-      if (control_.max_step_s > 0.0 && h > control_.max_step_s) h = control_.max_step_s;
-      const bool last = t_ + 1.01 * h >= t_limit_s;
-      if (last) h = t_limit_s - t_;
-      if (!(h > 0.0) || (!last && h <= 1e-15 * __builtin_fabs(t_)))
-        return attempts_not_finite > 0 ? StepEnd::not_finite : StepEnd::rounding_limit;
-      const Newton newton = prepare(h) ? find_stages(h) : Newton::diverged;
-      const double error = newton == Newton::converged ? error_norm(h) : 0.0;
-      if (newton != Newton::converged || !__builtin_isfinite(error)) {
-        ++counts_.rejected;
-        rejected_before_ = true;
-        if (newton == Newton::not_finite && ++attempts_not_finite > 40) return StepEnd::not_finite;
-        h_ = (newton == Newton::not_finite ? 0.1 : 0.4) * h;
-        continue;
-      }
-      const double factor = step_factor(error);
-      if (error <= 1.0) {
-        accept(h, last ? t_limit_s : t_ + h, error);
-        const double next = h * (rejected_before_ && factor > 1.0 ? 1.0 : factor);
-        h_ = last && next < h_ ? h_ : next;
-        rejected_before_ = false;
-        return StepEnd::accepted;
-      }
-      ++counts_.rejected;
-      rejected_before_ = true;
-      h_ = h * factor;
-    }
-  }
-
-  [[nodiscard]] double t_s() const { return t_; }
-  [[nodiscard]] double t_previous_s() const { return t_previous_; }
-  [[nodiscard]] double step_s() const { return step_; }
   [[nodiscard]] const Y& y() const { return y_; }
   [[nodiscard]] const Y& derivative() const { return slope_; }
-  [[nodiscard]] const StepCounts& counts() const { return counts_; }
   [[nodiscard]] const System& system() const { return system_; }
 
   /// The last step's polynomials are always ready.
@@ -225,9 +182,6 @@ class Radau {
                      u - 1.0) +
            value_of(bend_[c]) * bending(u);
   }
-  [[nodiscard]] double fraction(double t_s) const {
-    return step_ > 0.0 ? (t_s - t_previous_) / step_ : 0.0;
-  }
   [[nodiscard]] Y dense_state(double u) const {
     Y y;
     for (int c = 0; c < kN; ++c) y[c] = dense(c, u);
@@ -235,7 +189,9 @@ class Radau {
   }
 
  private:
-  enum class Newton { converged, diverged, not_finite };
+  using Steps = Stepping<Radau, System::kStates>;
+  friend Steps;
+  using Steps::control_, Steps::counts_, Steps::step_, Steps::t_;
 
   static auto plain(const System& system) {
     if constexpr (requires { S::kLanes; })
@@ -263,8 +219,8 @@ class Radau {
     return u * (1.0 + u * (-4.5 + u * (6.0 - 2.5 * u)));
   }
 
-  /// By difference quotients: Newton's iteration needs no better.
-  void find_jacobian() {
+  /// The Jacobian, by difference quotients: Newton's iteration needs no better.
+  void get_ready() {
     State<double, kN> y, rate, moved;
     for (int i = 0; i < kN; ++i) y[i] = value_of(y_[i]);
     plain_.derivative(t_, y, rate);
@@ -368,7 +324,14 @@ class Radau {
     return true;
   }
 
-  [[nodiscard]] Newton find_stages(double h) {
+  [[nodiscard]] Attempt attempt(double h) {
+    Attempt tried{prepare(h) ? find_stages(h) : Attempt::End::diverged};
+    if (tried.end == Attempt::End::done) tried.error = error_norm(h);
+    if (!__builtin_isfinite(tried.error)) tried.end = Attempt::End::diverged;
+    return tried;
+  }
+
+  [[nodiscard]] Attempt::End find_stages(double h) {
     constexpr int kMost = 10;
     constexpr double kC[3] = {radau::kC1, radau::kC2, 1.0};
     guess(h);
@@ -382,17 +345,17 @@ class Radau {
       }
       widely<S>([&]() TROCHOID_LAMBDA_INLINE { improve(h, values_rest); });
       const double change = change_norm();
-      if (!__builtin_isfinite(change)) return Newton::not_finite;
+      if (!__builtin_isfinite(change)) return Attempt::End::not_finite;
       if (!values_rest && iteration > 0) {
         const double rate = change / before;
-        if (rate >= 0.99) return Newton::diverged;
+        if (rate >= 0.99) return Attempt::End::diverged;
         values_rest = rate / (1.0 - rate) * change <= converged_;
       }
       values_rest = values_rest || change <= 1e-3 * converged_;
-      if (values_rest && derivatives_rest()) return Newton::converged;
+      if (values_rest && derivatives_rest()) return Attempt::End::done;
       before = change;
     }
-    return Newton::diverged;
+    return Attempt::End::diverged;
   }
 
   /// Of the collocation polynomial at the start of the step.
@@ -419,7 +382,7 @@ class Radau {
     return factor < 0.2 ? 0.2 : (factor > 8.0 ? 8.0 : factor);
   }
 
-  void accept(double h, double t_new, double error) {
+  void accept(double h, double t_new) {
     for (int c = 0; c < kN; ++c) bend_[c] = missing_slope(h, c);
     RealSide<S, kN> side{bend_};
     real_.solve(side);
@@ -433,12 +396,7 @@ class Radau {
       dense_[2][c] = dense_[1][c] - bend;
       y_[c] += z_[2][c];
     }
-    t_previous_ = t_;
-    t_ = t_new;
-    step_ = h;
-    evaluate(t_, y_, slope_);
-    ++counts_.steps;
-    counts_.error_sum += error;
+    evaluate(t_new, y_, slope_);
   }
 
   /// A change of every component by a hundredth of its tolerance's size; the error tells the rest.
@@ -455,12 +413,8 @@ class Radau {
 
   System system_;
   Plain plain_;
-  StepControl<kN> control_;
   double size_[kN];
   double converged_ = 0.0;  ///< what Newton's iteration may leave, in tolerances
-  StepCounts counts_;
-  double t_ = 0.0, t_previous_ = 0.0, step_ = 0.0, h_ = 0.0;
-  bool rejected_before_ = false;
   double jacobian_[kN][kN];
   SmallLu<double, kN> real_;
   SmallLu<Complex, kN> complex_;
