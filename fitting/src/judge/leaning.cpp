@@ -1,5 +1,6 @@
 #include "judge/leaning.hpp"
 
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -24,22 +25,30 @@ Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
   constexpr double kSeen = 1e-9;  // below that the derivatives are rounding
   const Eigen::MatrixXd jacobian = linearise(problem, u).jacobian;
   const Eigen::VectorXd sizes = jacobian.colwise().norm().cwiseMax(1e-300);
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(jacobian * sizes.cwiseInverse().asDiagonal(),
-                                           Eigen::ComputeThinU);
+  const Eigen::Index rank = std::min(jacobian.rows(), jacobian.cols());
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(jacobian * sizes.cwiseInverse().asDiagonal());
+  const Eigen::MatrixXd triangle = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeThinU);
   const auto seen = (svd.singularValues().array() > kSeen * svd.singularValues()[0]).count();
-  return svd.matrixU().leftCols(seen);
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(jacobian.rows(), seen);
+  basis.topRows(rank) = svd.matrixU().leftCols(seen);
+  return qr.householderQ() * basis;
 }
 
 // The share a sample with these readings has in the direction of the parameters it says most of: 1
-// where it alone does.
-double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows) {
+// where it alone does; 0 if that is less than `least`.
+double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows,
+                   double least) {
+  double all = 0.0;  // shares in all directions together
+  for (const Reading* reading : readings)
+    all += rows.middleRows(reading->row, width_of(*reading)).squaredNorm();
+  if (all < least) return 0.0;
   Eigen::MatrixXd own(0, rows.cols());
   for (const Reading* reading : readings) {
     const int width = width_of(*reading);
     own.conservativeResize(own.rows() + width, Eigen::NoChange);
     own.bottomRows(width) = rows.middleRows(reading->row, width);
   }
-  if (own.rows() == 0) return 0.0;
   const double largest = Eigen::JacobiSVD<Eigen::MatrixXd>(own).singularValues()[0];
   return largest * largest;
 }
@@ -57,7 +66,7 @@ std::vector<Sample> carrying_most(const Problem& problem, const Eigen::VectorXd&
     std::vector<std::vector<const Reading*>> of_sample(data.t_s.size());
     for (const Reading& reading : data.readings) of_sample[reading.sample].push_back(&reading);
     for (int i = 0; i < static_cast<int>(data.t_s.size()); ++i)
-      if (const double share = leverage_of(of_sample[i], rows); share > kMostOfIt)
+      if (const double share = leverage_of(of_sample[i], rows, kMostOfIt); share > kMostOfIt)
         samples.push_back({arc, i, share});
   }
   std::stable_sort(samples.begin(), samples.end(),

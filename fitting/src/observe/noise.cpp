@@ -203,13 +203,19 @@ NoiseEvidence noise_evidence(const std::vector<NoiseGroup>& groups) {
   const double plain = *std::min_element(surprises.begin(), surprises.end());
   std::vector<std::vector<Eigen::MatrixXd>> rows_of_all;
   for (const NoiseGroup& group : groups) rows_of_all.push_back(rows_of(group));
+  constexpr double kNegligible = 1e-3;
   // The parameters' part of the likelihood is worth, for each of them, the logarithm of how much
   // more noise there is at its frequencies, at most the inflation, and a little for what they would
-  // rather follow of such noise: where the plain one is far beyond that, it says enough.
-  constexpr double kFar = 30.0, kRather = 2.0;
+  // rather follow of such noise: where the plain one and what is known beforehand leave next to no
+  // belief beyond that, they say enough.
+  constexpr double kRather = 2.0;
+  const auto doubt = [&](std::size_t i) { return surprises[i] - 2.0 * std::log(kinds[i].belief); };
+  double least_doubt = doubt(0);
+  for (std::size_t i = 1; i < kinds.size(); ++i) least_doubt = std::min(least_doubt, doubt(i));
+  const double far = least_doubt - 2.0 * std::log(kNegligible);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     const double of_each = kRather + std::log(kinds[i].inflation());
-    surprises[i] = surprises[i] > plain + kFar + of_each * static_cast<double>(taken)
+    surprises[i] = doubt(i) > far + of_each * static_cast<double>(taken)
                        ? std::numeric_limits<double>::infinity()
                        : restricted_surprise(rows_of_all, kinds[i]);
   }
@@ -221,7 +227,6 @@ NoiseEvidence noise_evidence(const std::vector<NoiseGroup>& groups) {
     for (const NoiseKind& kind : kinds) all += kind.belief;
     for (NoiseKind& kind : kinds) kind.belief /= all;
   };
-  constexpr double kNegligible = 1e-3;
   share_belief();
   std::erase_if(kinds, [&](const NoiseKind& kind) { return kind.belief < kNegligible; });
   share_belief();

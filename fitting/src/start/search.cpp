@@ -93,20 +93,48 @@ bool settles_it(const Problem& problem, const Found& best) {
   return surely_explained(problem, best) && !(rim && best.unexplained > kClear);
 }
 
+// The best of what starts led to, and how many of them led there.
+class BestValley {
+ public:
+  explicit BestValley(Found best = {}) : best_(std::move(best)) {}
+
+  void take(Found found) {
+    if (!found.solution.usable) return;
+    constexpr double kSameValley = 1e-3;  // of chi-square
+    const double gain = best_.reduced_chi2 / found.reduced_chi2 - 1.0;
+    if (!best_.solution.usable || gain > kSameValley)
+      reached_ = 1;
+    else if (gain > -kSameValley)
+      ++reached_;
+    if (better(found, best_)) best_ = std::move(found);
+  }
+  [[nodiscard]] const Found& best() const { return best_; }
+  /// No better one is to be expected.
+  [[nodiscard]] bool reached_often() const { return reached_ >= 3; }
+
+ private:
+  Found best_;
+  int reached_ = 0;
+};
+
 // A few quick tries: most tracks need no more.
 Found search_briefly(const Problem& problem, const Starter& starter) {
   // Where the angles were seen, starts differ little and a good one is known by its result.
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
+  const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   const std::size_t tried = seen ? 3 : 5;
-  Found best;
+  BestValley valley;
+  const Found& best = valley.best();
   for (const int window : window_sizes(problem)) {
     const std::vector<Start> starts = screened(windowed(problem, window), starter);
     Valleys valleys;
     for (std::size_t i = 0; i < std::min(tried, starts.size()); ++i) {
-      Found found = grow(problem, starts[i], window, {.known = &valleys});
-      if (better(found, best)) best = std::move(found);
+      valley.take(grow(problem, starts[i], window, {.known = &valleys}));
       if (settles_it(problem, best) || exhausted(problem, best)) return best;
       if (seen && followed_closely(problem, best)) return best;
+      // A wrong valley of a top may be reached as often, but is rarely so deep.
+      constexpr double kLikely = 2.0;
+      if (!rim && valley.reached_often() && explained_within(problem, best, kLikely)) return best;
     }
     if (followed_closely(problem, best)) return best;
   }
@@ -155,7 +183,7 @@ std::vector<Start> settled(const Problem& window, const Starter& starter, Starts
 // pass.
 class WideSearch {
  public:
-  WideSearch(const Problem& problem, Found best) : problem_(problem), best_(std::move(best)) {}
+  WideSearch(const Problem& problem, Found best) : problem_(problem), valley_(std::move(best)) {}
 
   Found run(const Starter& starter, StartsFrom from) {
     const bool seen = problem_.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
@@ -166,46 +194,33 @@ class WideSearch {
       constexpr std::size_t kMany = 20, kFew = 6;
       constexpr double kExplainedAll = 1.0, kComeWhatMay = 0.0;  // of the gate
       if (!seen && grown(starts, window, kMany, kExplainedAll)) break;
-      if ((seen || !best_.passed) && grown(starts, window, kFew, kComeWhatMay)) break;
+      if ((seen || !best().passed) && grown(starts, window, kFew, kComeWhatMay)) break;
     }
-    return std::move(best_);
+    return best();
   }
 
  private:
+  [[nodiscard]] const Found& best() const { return valley_.best(); }
   // Whether that was enough.
   bool grown(const std::vector<Start>& starts, int window, std::size_t most,
              double most_over_gate) {
-    constexpr int kOftenEnough = 3;
     constexpr double kSlowly = 1.2;
     Valleys dead_ends;
     for (std::size_t i = 0; i < std::min(most, starts.size()); ++i) {
       const std::size_t known = dead_ends.size();
       Found found = grow(problem_, starts[i], window,
                          {kSlowly, most_over_gate, most_over_gate > 0.0 ? &dead_ends : nullptr});
-      if (found.solution.usable) {
-        dead_ends.resize(known);
-        take(std::move(found));
-      }
-      if (settles_it(problem_, best_) || followed_closely(problem_, best_) ||
-          reached_ >= kOftenEnough || exhausted(problem_, best_))
+      if (found.solution.usable) dead_ends.resize(known);
+      valley_.take(std::move(found));
+      if (settles_it(problem_, best()) || followed_closely(problem_, best()) ||
+          valley_.reached_often() || exhausted(problem_, best()))
         return true;
     }
     return false;
   }
 
-  void take(Found found) {
-    constexpr double kSameValley = 1e-3;  // of chi-square
-    const double gain = best_.reduced_chi2 / found.reduced_chi2 - 1.0;
-    if (!best_.solution.usable || gain > kSameValley)
-      reached_ = 1;
-    else if (gain > -kSameValley)
-      ++reached_;
-    if (better(found, best_)) best_ = std::move(found);
-  }
-
   const Problem& problem_;
-  Found best_;
-  int reached_ = 0;
+  BestValley valley_;
 };
 
 }  // namespace

@@ -89,9 +89,14 @@ bool better(const Found& a, const Found& b) {
   return a.solution.usable && (!b.solution.usable || a.reduced_chi2 < b.reduced_chi2);
 }
 
-bool surely_explained(const Problem& problem, const Found& best) {
+bool explained_within(const Problem& problem, const Found& best, double deviations) {
   return best.passed &&
-         best.reduced_chi2 < 1.0 + 0.5 * std::sqrt(2.0 / std::max(1, problem.rows()));
+         best.reduced_chi2 < 1.0 + deviations * std::sqrt(2.0 / std::max(1, problem.rows()));
+}
+
+bool surely_explained(const Problem& problem, const Found& best) {
+  constexpr double kSurely = 0.5;
+  return explained_within(problem, best, kSurely);
 }
 
 bool exhausted(const Problem& problem, const Found& best) {

@@ -115,8 +115,12 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// Whether a is usable and explains more than b.
 [[nodiscard]] bool better(const Found& a, const Found& b);
 
-/// Whether chi-square is within half a standard deviation of its distribution: from positions alone
-/// neighbouring valleys pass the gate as well.
+/// Whether the gate is passed, and chi-square at most so many standard deviations of its
+/// distribution above what it should be.
+[[nodiscard]] bool explained_within(const Problem& problem, const Found& best, double deviations);
+
+/// Within half a standard deviation: from positions alone neighbouring valleys pass the gate as
+/// well.
 [[nodiscard]] bool surely_explained(const Problem& problem, const Found& best);
 
 /// Whether the search has used up its steps (less than a minute's, half of that where angles were
