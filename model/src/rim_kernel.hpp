@@ -53,9 +53,10 @@ RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input,
 [[nodiscard]] double explicit_steps(const RimModel& model, const Coulomb<double>& friction,
                                     double duration_s);
 
-/// Whether implicit steps are faster than so many explicit ones for a body that turns so fast.
+/// Whether implicit steps are faster than so many explicit ones, from such a tilt and w2.
 [[nodiscard]] bool asks_for_implicit_steps(const RimModel& model, double explicit_bound,
-                                           double turning_rad_s, const RimRunOptions& options);
+                                           double theta_rad, double w2_rad_s,
+                                           const RimRunOptions& options);
 
 /// Body and losses of a system over S from an input over From.
 template <class System, class From>

@@ -23,10 +23,11 @@ double explicit_steps(const RimModel& model, const Coulomb<double>& friction, do
 // about a quarter of the bound, the friction. Measured with derivatives on a coin (R = 12 mm) and a
 // disc (37 mm). Where stability sets explicit steps, derivatives are worse than values besides:
 // nothing in a path that keeps to a slow creep tells that they are about to run away.
-bool asks_for_implicit_steps(const RimModel& model, double explicit_bound, double turning_rad_s,
-                             const RimRunOptions& options) {
+bool asks_for_implicit_steps(const RimModel& model, double explicit_bound, double theta_rad,
+                             double w2_rad_s, const RimRunOptions& options) {
   constexpr double kStepsPerTime = 80.0;  // of the fastest turn
   constexpr double kAtTolerance = 1e-7, kPower = 1.0 / 6.0;
+  const double turning_rad_s = std::abs(w2_rad_s / std::sin(theta_rad));
   const double fastest_rad_s = std::max(std::sqrt(model.body.g / model.body.R), turning_rad_s);
   return explicit_bound > kStepsPerTime * options.end_s * fastest_rad_s *
                               std::pow(kAtTolerance / options.tolerance, kPower);
@@ -38,10 +39,12 @@ RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input, const Ri
   RimRunOptions options = given;
   const Coulomb<S> friction{input.friction, input.eps_v};
   const double steps = explicit_steps(model, friction.values(), options.end_s);
-  const double turning_rad_s = std::abs(value_of(input.w2) / std::sin(value_of(input.theta)));
-  options.stiff = asks_for_implicit_steps(model, steps, turning_rad_s, options);
+  options.stiff =
+      asks_for_implicit_steps(model, steps, value_of(input.theta), value_of(input.w2), options);
   // Stability asks for that many, whatever the motion.
-  if (!options.stiff) options.max_steps = std::max(options.max_steps, static_cast<int>(steps));
+  constexpr double kCountable = 1e9;
+  if (!options.stiff)
+    options.max_steps = std::max(options.max_steps, static_cast<int>(std::min(steps, kCountable)));
   const S limit = value_of(friction.eps_v) > 0.0 ? S(0.0) : friction.mu;
   return with_few_terms(model.terms, [&](auto terms) {
     return rim_path<S, Coulomb>(model, input, friction, limit, Regime::sliding, options, t_s,

@@ -275,6 +275,7 @@ class RimRun {
     limits.control_derivatives = exact();
     if constexpr (kCoulomb) {
       if (options_.stiff) {
+        limits = Radau<Slide>::loosened(limits);
         resolve_stick(value_of(slide_.friction.eps_v), limits);
         return sliding_phase(Radau<Slide>(slide_, limits), sink);
       }

@@ -231,8 +231,8 @@ ContactChoice choose(const RimJob& job, const std::string& asked, double toleran
     if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
     const double steps =
         job.law == "sliding" ? explicit_steps(job.model, job.friction(), job.t_s.back()) : 0.0;
-    const double turning_rad_s = std::abs(job.input.w2 / std::sin(job.input.theta));
-    if (asks_for_implicit_steps(job.model, steps, turning_rad_s, job.options(tolerance, 1.0)))
+    if (asks_for_implicit_steps(job.model, steps, job.input.theta, job.input.w2,
+                                job.options(tolerance, 1.0)))
       return {
           Method::radau, "radau",
           fmt::format("stiff friction: an explicit method would take about {:.0e} steps", steps)};
@@ -248,8 +248,8 @@ ContactChoice choose(const RimJob& job, const std::string& asked, double toleran
   if (asked == "radau") {
     if (job.input.eps_v > 0.0) return {Method::radau, asked, "asked for"};
     throw InputError(
-        "run.integrator = \"radau\" is for friction that sets in softly "
-        "(model.slip_regularisation_m_s); other contact models take auto, dop853, cvode-adams, "
+        "run.integrator = \"radau\" is for friction that sets in softly (model.friction above 0, "
+        "with model.slip_regularisation_m_s); other contact models take auto, dop853, cvode-adams, "
         "cvode-bdf or arkode");
   }
   const Choice choice = choose_integrator(asked);

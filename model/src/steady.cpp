@@ -61,7 +61,7 @@ struct RollingAcceleration {
 struct SmoothAcceleration {
   template <class System, class Y>
   auto operator()(const System& system, const Y& y) const {
-    return system.contact(system.motion(y)).a;
+    return system.contact(system.motion(y), system.slip(y)).a;
   }
 };
 

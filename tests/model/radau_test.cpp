@@ -32,6 +32,11 @@ struct Relaxation {
   Relaxation<double> values() const { return {value_of(rate), value_of(turning)}; }
 };
 
+template <class System>
+Radau<System> radau_for(const System& system, double tolerance) {
+  return {system, Radau<System>::loosened(uniform_control<System::kStates>(tolerance))};
+}
+
 /// A state grows without bound in finite time.
 struct Explosion {
   using Scalar = double;
@@ -95,12 +100,14 @@ TEST(SmallLu, SolvesRealAndComplexSystemsThatNeedPivots) {
   const double singular[2][2] = {{1.0, 2.0}, {2.0, 4.0}};
   SmallLu<double, 2> none;
   EXPECT_FALSE(none.factorise(singular));
+  const double endless[2][2] = {{INFINITY, 0.0}, {0.0, 1.0}};
+  EXPECT_FALSE(none.factorise(endless));
 }
 
 TEST(Radau, FollowsAStiffRelaxationInFewStepsAlsoBetweenThem) {
   const double rate = 1e6, turning = 2.0, start = 0.3;
   for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
-    Radau<Relaxation<double>> stepper({rate, turning}, uniform_control<2>(tolerance));
+    auto stepper = radau_for(Relaxation<double>{rate, turning}, tolerance);
     stepper.start(0.0, {{start, 0.0}});
     std::vector<double> t_s;
     for (int n = 1; n <= 300; ++n) t_s.push_back(0.01 * n);
@@ -125,7 +132,7 @@ TEST(Radau, FollowsAStiffRelaxationInFewStepsAlsoBetweenThem) {
 TEST(Radau, DifferentiatesAsExactlyAsItIntegrates) {
   using D = Dual<4>;
   const double k = 300.0, a = 2.0, start = 0.7, end_s = 0.02;  // exp(-6): the start still shows
-  Radau<Relaxation<D>> stepper({D::variable(k, 0), D::variable(a, 1)}, uniform_control<2>(1e-9));
+  auto stepper = radau_for(Relaxation<D>{D::variable(k, 0), D::variable(a, 1)}, 1e-9);
   stepper.start(0.0, {{D::variable(start, 2), D(0.0)}});
   while (stepper.t_s() < end_s) ASSERT_EQ(stepper.step(end_s), StepEnd::accepted);
   const double decay = std::exp(-k * end_s);
@@ -137,7 +144,7 @@ TEST(Radau, DifferentiatesAsExactlyAsItIntegrates) {
   EXPECT_NEAR(x.derivative[2], (1.0 - decay) / k, 1e-9);
 
   // The values are those of a run without derivatives, to rounding.
-  Radau<Relaxation<double>> plain({k, a}, uniform_control<2>(1e-9));
+  auto plain = radau_for(Relaxation<double>{k, a}, 1e-9);
   plain.start(0.0, {{start, 0.0}});
   while (plain.t_s() < end_s) ASSERT_EQ(plain.step(end_s), StepEnd::accepted);
   EXPECT_EQ(plain.counts().steps, stepper.counts().steps);
@@ -145,7 +152,7 @@ TEST(Radau, DifferentiatesAsExactlyAsItIntegrates) {
 }
 
 TEST(Radau, StopsOnAnEvent) {
-  Radau<Relaxation<double>> stepper({1e5, 1.0}, uniform_control<2>(1e-9));
+  auto stepper = radau_for(Relaxation<double>{1e5, 1.0}, 1e-9);
   stepper.start(0.0, {{0.0, 0.0}});
   const auto run = integrate(stepper, 3.0, nullptr, 0, [](const auto&, int, int) {});
   ASSERT_EQ(run.end, RunEnd::event);
@@ -154,12 +161,55 @@ TEST(Radau, StopsOnAnEvent) {
 }
 
 TEST(Radau, EndsWhereNoStepIsShortEnough) {
-  Radau<Explosion> stepper({}, uniform_control<1>(1e-8));
+  auto stepper = radau_for(Explosion{}, 1e-8);
   stepper.start(0.0, {{1.0}});
   StepEnd end = StepEnd::accepted;
   while (end == StepEnd::accepted && stepper.t_s() < 2.0) end = stepper.step(2.0);
   EXPECT_TRUE(end == StepEnd::rounding_limit || end == StepEnd::not_finite);
   EXPECT_NEAR(stepper.t_s(), 1.0, 1e-3);  // y = 1 / (1 - t)
+}
+
+/// A slope that is no number from some time on.
+template <class T>
+struct Broken {
+  using Scalar = T;
+  static constexpr int kStates = 1;
+  T rate;
+  bool values_too;
+  void derivative(double t, const State<T, 1>& y, State<T, 1>& dy) const {
+    dy[0] = -rate * y[0];
+    if (t < 0.5) return;
+    if (values_too) dy[0] = T(NAN);
+    if constexpr (requires { T::kLanes; }) dy[0].derivative[0] = NAN;
+  }
+  Broken<double> values() const { return {value_of(rate), values_too}; }
+};
+
+TEST(Radau, EndsBeforeSlopesOrDerivativesThatAreNoNumbers) {
+  auto stepper = radau_for(Broken<double>{1.0, true}, 1e-8);
+  stepper.start(0.0, {{1.0}});
+  StepEnd end = StepEnd::accepted;
+  while (end == StepEnd::accepted && stepper.t_s() < 1.0) end = stepper.step(1.0);
+  EXPECT_EQ(end, StepEnd::not_finite);
+  EXPECT_NEAR(stepper.y()[0], std::exp(-stepper.t_s()), 1e-6);
+
+  using D = Dual<4>;
+  auto derived = radau_for(Broken<D>{D::variable(1.0, 0), false}, 1e-8);
+  derived.start(0.0, {{D(1.0)}});
+  end = StepEnd::accepted;
+  while (end == StepEnd::accepted && derived.t_s() < 1.0) end = derived.step(1.0);
+  EXPECT_EQ(end, StepEnd::not_finite);
+  EXPECT_NEAR(derived.y()[0].derivative[0], -derived.t_s() * std::exp(-derived.t_s()), 1e-6);
+}
+
+TEST(Radau, EndsAtItsStepLimit) {
+  StepControl<2> control = uniform_control<2>(1e-9);
+  control.max_steps = 5;
+  Radau<Relaxation<double>> stepper({1e5, 1.0}, control);
+  stepper.start(0.0, {{1.0, 0.0}});
+  StepEnd end = StepEnd::accepted;
+  while (end == StepEnd::accepted) end = stepper.step(3.0);
+  EXPECT_EQ(end, StepEnd::step_limit);
 }
 
 template <class S>
@@ -230,7 +280,10 @@ TEST(Radau, FollowsAStiffBodyAndItsDerivativesAsSundialsDoes) {
 
   RimRunOptions asked;
   asked.tolerance = 1e-9;
-  Radau<Slide<Dual<4>>> stepper(by_friction, rim_control<n>(model.body, asked));
+  using Stepper = Radau<Slide<Dual<4>>>;
+  StepControl<n> control = Stepper::loosened(rim_control<n>(model.body, asked));
+  resolve_stick(input.eps_v, control);
+  Stepper stepper(by_friction, control);
   State<Dual<4>, n> from;
   for (int i = 0; i < n; ++i) from[i] = Dual<4>(start[i]);
   stepper.start(0.0, from);
@@ -273,6 +326,35 @@ TEST(Radau, DerivativesOfSoftFrictionAreRightAtAnyTolerance) {
                 2e-2 * exact.jacobian.col(i).norm())
           << infos[static_cast<std::size_t>(i)].name << " at " << tolerance;
   }
+}
+
+// A body that sticks creeps: the slip it has then is a share of the speed over which friction sets
+// in, however slow that is, beside velocities of the body of 1 m/s. The path goes to that of the
+// exact law in proportion to that speed.
+TEST(Radau, ABodySticksHoweverSharplyFrictionSetsIn) {
+  data::Scene scene = reference("s08_slide_disc").posed.scene;
+  const std::array<double, 1> t_s{0.8};
+  const auto predicted = [&](double eps_v_m_s, double tolerance) {
+    scene.model.slip_regularisation_m_s = eps_v_m_s;
+    const auto predictor = make_predictor(scene);
+    const auto& infos = predictor->parameters();
+    Eigen::VectorXd values(static_cast<Eigen::Index>(infos.size()));
+    for (int i = 0; i < values.size(); ++i) values[i] = infos[static_cast<std::size_t>(i)].value;
+    PredictRequest request;
+    request.t_s = t_s;
+    request.tolerance = tolerance;
+    return predictor->predict(values, request);
+  };
+  const Prediction sharp = predicted(1e-12, 1e-12);
+  ASSERT_EQ(sharp.outcome, Outcome::reached_end);
+  for (const double eps_v_m_s : {1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-12})
+    for (const double tolerance : {1e-1, 1e-3, 1e-6, 1e-10, 1e-13}) {
+      const Prediction run = predicted(eps_v_m_s, tolerance);
+      ASSERT_EQ(run.outcome, Outcome::reached_end) << eps_v_m_s << " at " << tolerance;
+      EXPECT_LT(run.steps, 10000) << eps_v_m_s << " at " << tolerance;
+      EXPECT_LT((run.values - sharp.values).norm(), 30.0 * eps_v_m_s + 0.1 * tolerance + 1e-9)
+          << eps_v_m_s << " at " << tolerance;
+    }
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ class SmallLu {
       pivot_[k] = k;
       for (int i = k + 1; i < N; ++i)
         if (size(lu_[i][k]) > size(lu_[pivot_[k]][k])) pivot_[k] = i;
-      if (!(size(lu_[pivot_[k]][k]) > 0.0)) return false;
+      const double pivot = size(lu_[pivot_[k]][k]);
+      if (!(pivot > 0.0 && __builtin_isfinite(pivot))) return false;
       for (int j = 0; j < N && pivot_[k] != k; ++j) swap(lu_[k][j], lu_[pivot_[k]][j]);
       inverse_[k] = reciprocal(lu_[k][k]);
       for (int i = k + 1; i < N; ++i) {
@@ -141,16 +142,19 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
   /// The local error is estimated at third order, far above that of the step taken: held to a lower
   /// power of the tolerance, as in [HairerWanner1996]'s own program, it leaves an error of the size
   /// asked for.
-  /// @param control  every absolute tolerance above 0: they tell the components' sizes.
+  [[nodiscard]] static StepControl<kN> loosened(StepControl<kN> control) {
+    const double looser = 0.03 * __builtin_pow(control.rtol, 2.0 / 3.0) / control.rtol;
+    control.rtol *= looser;
+    for (double& atol : control.atol) atol *= looser;
+    return control;
+  }
+
+  /// @param control  loosened(), in general; every absolute tolerance above 0: they tell the
+  ///                 components' sizes.
   Radau(const System& system, const StepControl<kN>& control)
       : Steps(control), system_(system), plain_(plain(system)) {
-    const double looser = 0.03 * __builtin_pow(control.rtol, 2.0 / 3.0) / control.rtol;
-    control_.rtol *= looser;
-    for (int i = 0; i < kN; ++i) {
-      size_[i] = control_.atol[i] / control.rtol;
-      control_.atol[i] *= looser;
-    }
-    const double root = __builtin_sqrt(control_.rtol);
+    for (int i = 0; i < kN; ++i) size_[i] = control.atol[i] / control.rtol;
+    const double root = __builtin_sqrt(control.rtol);
     converged_ = root < 0.03 ? root : 0.03;
   }
 
@@ -331,6 +335,14 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
     return tried;
   }
 
+  [[nodiscard]] bool derivatives_finite() const {
+    if constexpr (requires { S::kLanes; })
+      for (const S& after : z_[2].v)
+        for (int lane = 0; lane < S::kLanes; ++lane)
+          if (!__builtin_isfinite(after.derivative[lane])) return false;
+    return true;
+  }
+
   [[nodiscard]] Attempt::End find_stages(double h) {
     constexpr int kMost = 10;
     constexpr double kC[3] = {radau::kC1, radau::kC2, 1.0};
@@ -355,7 +367,7 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
       if (values_rest && derivatives_rest()) return Attempt::End::done;
       before = change;
     }
-    return Attempt::End::diverged;
+    return derivatives_finite() ? Attempt::End::diverged : Attempt::End::not_finite;
   }
 
   /// Of the collocation polynomial at the start of the step.

@@ -61,6 +61,12 @@ struct Sliding {
     return q;
   }
 
+  /// Of the contact point, as the state has it: reckoned from the other velocities it would be
+  /// known to their rounding only, and a body that sticks creeps slower than that.
+  [[nodiscard]] static TROCHOID_INLINE Horizontal<S> slip(const State<S, kStates>& y) {
+    return {y[Rim::un], y[Rim::ut]};
+  }
+
   struct Contact {
     RimAcceleration<S> a;
     ContactForce<S> force;
@@ -68,7 +74,8 @@ struct Sliding {
     S drag_n, drag_mh;  ///< horizontal air force [N]
   };
 
-  [[nodiscard]] TROCHOID_INLINE Contact contact(const NodeMotion<S>& q) const {
+  [[nodiscard]] TROCHOID_INLINE Contact contact(const NodeMotion<S>& q,
+                                                const Horizontal<S>& slip) const {
     const double m = body.m, A = body.A, h = body.signed_h();
     S g0 = (A * q.precession_k - body.C * q.w3) * q.w2;  // couples on w1 without and per N  (S4)
     S g1 = -q.at.slope;
@@ -88,7 +95,7 @@ struct Sliding {
     }
     Horizontal<S> f{S(0.0), S(0.0)};
     if constexpr (Friction<S>::kActive) {
-      f = friction.per_normal(slip_velocity(body, q));
+      f = friction.per_normal(slip);
       g1 += q.at.z * f.along_mh;
     }
     ContactCouple<S> couple;
@@ -113,7 +120,7 @@ struct Sliding {
 
   TROCHOID_INLINE void rates(const State<S, kStates>& y, State<S, kStates>& dy) const {
     const NodeMotion<S> q = motion(y);
-    const Contact r = contact(q);
+    const Contact r = contact(q, slip(y));
     dy[Rim::phi] = q.w2 / q.at.s;
     dy[Rim::theta] = q.w1;
     dy[Rim::psi] = q.w3 - q.precession_k;
@@ -135,25 +142,24 @@ struct Sliding {
   }
 
   [[nodiscard]] ContactForce<S> contact_force(const NodeMotion<S>& q) const {
-    return contact(q).force;
+    return contact(q, slip_velocity(body, q)).force;
   }
 
   /// Face contact, the other rim's touch, lift-off, no admissible force, end of slip.
   void events(double, const State<S, kStates>& y, State<S, kEvents>& g) const {
     const NodeMotion<S> q = motion(y);
-    const Contact r = contact(q);
+    const Horizontal<S> u = slip(y);
+    const Contact r = contact(q, u);
     g[flat] = q.at.s - kFlat_rad;
     g[rim] = body.h > 0.0 ? body.side * q.at.c : S(1.0);
     // N changes sign through infinity where the contact becomes inconsistent: look at N times that.
     g[lift_off] = r.a.normal * r.consistency * (1.0 / (body.m * body.g));
     g[inconsistent] = r.consistency;
     g[stick] = S(1.0);
-    if (stick_speed_m_s > 0.0) {
-      const Horizontal<S> u = slip_velocity(body, q);
+    if (stick_speed_m_s > 0.0)
       g[stick] =
           sqrt(u.along_n * u.along_n + u.along_mh * u.along_mh + 1e-300) * (1.0 / stick_speed_m_s) -
           1.0;
-    }
   }
 };
 
