@@ -220,29 +220,72 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
   EXPECT_NE(sha256_of_recording(folder_), digest);
 }
 
-TEST_F(FrameSourceTest, APhotographTakenWithTheCameraTurnedComesUpright) {
-  cv::Mat upright(kHeight, kWidth, CV_8UC1, cv::Scalar(40));
-  upright(cv::Rect(0, 0, 16, 16)) = 220;  // its upper left corner
-  cv::Mat as_stored;
-  cv::rotate(upright, as_stored, cv::ROTATE_90_COUNTERCLOCKWISE);
+// A photograph as a camera stores it that was held so, by Exif 2.32, 4.6.4: which side of what is
+// seen is row 0 and which is column 0.
+void photograph(const cv::Mat& upright, int orientation, const fs::path& path) {
+  cv::Mat stored = upright.clone();
+  if (orientation >= 5) cv::transpose(upright, stored);
+  constexpr int kAsIs = 2, kFlips[] = {kAsIs, 1, -1, 0, kAsIs, 0, -1, 1};
+  if (const int flip = kFlips[orientation - 1]; flip != kAsIs) cv::flip(stored, stored, flip);
   std::vector<uchar> jpeg;
-  cv::imencode(".jpg", as_stored, jpeg);
-  // Exif 2.32, 4.6.4: Orientation 6, the stored picture is to be turned clockwise.
-  const std::vector<uchar> exif{0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0,    'M', 'M',
-                                0,    42,   0, 0,  0,   8,   0,   1,   1, 0x12, 0,   3,
-                                0,    0,    0, 1,  0,   6,   0,   0,   0, 0,    0,   0};
+  cv::imencode(".jpg", stored, jpeg);
+  const auto value = static_cast<uchar>(orientation);
+  const std::vector<uchar> exif{0xff, 0xe1, 0, 34, 'E', 'x',   'i', 'f', 0, 0,    'M', 'M',
+                                0,    42,   0, 0,  0,   8,     0,   1,   1, 0x12, 0,   3,
+                                0,    0,    0, 1,  0,   value, 0,   0,   0, 0,    0,   0};
   jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
-  std::ofstream(folder_ / "turned.jpg", std::ios::binary)
+  std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
-  const auto source = open_video(folder_ / "turned.jpg");
-  EXPECT_EQ(source->info().width_px, kWidth);
-  EXPECT_EQ(source->info().height_px, kHeight);
-  const auto frame = source->next();
-  ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->luma.size(), upright.size());
-  EXPECT_NEAR(frame->luma.at<uchar>(4, 4), 220, 6);
-  EXPECT_NEAR(frame->luma.at<uchar>(kHeight - 4, 4), 40, 6);
-  EXPECT_FALSE(source->next());
+}
+
+// No two of the eight ways to hold it look alike.
+cv::Mat marked_picture() {
+  cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(40));
+  picture(cv::Rect(0, 0, 16, 16)) = 220;
+  picture(cv::Rect(kWidth - 16, 0, 16, 16)) = 130;
+  return picture;
+}
+
+void expect_upright(const Frame& frame) {
+  ASSERT_EQ(frame.luma.size(), cv::Size(kWidth, kHeight));
+  EXPECT_NEAR(frame.luma.at<uchar>(4, 4), 220, 6);
+  EXPECT_NEAR(frame.luma.at<uchar>(4, kWidth - 4), 130, 6);
+  EXPECT_NEAR(frame.luma.at<uchar>(kHeight - 4, 4), 40, 6);
+}
+
+TEST_F(FrameSourceTest, PhotographsComeUprightHoweverTheCameraWasHeld) {
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    SCOPED_TRACE(orientation);
+    photograph(marked_picture(), orientation, folder_ / "held.jpg");
+    const auto source = open_video(folder_ / "held.jpg");
+    EXPECT_EQ(source->info().width_px, kWidth);
+    EXPECT_EQ(source->info().height_px, kHeight);
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    expect_upright(*frame);
+    EXPECT_FALSE(source->next());
+  }
+}
+
+TEST_F(FrameSourceTest, EveryPhotographOfASeriesSaysHowTheCameraWasHeld) {
+  int pictures = 0;
+  for (const int orientation : {6, 1, 3, 8})
+    photograph(marked_picture(), orientation, folder_ / cv::format("p%d.jpg", pictures++));
+  const auto source = open_video(folder_ / "p*.jpg", {.frame_rate_hz = 10.0});
+  int count = 0;
+  for (; const auto frame = source->next(); ++count) {
+    SCOPED_TRACE(count);
+    expect_upright(*frame);
+  }
+  EXPECT_EQ(count, pictures);
+
+  // Of as many pixels, but higher than wide.
+  cv::Mat portrait;
+  cv::transpose(marked_picture(), portrait);
+  photograph(portrait, 1, folder_ / "p2.jpg");
+  EXPECT_THAT(error_of(folder_ / "p*.jpg", {.frame_rate_hz = 10.0}),
+              HasSubstr(cv::format("frame 2: the picture size changes from %d x %d to %d x %d",
+                                   kWidth, kHeight, kHeight, kWidth)));
 }
 
 TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {

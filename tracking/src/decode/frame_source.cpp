@@ -29,26 +29,34 @@ bool after(const std::optional<data::Moment>& to, const Frame& frame) {
          ((to->frame && frame.index > *to->frame) || (to->t_s && frame.t_s > *to->t_s + 1e-9));
 }
 
-/// Counter-clockwise quarter turns that make a picture upright, 0..3: a video's container tells, of
-/// photographs the picture itself (Exif).
-int quarter_turns(const AVStream& stream, const AVFrame& first) {
-  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
-  if (const auto* own = av_frame_get_side_data(&first, AV_FRAME_DATA_DISPLAYMATRIX);
-      matrix == nullptr && own != nullptr)
-    matrix = own->data;
-  if (matrix == nullptr) return 0;
-  const double angle_deg =  // counter-clockwise, may be NaN
-      av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix));
-  if (!std::isfinite(angle_deg)) return 0;
-  return ((static_cast<int>(std::lround(angle_deg / 90.0)) % 4) + 4) % 4;
-}
+/// What makes a stored picture upright: columns taken for rows, then either turned round.
+struct Turn {
+  bool transposed = false, left_right = false, up_down = false;
 
-void turn(cv::Mat& image, int quarters) {
-  if (quarters == 0 || image.empty()) return;
-  const int code[] = {0, cv::ROTATE_90_COUNTERCLOCKWISE, cv::ROTATE_180, cv::ROTATE_90_CLOCKWISE};
-  cv::Mat turned;
-  cv::rotate(image, turned, code[quarters]);
-  image = turned;
+  /// Nearest to a display matrix of libavutil, (p, q) -> (a p + c q, b p + d q) with a, b, -, c, d
+  /// its first elements, which for photographs may mirror.
+  static Turn of(const std::int32_t* matrix) {
+    const std::int64_t a = matrix[0], b = matrix[1], c = matrix[3], d = matrix[4];
+    if (std::abs(a) + std::abs(d) >= std::abs(b) + std::abs(c)) return {false, a < 0, d < 0};
+    return {true, c < 0, b < 0};
+  }
+  [[nodiscard]] cv::Size upright(int width, int height) const {
+    return transposed ? cv::Size(height, width) : cv::Size(width, height);
+  }
+  void apply(cv::Mat& image) const {
+    if (image.empty()) return;
+    if (transposed) cv::transpose(image, image);
+    if (left_right || up_down) cv::flip(image, image, !left_right ? 0 : up_down ? -1 : 1);
+  }
+};
+
+/// A video's container tells; of photographs each picture itself (Exif).
+Turn turn_of(const AVStream& stream, const AVFrame* photograph) {
+  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  if (matrix == nullptr && photograph != nullptr)
+    if (const auto* own = av_frame_get_side_data(photograph, AV_FRAME_DATA_DISPLAYMATRIX))
+      matrix = own->data;
+  return matrix != nullptr ? Turn::of(reinterpret_cast<const std::int32_t*>(matrix)) : Turn{};
 }
 
 /// Rate at which a phone says it filmed; slow motion is stored at a lower one.
@@ -70,7 +78,8 @@ class LibavSource final : public FrameSource {
     av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
     open_container(path);
     open_decoder();
-    first_is_decoded_ = decoder_->codec_id == AV_CODEC_ID_MJPEG && decode_one();
+    photographs_ = decoder_->codec_id == AV_CODEC_ID_MJPEG;
+    first_is_decoded_ = photographs_ && decode_one();
     describe();
   }
 
@@ -134,11 +143,11 @@ class LibavSource final : public FrameSource {
   }
 
   void describe() {
-    quarters_ = quarter_turns(*stream_, *picture_);
-    info_.width_px = decoder_->width;
-    info_.height_px = decoder_->height;
-    if (info_.width_px <= 0 || info_.height_px <= 0) fail("no picture size: not a readable video");
-    if (quarters_ % 2 == 1) std::swap(info_.width_px, info_.height_px);
+    if (decoder_->width <= 0 || decoder_->height <= 0)
+      fail("no picture size: not a readable video");
+    const cv::Size upright = turn().upright(decoder_->width, decoder_->height);
+    info_.width_px = upright.width;
+    info_.height_px = upright.height;
     const double average = av_q2d(stream_->avg_frame_rate), base = av_q2d(stream_->r_frame_rate);
     const bool has_average = std::isfinite(average) && average > 0.0;
     info_.frame_rate_hz = has_average ? average : (std::isfinite(base) ? base : 0.0);
@@ -198,19 +207,22 @@ class LibavSource final : public FrameSource {
     return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
   }
 
+  [[nodiscard]] Turn turn() const {
+    return turn_of(*stream_, photographs_ ? picture_.get() : nullptr);
+  }
+
   void convert(Frame& frame) {
-    if (picture_->width != decoder_->width || picture_->height != decoder_->height ||
-        picture_->width * picture_->height != info_.width_px * info_.height_px)
-      fail(fmt::format("frame {}: the picture size changes to {} x {}", frame.index,
-                       picture_->width, picture_->height));
+    const Turn upright = turn();
+    const cv::Size size = upright.upright(picture_->width, picture_->height);
+    if (size != cv::Size(info_.width_px, info_.height_px))
+      fail(fmt::format("frame {}: the picture size changes from {} x {} to {} x {}", frame.index,
+                       info_.width_px, info_.height_px, size.width, size.height));
     frame.damaged =
         (picture_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture_->decode_error_flags != 0;
     frame.luma = luma_of(*picture_, scaler_);
     if (options_.colour) frame.bgr = bgr_of(*picture_, colour_scaler_);
     if (options_.chroma) frame.chroma = chroma_of(*picture_);
-    turn(frame.luma, quarters_);
-    turn(frame.chroma, quarters_);
-    turn(frame.bgr, quarters_);
+    for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) upright.apply(*image);
   }
 
   /// A file cut short ends like a whole one; only the promised number of frames tells. Edit lists
@@ -255,7 +267,7 @@ class LibavSource final : public FrameSource {
   Scaler scaler_, colour_scaler_;
   AVStream* stream_ = nullptr;
   VideoInfo info_;
-  int quarters_ = 0;
+  bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
