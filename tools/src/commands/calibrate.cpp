@@ -296,8 +296,8 @@ void run(const Options& options) {
   tracking::Calibration result = tracking::calibrate(views.found, views.size);
   set_aside(result, views);
   const std::string floor = place_floor(options, views, result.camera);
-  if (!options.picture.empty()) draw_check(options, views, result.camera);
   data::write_camera(result.camera, options.output);
+  if (!options.picture.empty()) draw_check(options, views, result.camera);
   tell(options, views, result, floor);
   constexpr double kPoor_px = 1.0;
   if (result.rms_px > kPoor_px)

@@ -1,14 +1,17 @@
 #pragma once
+#include <sys/types.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 #include "trochoid/data/io.hpp"
 
 namespace trochoid::tools {
 
-/// How ffmpeg is told to code, in words of its command line.
+/// How ffmpeg is told to code, in words of its command line with a blank between two.
 namespace coding {
 /// H.264 for any player; `crf` from 0 (best) to 51. Sides must be even.
 [[nodiscard]] std::string h264(int crf);
@@ -56,14 +59,16 @@ class EncodedFile {
   void commit();
 
  private:
+  void start(const std::vector<std::string>& words);
   int close();
-  [[noreturn]] void fail();
+  [[noreturn]] void fail(int status);
 
   std::filesystem::path target_;
   data::PendingFile pending_;
   Workshop workshop_;
   std::filesystem::path file_, log_;
   std::FILE* pipe_ = nullptr;
+  pid_t encoder_ = 0;
   std::int64_t pictures_ = 0;
 };
 

@@ -112,7 +112,8 @@ class LibavSource final : public FrameSource {
     const ImageSequence sequence = find_image_sequence(path);
     if (!sequence.is_sequence()) {
       if (!fs::exists(path)) fail("no such file");
-      if (fs::is_regular_file(path) && fs::file_size(path) == 0) fail("the file is empty");
+      if (!fs::is_regular_file(path)) fail("neither a file nor a folder of pictures");
+      if (fs::file_size(path) == 0) fail("the file is empty");
     } else if (!options_.frame_rate_hz) {
       fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
     }
