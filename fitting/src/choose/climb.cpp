@@ -148,11 +148,20 @@ FirstPart longest_first_part(const Rungs& rungs) {
 
 // All that usually acts, the last resort with it. What helped a model that explains nothing tells
 // nothing.
-void by_all_that_usually_acts(const Contest& contest, const Rung& best, Rungs& rungs) {
+void by_all_that_usually_acts(const Contest& contest, const Rung& known, Rungs& rungs) {
   const Terms all =
-      all_that_usually_acts(contest.ladder, best.fit.converged ? best.terms : Terms{});
+      all_that_usually_acts(contest.ladder, known.fit.converged ? known.terms : Terms{});
   if (all.empty()) return;
-  step_down(contest, add_searched(contest, all, rungs, longest_first_part(rungs)), rungs);
+  const Rung& searched = add_searched(contest, all, rungs, longest_first_part(rungs));
+  if (explains(searched)) return step_down(contest, searched, rungs);
+  // Where one loss more leads nearer, it may lead there from another start.
+  Rungs nearer;
+  const Rung& nearest = step_up(contest, false, Reach::from_below, searched, nearer);
+  if (&nearest == &searched) return;
+  step_down(
+      contest,
+      explains(nearest) ? rungs.emplace_back(nearest) : add_searched(contest, nearest.terms, rungs),
+      rungs);
 }
 
 }  // namespace
