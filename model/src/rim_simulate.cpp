@@ -34,12 +34,14 @@ struct Columns {
 };
 
 template <class S, template <class> class... Terms>
-ContactForce<S> force_of(const Rolling<S, Terms...>& system, const NodeMotion<S>& q) {
+ContactForce<S> force_of(const Rolling<S, Terms...>& system, const State<S, 8>& /*y*/,
+                         const NodeMotion<S>& q) {
   return system.contact_force(q, system.acceleration(q));
 }
 template <class S, template <class> class Friction, template <class> class... Terms>
-ContactForce<S> force_of(const Sliding<S, Friction, Terms...>& system, const NodeMotion<S>& q) {
-  return system.contact_force(q);
+ContactForce<S> force_of(const Sliding<S, Friction, Terms...>& system, const State<S, 10>& y,
+                         const NodeMotion<S>& q) {
+  return system.contact(q, system.slip(y)).force;
 }
 
 /// One row of the table.
@@ -54,16 +56,16 @@ std::vector<double> row_of(const Columns& columns, const System& system, double 
   const World<double> v = world_from_node(horizontal_velocity(q), y[Rim::phi]);
   row.insert(row.end(), {q.w1, q.w2, q.w3, v.x, v.y});
   if (columns.mass_known) {
-    const ContactForce<double> force = force_of(system, q);
+    const ContactForce<double> force = force_of(system, y, q);
     const World<double> f =
         world_from_node(Horizontal<double>{force.along_n, force.along_mh}, y[Rim::phi]);
     row.insert(row.end(), {force.normal, f.x, f.y});
   }
   const World<double> arm = world_from_node(Horizontal<double>{0.0, -q.at.slope}, y[Rim::phi]);
-  const bool slides = System::kStates == 10;
-  const Horizontal<double> u = slip_velocity(system.body, q);
-  row.insert(row.end(), {y[Rim::x] + arm.x, y[Rim::y] + arm.y,
-                         slides ? std::hypot(u.along_n, u.along_mh) : 0.0});
+  constexpr bool slides = System::kStates == 10;
+  Horizontal<double> u{0.0, 0.0};
+  if constexpr (slides) u = system.slip(y);
+  row.insert(row.end(), {y[Rim::x] + arm.x, y[Rim::y] + arm.y, std::hypot(u.along_n, u.along_mh)});
   if (columns.exact_friction) row.push_back(slides ? 1.0 : 0.0);
   return row;
 }

@@ -186,7 +186,7 @@ data::Scene soon_flat(const std::string& name) {
 TEST(RimPredictor, DifferentiatesWhereABodyFellFlat) {
   const auto check = [](const data::Scene& scene, double tolerance) {
     constexpr double kStep =
-        4e-5;  // phi runs fast at the end: its error goes by the step's fourth power
+        4e-5;  // the quotient's error: rounding for less, for more phi, which runs fast at the end
     const auto predictor = make_predictor(scene);
     expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.05, 0.1, 2.0, 2.5},
                              tolerance, kStep, Outcome::flat);

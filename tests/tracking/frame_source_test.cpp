@@ -267,25 +267,47 @@ TEST_F(FrameSourceTest, PhotographsComeUprightHoweverTheCameraWasHeld) {
   }
 }
 
-TEST_F(FrameSourceTest, EveryPhotographOfASeriesSaysHowTheCameraWasHeld) {
-  int pictures = 0;
-  for (const int orientation : {6, 1, 3, 8})
-    photograph(marked_picture(), orientation, folder_ / cv::format("p%d.jpg", pictures++));
-  const auto source = open_video(folder_ / "p*.jpg", {.frame_rate_hz = 10.0});
+TEST_F(FrameSourceTest, APhotographUnlikeTheFirstOfItsSeriesIsRefused) {
+  const SourceOptions rate{.frame_rate_hz = 10.0};
+  const fs::path series = folder_ / "p*.jpg";
+  for (int i = 0; i < 4; ++i) photograph(marked_picture(), 6, folder_ / cv::format("p%d.jpg", i));
+  const auto source = open_video(series, rate);
+  EXPECT_EQ(source->info().orientation, 6);
   int count = 0;
   for (; const auto frame = source->next(); ++count) {
     SCOPED_TRACE(count);
     expect_upright(*frame);
   }
-  EXPECT_EQ(count, pictures);
+  EXPECT_EQ(count, 4);
 
+  photograph(marked_picture(), 3, folder_ / "p2.jpg");
+  EXPECT_THAT(error_of(series, rate), HasSubstr("frame 2: the camera was held another way"));
   // Of as many pixels, but higher than wide.
   cv::Mat portrait;
   cv::transpose(marked_picture(), portrait);
-  photograph(portrait, 1, folder_ / "p2.jpg");
-  EXPECT_THAT(error_of(folder_ / "p*.jpg", {.frame_rate_hz = 10.0}),
+  photograph(portrait, 6, folder_ / "p2.jpg");
+  EXPECT_THAT(error_of(series, rate),
               HasSubstr(cv::format("frame 2: the picture size changes from %d x %d to %d x %d",
                                    kWidth, kHeight, kHeight, kWidth)));
+}
+
+TEST_F(FrameSourceTest, APictureOfASeriesThatCannotBeDecodedIsNotPassedOver) {
+  const SourceOptions rate{.frame_rate_hz = 10.0};
+  for (int i = 0; i < 6; ++i) photograph(marked_picture(), 1, folder_ / cv::format("p%d.jpg", i));
+  for (const char* series : {"p*.jpg", "p%d.jpg"})
+    for (const char* words : {"these are words, not a picture", ""}) {
+      std::ofstream(folder_ / "p3.jpg") << words;
+      EXPECT_THAT(error_of(folder_ / series, rate),
+                  HasSubstr("picture 4 of 6, p3.jpg, cannot be decoded"))
+          << series << words;
+      std::ofstream(folder_ / "p5.jpg") << words;
+      photograph(marked_picture(), 1, folder_ / "p3.jpg");
+      EXPECT_THAT(error_of(folder_ / series, rate),
+                  HasSubstr("picture 6 of 6, p5.jpg, cannot be decoded"))
+          << series << words;
+      photograph(marked_picture(), 1, folder_ / "p5.jpg");
+    }
+  EXPECT_EQ(error_of(folder_ / "p*.jpg", rate), "");
 }
 
 TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {

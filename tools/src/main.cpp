@@ -1,4 +1,6 @@
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -16,6 +18,12 @@
 namespace {
 
 enum ExitStatus { kDone = 0, kError = 1, kUsage = 2, kNotGood = 3 };
+
+/// Where a caller has closed one of them, a file opened later would take its place, and our words.
+void open_standard_streams() {
+  for (int stream = 0; stream <= STDERR_FILENO; ++stream)
+    if (fcntl(stream, F_GETFD) < 0) (void)open("/dev/null", O_RDWR);
+}
 
 /// "trochoid study fits", as far as the words were understood.
 std::string understood(const CLI::App& app) {
@@ -96,6 +104,7 @@ int run(int argc, char** argv) {
 
 // The only place that catches: libraries throw, commands do not print errors.
 int main(int argc, char** argv) try {
+  open_standard_streams();
   trochoid::tools::clean_up_when_interrupted();
   const int status = run(argc, argv);
   if (std::fflush(stdout) != 0)

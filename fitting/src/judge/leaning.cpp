@@ -36,7 +36,7 @@ Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
 }
 
 // The share a sample with these readings has in the direction of the parameters it says most of: 1
-// where it alone does; 0 if that is less than `least`.
+// where it alone does; 0 where all directions together leave it no more than `least`.
 double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows,
                    double least) {
   double all = 0.0;  // shares in all directions together

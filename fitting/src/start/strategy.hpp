@@ -119,8 +119,8 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 /// distribution above what it should be.
 [[nodiscard]] bool explained_within(const Problem& problem, const Found& best, double deviations);
 
-/// Within half a standard deviation: from positions alone neighbouring valleys pass the gate as
-/// well.
+/// Whether it is so within half a standard deviation: from positions alone neighbouring valleys
+/// pass the gate as well.
 [[nodiscard]] bool surely_explained(const Problem& problem, const Found& best);
 
 /// Whether the search has used up its steps (less than a minute's, half of that where angles were

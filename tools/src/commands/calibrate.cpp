@@ -43,12 +43,25 @@ tracking::BoardPattern pattern_of(const Options& options) {
   return pattern;
 }
 
-// Pictures with the board found in them, all of one size.
+// Pictures with the board found in them, all of one size and taken with the camera held one way.
 struct Views {
   std::vector<tracking::BoardView> found;
   std::vector<cv::Mat> pictures;  ///< of `found`
   cv::Size size;
   int looked_at = 0;
+  std::optional<int> orientation;
+
+  // Turned upright, pictures taken with the camera the other way up are another camera's: its
+  // principal point is mirrored.
+  void held_alike(int one, const std::string& name) {
+    if (orientation.value_or(one) != one)
+      throw InputError(
+          fmt::format("{}: the camera was held another way than for the pictures before it (Exif "
+                      "orientation {} "
+                      "after {}); take them alike, or remove what they say of it",
+                      name, one, *orientation));
+    orientation = one;
+  }
 
   void look(const cv::Mat& luma, const std::string& name, const tracking::BoardPattern& pattern) {
     if (looked_at++ == 0) size = luma.size();
@@ -70,6 +83,7 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   constexpr double kEvery_s = 0.5, kMoved = 0.03;
   constexpr std::size_t kMost = 40;
   const auto source = tracking::open_video(path);
+  views.held_alike(source->info().orientation, path.string());
   auto frame = source->next(), following = source->next();
   if (!following) return views.look(frame->luma, path.string(), pattern);
   double next_s = 0.0;
@@ -297,8 +311,8 @@ void run(const Options& options) {
   set_aside(result, views);
   const std::string floor = place_floor(options, views, result.camera);
   data::write_camera(result.camera, options.output);
-  if (!options.picture.empty()) draw_check(options, views, result.camera);
   tell(options, views, result, floor);
+  if (!options.picture.empty()) draw_check(options, views, result.camera);
   constexpr double kPoor_px = 1.0;
   if (result.rms_px > kPoor_px)
     throw NotGood(

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <fstream>
@@ -98,10 +99,12 @@ void EncodedFile::start(const std::vector<std::string>& words) {
   posix_spawn_file_actions_destroy(&actions);
   ::close(ends[0]);
   pipe_ = fdopen(ends[1], "w");
-  if (error != 0) {
-    encoder_ = 0;
+  const int cause = pipe_ == nullptr ? errno : error;
+  if (pipe_ == nullptr) ::close(ends[1]);
+  if (error != 0) encoder_ = 0;
+  if (cause != 0) {
     close();
-    fail_to_start(target_, error);
+    fail_to_start(target_, cause);
   }
 }
 
@@ -136,7 +139,9 @@ int EncodedFile::close() {
 void EncodedFile::fail(int status) {
   std::ifstream log(log_);
   std::string words;
-  if (!std::getline(log, words) || words.empty())
+  while (words.empty() && std::getline(log, words)) {
+  }
+  if (words.empty())
     words = (WIFSIGNALED(status) ? fmt::format("was ended by signal {}", WTERMSIG(status))
                                  : fmt::format("ended with status {}", WEXITSTATUS(status))) +
             " and does not say why; is the disk full?";

@@ -40,6 +40,11 @@ struct Turn {
     if (std::abs(a) + std::abs(d) >= std::abs(b) + std::abs(c)) return {false, a < 0, d < 0};
     return {true, c < 0, b < 0};
   }
+  /// As Exif numbers them, 1 to 8.
+  [[nodiscard]] int orientation() const {
+    constexpr int kNumbers[] = {1, 2, 4, 3, 5, 6, 8, 7};
+    return kNumbers[(transposed ? 4 : 0) + (up_down ? 2 : 0) + (left_right ? 1 : 0)];
+  }
   [[nodiscard]] cv::Size upright(int width, int height) const {
     return transposed ? cv::Size(height, width) : cv::Size(width, height);
   }
@@ -89,6 +94,7 @@ class LibavSource final : public FrameSource {
     while (!finished_) {
       if (!std::exchange(first_is_decoded_, false) && !decode_one()) break;
       Frame frame{.luma = {}, .bgr = {}, .index = frames_read_++, .t_s = 0.0, .damaged = false};
+      check_in_place(frame.index);
       frame.t_s = presentation_time_s(frame.index);
       if (after(window_.to, frame)) {
         finished_ = true;
@@ -110,10 +116,10 @@ class LibavSource final : public FrameSource {
 
   void open_container(const fs::path& path) {
     const ImageSequence sequence = find_image_sequence(path);
+    if (sequence.is_sequence()) pictures_ = pictures_of(sequence);
     if (!sequence.is_sequence()) {
       if (!fs::exists(path)) fail("no such file");
-      if (!fs::is_regular_file(path)) fail("neither a file nor a folder of pictures");
-      if (fs::file_size(path) == 0) fail("the file is empty");
+      if (fs::is_regular_file(path) && fs::file_size(path) == 0) fail("the file is empty");
     } else if (!options_.frame_rate_hz) {
       fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
     }
@@ -146,7 +152,9 @@ class LibavSource final : public FrameSource {
   void describe() {
     if (decoder_->width <= 0 || decoder_->height <= 0)
       fail("no picture size: not a readable video");
-    const cv::Size upright = turn().upright(decoder_->width, decoder_->height);
+    turn_ = turn_of(*stream_, photographs_ ? picture_.get() : nullptr);
+    info_.orientation = turn_.orientation();
+    const cv::Size upright = turn_.upright(decoder_->width, decoder_->height);
     info_.width_px = upright.width;
     info_.height_px = upright.height;
     const double average = av_q2d(stream_->avg_frame_rate), base = av_q2d(stream_->r_frame_rate);
@@ -160,7 +168,8 @@ class LibavSource final : public FrameSource {
       info_.variable_rate = false;
     }
     info_.capture_rate_hz = capture_rate_hz(*container_);
-    info_.frames = stream_->nb_frames;
+    info_.frames =
+        pictures_.empty() ? stream_->nb_frames : static_cast<std::int64_t>(pictures_.size());
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }
 
@@ -208,13 +217,30 @@ class LibavSource final : public FrameSource {
     return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
   }
 
-  [[nodiscard]] Turn turn() const {
-    return turn_of(*stream_, photographs_ ? picture_.get() : nullptr);
+  /// A picture of a series that cannot be decoded would shift all after it in time.
+  void check_in_place(std::int64_t index) const {
+    const std::int64_t place = picture_->best_effort_timestamp;
+    if (!pictures_.empty() && place != AV_NOPTS_VALUE && place != index) fail_to_decode(index);
+  }
+  [[noreturn]] void fail_to_decode(std::int64_t index) const {
+    fail(fmt::format("picture {} of {}, {}, cannot be decoded", index + 1, pictures_.size(),
+                     pictures_[static_cast<std::size_t>(index)].filename().string()));
+  }
+
+  /// A recording's camera stands still: what its pictures say of how it was held must agree.
+  void check_orientation(std::int64_t index) const {
+    if (!photographs_) return;
+    const int orientation = turn_of(*stream_, picture_.get()).orientation();
+    if (orientation != info_.orientation)
+      fail(
+          fmt::format("frame {}: the camera was held another way than for the first (Exif "
+                      "orientation {} after {}); if it was not, remove what they say of it",
+                      index, orientation, info_.orientation));
   }
 
   void convert(Frame& frame) {
-    const Turn upright = turn();
-    const cv::Size size = upright.upright(picture_->width, picture_->height);
+    check_orientation(frame.index);
+    const cv::Size size = turn_.upright(picture_->width, picture_->height);
     if (size != cv::Size(info_.width_px, info_.height_px))
       fail(fmt::format("frame {}: the picture size changes from {} x {} to {} x {}", frame.index,
                        info_.width_px, info_.height_px, size.width, size.height));
@@ -223,7 +249,7 @@ class LibavSource final : public FrameSource {
     frame.luma = luma_of(*picture_, scaler_);
     if (options_.colour) frame.bgr = bgr_of(*picture_, colour_scaler_);
     if (options_.chroma) frame.chroma = chroma_of(*picture_);
-    for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) upright.apply(*image);
+    for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) turn_.apply(*image);
   }
 
   /// A file cut short ends like a whole one; only the promised number of frames tells. Edit lists
@@ -232,6 +258,7 @@ class LibavSource final : public FrameSource {
     if (frames_read_ == 0) fail("holds no decodable picture");
     if (options_.key_frames_only) return;
     const std::int64_t missing = info_.frames - frames_read_;
+    if (!pictures_.empty() && missing > 0) fail_to_decode(frames_read_);
     const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
     if (cut || (!read_error_.empty() && missing > 0))
       fail(fmt::format(
@@ -268,6 +295,8 @@ class LibavSource final : public FrameSource {
   Scaler scaler_, colour_scaler_;
   AVStream* stream_ = nullptr;
   VideoInfo info_;
+  std::vector<fs::path> pictures_;  ///< of a series
+  Turn turn_;
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;

@@ -240,7 +240,7 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
     counts_.evaluations += kN + 1;
   }
 
-  /// The matrices of Newton's iteration; false if one is singular.
+  /// The matrices of Newton's iteration; false if one is singular or not finite.
   [[nodiscard]] bool prepare(double h) {
     double real[kN][kN];
     Complex complex[kN][kN];
@@ -329,9 +329,9 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
   }
 
   [[nodiscard]] Attempt attempt(double h) {
-    Attempt tried{prepare(h) ? find_stages(h) : Attempt::End::diverged};
+    Attempt tried{prepare(h) ? find_stages(h) : Attempt::End::not_finite};
     if (tried.end == Attempt::End::done) tried.error = error_norm(h);
-    if (!__builtin_isfinite(tried.error)) tried.end = Attempt::End::diverged;
+    if (!__builtin_isfinite(tried.error)) tried.end = Attempt::End::not_finite;
     return tried;
   }
 

@@ -27,6 +27,7 @@ struct VideoInfo {
   std::string codec;
   bool variable_rate = false;
   std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
+  int orientation = 1;  ///< how the stored pictures were turned to be upright, by Exif's numbers
 };
 
 struct SourceOptions {
@@ -47,7 +48,9 @@ class FrameSource {
   virtual ~FrameSource() = default;
   [[nodiscard]] virtual const VideoInfo& info() const = 0;
   /// Next frame, or nothing at the end. Each returned frame owns its pixels.
-  /// @throws InputError if the file breaks off before its promised end; the message says where.
+  /// @throws InputError if the file breaks off before its promised end, or a picture of a series
+  ///         cannot be decoded, has another size or was taken with the camera held another way; the
+  ///         message says where.
   [[nodiscard]] virtual std::optional<Frame> next() = 0;
 };
 
