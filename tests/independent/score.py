@@ -84,7 +84,7 @@ def main():
     with ThreadPoolExecutor(given.jobs) as pool:
         for case, (outcome, words) in zip(cases, pool.map(lambda c: score(given.program, c, given.limit), cases)):
             print(f"{case.name:14} {outcome:6} {words}", flush=True)
-            totals.setdefault(case.name[0], Counter())[outcome] += 1
+            totals.setdefault(case.name.split("-")[0], Counter())[outcome] += 1
     for kind, counts in sorted(totals.items()):
         print(f"{kind}: " + ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items())))
 
