@@ -154,6 +154,7 @@ void by_all_that_usually_acts(const Contest& contest, const Rung& known, Rungs& 
   if (all.empty()) return;
   const Rung& searched = add_searched(contest, all, rungs, longest_first_part(rungs));
   if (explains(searched)) return step_down(contest, searched, rungs);
+  if (!searched.fitted) return;  // nothing to go on from
   // Where one loss more leads nearer, it may lead there from another start.
   Rungs nearer;
   const Rung& nearest = step_up(contest, false, Reach::from_below, searched, nearer);

@@ -110,7 +110,10 @@ class BestValley {
   }
   [[nodiscard]] const Found& best() const { return best_; }
   /// No better one is to be expected.
-  [[nodiscard]] bool reached_often() const { return reached_ >= 3; }
+  [[nodiscard]] bool reached_often() const {
+    constexpr int kOftenEnough = 3;
+    return reached_ >= kOftenEnough;
+  }
 
  private:
   Found best_;

@@ -57,8 +57,7 @@ struct Views {
     if (orientation.value_or(one) != one)
       throw InputError(
           fmt::format("{}: the camera was held another way than for the pictures before it (Exif "
-                      "orientation {} "
-                      "after {}); take them alike, or remove what they say of it",
+                      "orientation {} after {}); take them alike, or remove what they say of it",
                       name, one, *orientation));
     orientation = one;
   }
