@@ -107,6 +107,42 @@ TEST(Rung, OfSeveralArcsIsSearchedForAnew) {
   EXPECT_EQ(values_of(two).at("friction"), 0.2);
 }
 
+// With Coulomb's law its search began ten times as far off, and led nowhere.
+TEST(Rung, ThatExtendsOneWhoseFrictionSetsInGentlyMayHaveGentleFrictionToo) {
+  const std::string folder = TROCHOID_SOURCE_DIR "/tests/independent/cases/gentle_friction";
+  const data::Track track = data::read_track(folder + "/track.csv").tracks.front();
+  Rung below, above;
+  below.scene = data::read_scene(folder + "/scene.toml");
+  below.scene.model.name = "sliding";
+  below.scene.model.friction = 0.2;
+  below.scene.model.air_linear_N_m_s = Eigen::Vector3d::Constant(1e-7);
+  above.scene = below.scene;
+  above.scene.model.air_force_N_s_m = 1e-4;
+  below.scene.model.slip_regularisation_m_s = 4e-3;
+  below.scene.fit.free.emplace_back("slip_regularisation_m_s");
+  fit_from_values(std::span(&track, 1),
+                  {{"theta_rad", 0.927},
+                   {"phi_rad", -1.574},
+                   {"w1_rad_s", -0.48},
+                   {"w2_rad_s", -38.2},
+                   {"w3_rad_s", -3.0},
+                   {"x_m", -0.0470},
+                   {"y_m", -0.0417},
+                   {"vx_m_s", -0.002},
+                   {"vy_m_s", -0.167},
+                   {"friction", 0.136}},
+                  {}, below);
+  ASSERT_TRUE(below.fitted) << below.reason;
+  EXPECT_FALSE(explains(below));
+  fit_rung(std::span(&track, 1), &below, nullptr, {}, above, Reach::from_below);
+  ASSERT_TRUE(above.fitted) << above.reason;
+  EXPECT_TRUE(explains(above)) << above.fit.verdict_words;
+  const data::FitParameter* gentle = above.fit.find("slip_regularisation_m_s");
+  ASSERT_NE(gentle, nullptr);
+  // The track was made with a quadratic couple of the air, for which a linear one stands here.
+  EXPECT_NEAR(gentle->value, 0.004068, 0.05 * 0.004068);
+}
+
 data::FitParameter loss(const std::string& name, double value, double sigma) {
   return {name, value, sigma, "m", data::ParameterStatus::free, true, ""};
 }

@@ -332,6 +332,16 @@ void fit_from(std::span<const data::Track> tracks, const Values& values,
   });
 }
 
+// Fits a rung beside a known one, from these values: where that one's friction sets in gently, this
+// one's may as well.
+void go_on_beside(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+                  Rung& rung) {
+  if (softness_is_open(rung) && !softness_is_open(known))
+    fit_softly(tracks, options, rung);
+  else
+    take(draft_one_of_several(tracks, rung.scene, options, nullptr, known.settled), rung);
+}
+
 // The same rung, not yet fitted.
 Rung rolling_at_first(Rung rung) {
   rung.rolls_at_first = true;
@@ -363,7 +373,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     if (extends) {
       own.start = extended_start(*below, rung);
       own.strategy = "single";
-      take(draft_one_of_several(tracks, rung.scene, own, nullptr, below->settled), rung);
+      go_on_beside(tracks, *below, own, rung);
     }
     // Near a solution that explains nothing there is nothing to be found.
     const bool near = extends && below->fit.whiteness_p > kWhite && usable(rung.fit) &&
@@ -494,10 +504,7 @@ namespace {
 void fit_beside(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
                 Rung& rung) {
   try_rung(rung, [&] {
-    if (softness_is_open(rung) && !softness_is_open(known))
-      fit_softly(tracks, options, rung);
-    else
-      take(draft_one_of_several(tracks, rung.scene, options, nullptr, known.settled), rung);
+    go_on_beside(tracks, known, options, rung);
     rung.fitted = usable(rung.fit);
   });
 }
