@@ -220,6 +220,64 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
   EXPECT_NE(sha256_of_recording(folder_), digest);
 }
 
+TEST_F(FrameSourceTest, PicturesComeByTheirNumbersThoughTheseHaveNoLeadingZeros) {
+  for (int i = 0; i < 12; ++i)
+    cv::imwrite((folder_ / cv::format("a 50%% [1]_%d.png", 5 + i)).string(),
+                cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10.0 * i)));
+  for (const char* series : {"", "a*_*.png"}) {
+    const auto source = open_video(folder_ / series, {.frame_rate_hz = 10.0});
+    for (int i = 0; i < 12; ++i) {
+      const auto frame = source->next();
+      ASSERT_TRUE(frame) << series << i;
+      EXPECT_EQ(frame->index, i);
+      EXPECT_EQ(frame->luma.at<uchar>(0, 0), 10 * i) << series;
+    }
+    EXPECT_FALSE(source->next());
+    EXPECT_EQ(source->info().missing, 0);
+  }
+}
+
+TEST_F(FrameSourceTest, AMissingPictureShiftsNoOthersInTime) {
+  for (const int number : {98, 99, 100, 103, 104})
+    for (const char* name : {"padded_%04d.png", "plain_%d.png"})
+      cv::imwrite((folder_ / cv::format(name, number)).string(),
+                  cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(number)));
+  for (const char* series :
+       {"padded_%04d.png", "padded_*.png", "plain_%d.png", "plain_*.png", "plain_[0-9]*.png"}) {
+    const auto source = open_video(folder_ / series, {.frame_rate_hz = 10.0});
+    EXPECT_EQ(source->info().frames, 5) << series;
+    EXPECT_EQ(source->info().missing, 2) << series;
+    for (const int number : {98, 99, 100, 103, 104}) {
+      const auto frame = source->next();
+      ASSERT_TRUE(frame) << series << number;
+      EXPECT_EQ(frame->luma.at<uchar>(0, 0), number) << series;
+      EXPECT_EQ(frame->index, number - 98) << series;
+      EXPECT_DOUBLE_EQ(frame->t_s, (number - 98) / 10.0) << series;
+    }
+    EXPECT_FALSE(source->next());
+  }
+}
+
+TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
+  const auto frames_of = [&](const std::vector<const char*>& names) {
+    const fs::path folder = folder_ / names.front();
+    fs::create_directory(folder);
+    for (const char* name : names)
+      cv::imwrite((folder / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+    const auto source = open_video(folder, {.frame_rate_hz = 10.0});
+    std::vector<std::int64_t> found;
+    while (const auto frame = source->next()) found.push_back(frame->index);
+    return found;
+  };
+  const std::vector<std::int64_t> one_by_one{0, 1, 2, 3};
+  // Every tenth kept; times of day in milliseconds; no number alone.
+  EXPECT_EQ(frames_of({"a_0010.png", "a_0020.png", "a_0030.png", "a_0040.png"}), one_by_one);
+  EXPECT_EQ(frames_of({"t101502033.png", "t101502066.png", "t101502101.png", "t101502133.png"}),
+            one_by_one);
+  EXPECT_EQ(frames_of({"1015_1.png", "1015_2.png", "1016_1.png", "1016_9.png"}), one_by_one);
+  EXPECT_EQ(frames_of({"only.png"}), (std::vector<std::int64_t>{0}));
+}
+
 // A photograph as a camera stores it that was held so, by Exif 2.32, 4.6.4: which side of what is
 // seen is row 0 and which is column 0.
 void photograph(const cv::Mat& upright, int orientation, const fs::path& path) {

@@ -476,6 +476,11 @@ class Tracking {
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
     result.file.notes = doubts_about_edges();
+    if (const std::int64_t missing = recording_.info().missing; missing > 0)
+      result.file.notes.push_back(fmt::format(
+          "by their numbers {} of {} pictures are missing; the others keep the times of "
+          "theirs",
+          missing, recording_.info().frames + missing));
     result.file.camera = words;
     result.summary.camera_words = words;
     if (options_.edges) write_edges(*options_.edges);

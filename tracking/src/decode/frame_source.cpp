@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <new>
+#include <optional>
 #include <utility>
 
 #include "decode/image_sequence.hpp"
@@ -93,8 +97,9 @@ class LibavSource final : public FrameSource {
   [[nodiscard]] std::optional<Frame> next() override {
     while (!finished_) {
       if (!std::exchange(first_is_decoded_, false) && !decode_one()) break;
-      Frame frame{.luma = {}, .bgr = {}, .index = frames_read_++, .t_s = 0.0, .damaged = false};
-      check_in_place(frame.index);
+      check_in_place();
+      Frame frame{.luma = {}, .bgr = {}, .index = index(), .t_s = 0.0, .damaged = false};
+      ++frames_read_;
       frame.t_s = presentation_time_s(frame.index);
       if (after(window_.to, frame)) {
         finished_ = true;
@@ -114,18 +119,31 @@ class LibavSource final : public FrameSource {
     throw InputError(fmt::format("{}: {}", name_, what));
   }
 
+  /// Of a series the first picture, which tells how the others are coded.
   void open_container(const fs::path& path) {
-    const ImageSequence sequence = find_image_sequence(path);
-    if (sequence.is_sequence()) pictures_ = pictures_of(sequence);
-    if (!sequence.is_sequence()) {
-      if (!fs::exists(path)) fail("no such file");
-      if (fs::is_regular_file(path) && fs::file_size(path) == 0) fail("the file is empty");
-    } else if (!options_.frame_rate_hz) {
+    series_ = find_image_sequence(path);
+    if (series_ && !options_.frame_rate_hz)
       fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
-    }
-    container_ = open_input(sequence, options_.frame_rate_hz, name_);
+    const fs::path& file = series_ ? series_->pictures.front() : path;
+    if (!fs::exists(file)) fail("no such file");
+    if (fs::is_regular_file(file) && fs::file_size(file) == 0)
+      fail(series_ ? undecodable(0) : "the file is empty");
+    container_ = open_input(file);
     if (const int status = avformat_find_stream_info(container_.get(), nullptr); status < 0)
-      fail(fmt::format("not a readable video ({})", libav_words(status)));
+      fail(not_readable(status));
+  }
+  [[nodiscard]] std::string not_readable(int status) const {
+    return series_ ? undecodable(0) : fmt::format("not a readable video ({})", libav_words(status));
+  }
+  [[nodiscard]] InputHandle open_input(const fs::path& file) const {
+    AVDictionary* options = nullptr;
+    av_dict_set(&options, "pattern_type", "none", 0);  // %d in a picture's name is no series,
+    const std::string url = "file:" + file.string();   // nor a colon in a file's a protocol
+    AVFormatContext* raw = nullptr;
+    const int status = avformat_open_input(&raw, url.c_str(), nullptr, &options);
+    av_dict_free(&options);
+    if (status < 0) fail(not_readable(status));
+    return InputHandle(raw);
   }
 
   void open_decoder() {
@@ -169,7 +187,8 @@ class LibavSource final : public FrameSource {
     }
     info_.capture_rate_hz = capture_rate_hz(*container_);
     info_.frames =
-        pictures_.empty() ? stream_->nb_frames : static_cast<std::int64_t>(pictures_.size());
+        series_ ? static_cast<std::int64_t>(series_->pictures.size()) : stream_->nb_frames;
+    info_.missing = series_ ? series_->missing() : 0;
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }
 
@@ -187,6 +206,7 @@ class LibavSource final : public FrameSource {
   /// One more packet, or the flush at the end, into the decoder; false when flushed before.
   bool feed() {
     if (flushing_) return false;
+    if (series_) return feed_picture();
     while (true) {
       const int status = av_read_frame(container_.get(), packet_.get());
       if (status < 0) {
@@ -201,6 +221,30 @@ class LibavSource final : public FrameSource {
       av_packet_unref(packet_.get());
       if (wanted) return true;
     }
+  }
+
+  /// The next picture of a series, stamped with its place in it.
+  bool feed_picture() {
+    if (next_picture_ == series_->pictures.size()) {
+      flushing_ = true;
+      avcodec_send_packet(decoder_.get(), nullptr);
+      return true;
+    }
+    std::ifstream file(series_->pictures[next_picture_], std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    if (bytes.empty()) fail(undecodable(next_picture_));
+    if (av_new_packet(packet_.get(), static_cast<int>(bytes.size())) < 0) throw std::bad_alloc();
+    std::copy(bytes.begin(), bytes.end(), packet_->data);
+    packet_->pts = packet_->dts = static_cast<std::int64_t>(next_picture_++);
+    packet_->flags |= AV_PKT_FLAG_KEY;
+    if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;
+    av_packet_unref(packet_.get());
+    return true;
+  }
+
+  /// Of the picture that was decoded last.
+  [[nodiscard]] std::int64_t index() const {
+    return series_ ? series_->frames[static_cast<std::size_t>(frames_read_)] : frames_read_;
   }
 
   /// Time since the first picture: the stamp in the file, or index / rate when overridden.
@@ -218,13 +262,16 @@ class LibavSource final : public FrameSource {
   }
 
   /// A picture of a series that cannot be decoded would shift all after it in time.
-  void check_in_place(std::int64_t index) const {
+  void check_in_place() const {
+    if (!series_) return;
     const std::int64_t place = picture_->best_effort_timestamp;
-    if (!pictures_.empty() && place != AV_NOPTS_VALUE && place != index) fail_to_decode(index);
+    const auto expected = static_cast<std::size_t>(frames_read_);
+    if (expected >= series_->pictures.size() || (place != AV_NOPTS_VALUE && place != frames_read_))
+      fail(undecodable(std::min(expected, series_->pictures.size() - 1)));
   }
-  [[noreturn]] void fail_to_decode(std::int64_t index) const {
-    fail(fmt::format("picture {} of {}, {}, cannot be decoded", index + 1, pictures_.size(),
-                     pictures_[static_cast<std::size_t>(index)].filename().string()));
+  [[nodiscard]] std::string undecodable(std::size_t place) const {
+    return fmt::format("picture {} of {}, {}, cannot be decoded", place + 1,
+                       series_->pictures.size(), series_->pictures[place].filename().string());
   }
 
   /// A recording's camera stands still: what its pictures say of how it was held must agree.
@@ -255,10 +302,10 @@ class LibavSource final : public FrameSource {
   /// A file cut short ends like a whole one; only the promised number of frames tells. Edit lists
   /// and open groups of pictures may honestly hide a few frames, so a handful is forgiven.
   void check_whole() const {
-    if (frames_read_ == 0) fail("holds no decodable picture");
+    if (frames_read_ == 0) fail(series_ ? undecodable(0) : "holds no decodable picture");
     if (options_.key_frames_only) return;
     const std::int64_t missing = info_.frames - frames_read_;
-    if (!pictures_.empty() && missing > 0) fail_to_decode(frames_read_);
+    if (series_ && missing > 0) fail(undecodable(static_cast<std::size_t>(frames_read_)));
     const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
     if (cut || (!read_error_.empty() && missing > 0))
       fail(fmt::format(
@@ -295,7 +342,8 @@ class LibavSource final : public FrameSource {
   Scaler scaler_, colour_scaler_;
   AVStream* stream_ = nullptr;
   VideoInfo info_;
-  std::vector<fs::path> pictures_;  ///< of a series
+  std::optional<ImageSequence> series_;
+  std::size_t next_picture_ = 0;  ///< of the series, to be decoded
   Turn turn_;
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
@@ -309,11 +357,10 @@ class LibavSource final : public FrameSource {
 }  // namespace
 
 std::string sha256_of_recording(const fs::path& path) {
-  const ImageSequence sequence = find_image_sequence(path);
-  if (!sequence.is_sequence()) return data::sha256_of_file(path);
+  const std::optional<ImageSequence> series = find_image_sequence(path);
+  if (!series) return data::sha256_of_file(path);
   std::string list;
-  for (const fs::path& picture : pictures_of(sequence))
-    list += data::sha256_of_file(picture) + "\n";
+  for (const fs::path& picture : series->pictures) list += data::sha256_of_file(picture) + "\n";
   return data::sha256_of_text(list);
 }
 

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <climits>
 #include <cstdlib>
 #include <map>
+#include <numeric>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "trochoid/data/error.hpp"
 
@@ -17,6 +19,11 @@ namespace trochoid::tracking {
 namespace {
 
 namespace fs = std::filesystem;
+using Pictures = std::vector<fs::path>;
+
+bool is_digit(char c) {
+  return std::isdigit(static_cast<unsigned char>(c)) != 0;
+}
 
 std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -31,101 +38,115 @@ bool is_image(const fs::path& path) {
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 
-ImageSequence images_of_folder(const fs::path& folder) {
-  std::map<std::string, int> count;  // by extension as written: patterns are case-sensitive
+Pictures pictures_in(const fs::path& folder) {
+  std::map<std::string, Pictures> by_type;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.is_regular_file() && is_image(entry.path()))
-      ++count[entry.path().extension().string()];
-  if (count.empty())
+      by_type[lower_extension(entry.path())].push_back(entry.path());
+  if (by_type.empty())
     throw InputError(
         fmt::format("{}: the folder holds no images; name a video file, or a folder of images",
                     folder.string()));
-  const auto most = std::max_element(
-      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return {ImageSequence::Kind::pattern, (folder / ("*" + most->first)).string(), 0};
+  return std::max_element(
+             by_type.begin(), by_type.end(),
+             [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); })
+      ->second;
 }
 
-/// Lowest number for which the printf-style name exists; libav itself only tries 0 to 4.
-ImageSequence numbered_series(const fs::path& path) {
+/// Those with a printf-style name.
+Pictures pictures_of_series(const fs::path& path) {
   const std::string name = path.filename().string();
   const std::size_t percent = name.find('%'), d = name.find('d', percent);
   if (d == std::string::npos)
     throw InputError(fmt::format("{}: a numbered series needs one %d or %04d", path.string()));
   const std::string head = name.substr(0, percent), tail = name.substr(d + 1);
+  const auto width =
+      static_cast<std::size_t>(std::atoi(name.substr(percent + 1, d - percent - 1).c_str()));
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: no such folder", folder.string()));
-  int first = INT_MAX;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string file = entry.path().filename().string();
+  const auto belongs = [&](const std::string& file) {
     if (file.size() <= head.size() + tail.size() || !file.starts_with(head) ||
         !file.ends_with(tail))
-      continue;
+      return false;
     const std::string digits = file.substr(head.size(), file.size() - head.size() - tail.size());
-    if (digits.size() < 10 &&
-        std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); }))
-      first = std::min(first, std::stoi(digits));
+    return std::all_of(digits.begin(), digits.end(), is_digit) &&
+           (digits.size() == std::max<std::size_t>(width, 1) ||
+            (digits.size() > width && digits.front() != '0'));
+  };
+  Pictures pictures;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (belongs(entry.path().filename().string())) pictures.push_back(entry.path());
+  if (pictures.empty()) throw InputError(fmt::format("{}: no image of that series", path.string()));
+  return pictures;
+}
+
+Pictures pictures_like(const fs::path& pattern) {
+  Pictures pictures;
+  glob_t found{};
+  if (::glob(pattern.c_str(), 0, nullptr, &found) == 0)
+    pictures.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+  ::globfree(&found);
+  if (pictures.empty()) throw InputError(fmt::format("{}: no such file", pattern.string()));
+  return pictures;
+}
+
+/// The numbers by which alone the names differ; nothing if they differ by more, or some are equal.
+std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
+  constexpr std::size_t kMostDigits = 18;
+  std::vector<std::string> names;
+  for (const fs::path& picture : pictures) names.push_back(picture.filename().string());
+  const auto [least, most] = std::minmax_element(names.begin(), names.end());
+  std::size_t head = static_cast<std::size_t>(
+      std::mismatch(least->begin(), least->end(), most->begin(), most->end()).first -
+      least->begin());
+  while (head > 0 && is_digit((*least)[head - 1])) --head;
+  const std::size_t dot = names.front().find_first_not_of("0123456789", head);
+  const std::string tail = dot == std::string::npos ? "" : names.front().substr(dot);
+  std::vector<std::int64_t> numbers;
+  for (const std::string& name : names) {
+    const std::size_t end = std::min(name.size(), name.find_first_not_of("0123456789", head));
+    if (end == head || end - head > kMostDigits || name.substr(end) != tail) return std::nullopt;
+    numbers.push_back(std::stoll(name.substr(head, end - head)));
   }
-  if (first == INT_MAX) throw InputError(fmt::format("{}: no image of that series", path.string()));
-  return {ImageSequence::Kind::numbered, path.string(), first};
+  std::vector<std::int64_t> sorted = numbers;
+  std::sort(sorted.begin(), sorted.end());
+  if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) return std::nullopt;
+  return numbers;
+}
+
+ImageSequence in_order(Pictures pictures) {
+  std::sort(pictures.begin(), pictures.end());
+  std::vector<std::int64_t> frames(pictures.size());
+  std::iota(frames.begin(), frames.end(), 0);
+  const auto numbers = numbers_of(pictures);
+  if (!numbers) return {std::move(pictures), std::move(frames)};
+
+  std::vector<std::pair<std::int64_t, fs::path>> numbered;
+  for (std::size_t i = 0; i < pictures.size(); ++i)
+    numbered.emplace_back((*numbers)[i], std::move(pictures[i]));
+  std::sort(numbered.begin(), numbered.end());
+  std::int64_t step = 0;
+  for (const auto& [number, picture] : numbered)
+    step = std::gcd(step, number - numbered.front().first);
+  ImageSequence sequence;
+  for (auto& [number, picture] : numbered) {
+    sequence.pictures.push_back(std::move(picture));
+    sequence.frames.push_back((number - numbered.front().first) / std::max<std::int64_t>(step, 1));
+  }
+  if (2 * sequence.missing() > sequence.frames.back()) sequence.frames = std::move(frames);
+  return sequence;
 }
 
 }  // namespace
 
-ImageSequence find_image_sequence(const fs::path& path) {
+std::optional<ImageSequence> find_image_sequence(const fs::path& path) {
+  if (fs::is_directory(path)) return in_order(pictures_in(path));
+  if (fs::exists(path)) return std::nullopt;
   const std::string text = path.string();
-  if (fs::is_directory(path)) return images_of_folder(path);
-  if (fs::exists(path)) return {ImageSequence::Kind::file, text, 0};
-  if (text.find('%') != std::string::npos) return numbered_series(path);
-  if (text.find_first_of("*?[") != std::string::npos)
-    return {ImageSequence::Kind::pattern, text, 0};
-  return {ImageSequence::Kind::file, text, 0};
-}
-
-std::vector<fs::path> pictures_of(const ImageSequence& sequence) {
-  std::vector<fs::path> pictures;
-  if (sequence.kind == ImageSequence::Kind::pattern) {
-    glob_t found{};
-    if (::glob(sequence.url.c_str(), 0, nullptr, &found) == 0)
-      pictures.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
-    ::globfree(&found);
-  } else if (sequence.kind == ImageSequence::Kind::numbered) {
-    const std::size_t percent = sequence.url.rfind('%'), d = sequence.url.find('d', percent);
-    const int digits = std::atoi(sequence.url.substr(percent + 1, d - percent - 1).c_str());
-    for (int number = sequence.first_number;; ++number) {
-      pictures.emplace_back(sequence.url.substr(0, percent) +
-                            fmt::format("{:0{}d}", number, digits) + sequence.url.substr(d + 1));
-      if (!fs::exists(pictures.back())) break;
-    }
-    pictures.pop_back();
-  } else {
-    pictures.emplace_back(sequence.url);
-  }
-  return pictures;
-}
-
-InputHandle open_input(const ImageSequence& sequence, std::optional<double> frame_rate_hz,
-                       const std::string& name) {
-  AVDictionary* options = nullptr;
-  const AVInputFormat* format = nullptr;
-  std::string url = sequence.url;
-  if (sequence.is_sequence()) {
-    format = av_find_input_format("image2");
-    av_dict_set(&options, "framerate", fmt::format("{:.9g}", frame_rate_hz.value_or(25.0)).c_str(),
-                0);
-    const bool numbered = sequence.kind == ImageSequence::Kind::numbered;
-    av_dict_set(&options, "pattern_type", numbered ? "sequence" : "glob", 0);
-    if (numbered) av_dict_set_int(&options, "start_number", sequence.first_number, 0);
-  } else {
-    url = "file:" + url;                               // a colon in a file name is not a protocol,
-    av_dict_set(&options, "pattern_type", "none", 0);  // nor is %d in a picture's a series
-  }
-  AVFormatContext* raw = nullptr;
-  const int status = avformat_open_input(&raw, url.c_str(), format, &options);
-  av_dict_free(&options);
-  if (status < 0)
-    throw InputError(fmt::format("{}: not a readable video ({})", name, libav_words(status)));
-  return InputHandle(raw);
+  if (text.find('%') != std::string::npos) return in_order(pictures_of_series(path));
+  if (text.find_first_of("*?[") != std::string::npos) return in_order(pictures_like(path));
+  return std::nullopt;
 }
 
 }  // namespace trochoid::tracking

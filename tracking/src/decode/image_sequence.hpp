@@ -1,33 +1,29 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
-
-#include "decode/libav_handles.hpp"
 
 namespace trochoid::tracking {
 
-/// How libavformat is to be asked for a path: a file, a numbered series ("img/%04d.png") or all
-/// images that match a pattern ("img/*.png", in the order of their names).
+/// A recording stored as pictures, one to a file.
 struct ImageSequence {
-  enum class Kind { file, numbered, pattern };
-  Kind kind = Kind::file;
-  std::string url;
-  int first_number = 0;
+  /// By number where that alone tells their names apart (of "p9.png" and "p10.png" the latter comes
+  /// second), else by name.
+  std::vector<std::filesystem::path> pictures;
+  /// The frames they show, from 0 on. A number that is missing is a frame that was lost; where more
+  /// than half are, numbers count something else and only order the pictures. Every tenth picture
+  /// kept, say, is no gap.
+  std::vector<std::int64_t> frames;
 
-  [[nodiscard]] bool is_sequence() const { return kind != Kind::file; }
+  [[nodiscard]] std::int64_t missing() const {
+    return frames.back() + 1 - static_cast<std::int64_t>(frames.size());
+  }
 };
 
-/// A folder becomes the pattern of the image type it holds most of.
-/// @throws InputError if a folder or series holds no image.
-[[nodiscard]] ImageSequence find_image_sequence(const std::filesystem::path& path);
-
-/// The pictures of a sequence in the order they are read.
-[[nodiscard]] std::vector<std::filesystem::path> pictures_of(const ImageSequence& sequence);
-
-/// @param frame_rate_hz rate given to a sequence.  @throws InputError in libav's words.
-[[nodiscard]] InputHandle open_input(const ImageSequence& sequence,
-                                     std::optional<double> frame_rate_hz, const std::string& name);
+/// The pictures of a folder (of the type it holds most of), of a numbered series ("img/%04d.png")
+/// or that match a pattern ("img/*.png"); nothing for any other path.
+/// @throws InputError if there are none.
+[[nodiscard]] std::optional<ImageSequence> find_image_sequence(const std::filesystem::path& path);
 
 }  // namespace trochoid::tracking
