@@ -303,6 +303,26 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsAsFarAsItGoes) {
               1e-12);
 }
 
+// By its odds after BIC it had counted for less than one against which the evidence is strong.
+TEST(Rivals, WithATermThatUsuallyActsWidenBarsTheMoreTheLessSpeaksAgainstThem) {
+  const auto bar_beside = [](double aicc, double bic) {
+    Rungs rungs{
+        rung_of({1}, {loss("contour_friction_m", 39.0, 0.2)}, 100.0, 100.0),
+        rung_of({1, 2},
+                {loss("contour_friction_m", 38.0, 2.7), loss("rolling_friction_m", 2.0, 7.0)}, aicc,
+                bic)};
+    rungs[0].fit.whiteness_p = 0.5;
+    data::Fit fit = rungs[0].fit;
+    allow_for_rivals(rungs, rungs[0], fit, {2});
+    return fit.parameters[0].sigma;
+  };
+  EXPECT_GT(bar_beside(102.2, 105.1), bar_beside(103.2, 106.1));
+  EXPECT_GT(bar_beside(103.2, 106.1), bar_beside(106.2, 109.1));
+  const double weight = std::exp(-1.1) / (1.0 + std::exp(-1.1));  // by AICc
+  EXPECT_NEAR(bar_beside(102.2, 105.1),
+              std::sqrt((1.0 - weight) * 0.2 * 0.2 + weight * (2.7 * 2.7 + 1.0)), 1e-12);
+}
+
 TEST(Rivals, ThatAreOtherMinimaOfTheSameModelWidenErrorBarsWithinBounds) {
   Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
               rung_of({1}, {loss("pivoting_friction_m", 25.0, 0.1)}, 102.0, 108.0)};

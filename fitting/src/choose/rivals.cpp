@@ -47,7 +47,9 @@ std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms
     if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
-    const double lead = larger && !too_large ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
+    // Stronger evidence against what usually acts would else count for it.
+    const bool by_bic = larger && !too_large && !acts;
+    const double lead = by_bic ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
     rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});
     all += rivals.back().weight;
   }

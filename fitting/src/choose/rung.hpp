@@ -71,7 +71,7 @@ void take(Draft draft, Rung& rung);
 /// where a bar grows noticeably. Rungs with further terms against which BIC's evidence is strong,
 /// for their size, widen bars up to a bound; what one of them would change beyond that is said.
 /// @param usual  terms that act on nearly every body: rungs that add nothing else count without
-/// that bound.
+/// that bound, and by AICc.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const Terms& usual = {});
 
