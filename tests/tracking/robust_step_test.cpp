@@ -93,5 +93,25 @@ TEST(RobustStep, LongSidesMoveAgainstEnds) {
   EXPECT_LT(std::sqrt(solution.common(0, 0)), 0.05 * kFlank_px);
 }
 
+// What is wider along one diagonal and narrower along the other is an ellipse that has turned: one
+// that is nearly round moves out by the difference of its semi-axes times sin 2t, a radian.
+TEST(RobustStep, DiagonalsMoveAgainstEachOther) {
+  constexpr double kTwist_px = 0.05, kLonger_px = 8.0;
+  std::mt19937 random(24);
+  auto equations = round_a_circle(0.02, 0.0, random);
+  for (EdgeEquation& e : equations) {
+    const double across = std::sin(2.0 * e.direction_rad);
+    e.motion = Eigen::Vector3d(e.normal.x(), e.normal.y(), kLonger_px * across);
+    e.twist_px = kTwist_px * across;
+  }
+  RobustSolution solution;
+  const PoseMotion::Step prior = Eigen::Vector3d(30.0, 30.0, 0.5);
+  ASSERT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
+  find_uncertainty(equations, prior, solution);
+  const double turned_rad = kTwist_px / kLonger_px;
+  EXPECT_NEAR(std::sqrt(solution.common(2, 2)), turned_rad, 0.15 * turned_rad);
+  EXPECT_LT(std::sqrt(solution.common(0, 0)), 0.05 * kTwist_px);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -571,15 +571,16 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
 // A lamp makes one side of the body wrong against the other; what the light is like beside the long
 // sides of the outline and at its ends, where the wall turns away, differs by more.
 void find_uncertainty(const Scenery& scenery, Refined& refined) {
-  // By normalised errors of centre and tilt in recordings made by two ray tracers.
-  constexpr double kSides = 0.65, kFlanks = 1.5;
+  // By normalised errors of centre, tilt and precession in recordings made by two ray tracers.
+  constexpr double kSides = 0.65, kFlanks = 1.5, kTwist = 0.7;
   const double narrow_rad = narrow_direction_rad(scenery.camera, refined.pose);
   for (size_t i = 0; i < refined.equations.size(); ++i) {
     EdgeEquation& e = refined.equations[i];
     const double light_px = common_light_px(scenery, refined.edges[i], refined.blurs_px[i]);
     e.common_px = std::hypot(kSides * light_px, sliver_px(refined.edges[i]));
-    if (refined.samples[i].silhouette)
-      e.flank_px = kFlanks * light_px * std::cos(2.0 * (e.direction_rad - narrow_rad));
+    if (!refined.samples[i].silhouette) continue;
+    e.flank_px = kFlanks * light_px * std::cos(2.0 * (e.direction_rad - narrow_rad));
+    e.twist_px = kTwist * e.common_px * std::sin(2.0 * (e.direction_rad - narrow_rad));
   }
   find_uncertainty(refined.equations, prior_of(scenery.motion), refined.solution);
 }

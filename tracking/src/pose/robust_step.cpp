@@ -223,7 +223,8 @@ double jackknife_ratio(const ArrowSystem& all, const Sectors& sectors,
 Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
                                   const std::vector<Row>& rows, const ArrowSystem& factorised,
                                   double scale, int first, int count) {
-  constexpr size_t kLower = 4, kOuterFlanks = 5, kBoreFlanks = 6, kPatterns = 7;
+  constexpr size_t kLower = 4, kOuterFlanks = 5, kBoreFlanks = 6, kOuterTwist = 7, kBoreTwist = 8,
+                   kPatterns = 9;
   std::array<Vector, kPatterns> patterns{};
   for (size_t i = 0; i < equations.size(); ++i) {
     const EdgeEquation& e = equations[i];
@@ -236,6 +237,8 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
     if (e.lower_px > 0.0) rows[i].add_to(weight * e.lower_px, patterns[kLower]);
     if (e.flank_px != 0.0)
       rows[i].add_to(weight * e.flank_px, patterns[e.swell > 0.0 ? kOuterFlanks : kBoreFlanks]);
+    if (e.twist_px != 0.0)
+      rows[i].add_to(weight * e.twist_px, patterns[e.swell > 0.0 ? kOuterTwist : kBoreTwist]);
   }
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
   for (Vector& pattern : patterns) {

@@ -33,6 +33,8 @@ struct EdgeEquation {
   double lower_px = 0.0;
   /// The same, where the outline is narrow against where it is wide; signed [px].
   double flank_px = 0.0;
+  /// The same, where the outline turns from wide to narrow against where it turns back; signed [px].
+  double twist_px = 0.0;
   /// Seen in the colour planes: with a shift of these planes and one along the normal as nuisances.
   bool colour = false;
   double offset_px = 0.0;
