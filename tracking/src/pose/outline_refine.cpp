@@ -572,7 +572,7 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
 // sides of the outline and at its ends, where the wall turns away, differs by more.
 void find_uncertainty(const Scenery& scenery, Refined& refined) {
   // By normalised errors of centre, tilt and precession in recordings made by two ray tracers.
-  constexpr double kSides = 0.65, kFlanks = 1.5, kTwist = 0.7;
+  constexpr double kSides = 0.6, kFlanks = 1.5, kTwist = 0.75;
   const double narrow_rad = narrow_direction_rad(scenery.camera, refined.pose);
   for (size_t i = 0; i < refined.equations.size(); ++i) {
     EdgeEquation& e = refined.equations[i];
