@@ -278,6 +278,13 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
   EXPECT_EQ(frames_of({"only.png"}), (std::vector<std::int64_t>{0}));
 }
 
+TEST_F(FrameSourceTest, TwoPicturesOfOneNumberHaveNoOrder) {
+  for (const char* name : {"1.png", "01.png", "2.png"})
+    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+  EXPECT_THAT(error_of(folder_, {.frame_rate_hz = 10.0}),
+              HasSubstr("01.png has the same number as"));
+}
+
 // A photograph as a camera stores it that was held so, by Exif 2.32, 4.6.4: which side of what is
 // seen is row 0 and which is column 0.
 void photograph(const cv::Mat& upright, int orientation, const fs::path& path) {
@@ -354,6 +361,11 @@ TEST_F(FrameSourceTest, APictureOfASeriesThatCannotBeDecodedIsNotPassedOver) {
   for (int i = 0; i < 6; ++i) photograph(marked_picture(), 1, folder_ / cv::format("p%d.jpg", i));
   for (const char* series : {"p*.jpg", "p%d.jpg"})
     for (const char* words : {"these are words, not a picture", ""}) {
+      std::ofstream(folder_ / "p0.jpg") << words;
+      EXPECT_THAT(error_of(folder_ / series, rate),
+                  HasSubstr("picture 1 of 6, p0.jpg, cannot be decoded"))
+          << series << words;
+      photograph(marked_picture(), 1, folder_ / "p0.jpg");
       std::ofstream(folder_ / "p3.jpg") << words;
       EXPECT_THAT(error_of(folder_ / series, rate),
                   HasSubstr("picture 4 of 6, p3.jpg, cannot be decoded"))

@@ -37,13 +37,14 @@ Stroke future_stroke() {
   return {.colour = palette::predicted, .width_px = 1, .halo_px = 1, .halo_alpha = 0.25};
 }
 
-tracking::SourceOptions source_options(const OverlayInput& input, const OverlayOptions& options) {
-  tracking::SourceOptions source;
-  source.colour = true;
-  source.from = options.from;
-  source.to = options.to;
-  if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
-  return source;
+std::optional<double> rate_of(const data::TrackFile& file) {
+  for (const data::Track& track : file.tracks) {
+    if (track.samples.size() < 2) continue;
+    const data::TrackSample &first = track.samples.front(), &last = track.samples.back();
+    if (first.frame >= 0 && last.frame > first.frame && last.t_s > first.t_s)
+      return static_cast<double>(last.frame - first.frame) / (last.t_s - first.t_s);
+  }
+  return std::nullopt;
 }
 
 /// Draws the pictures of an overlay one after the other; strokes of the past are kept between
@@ -183,12 +184,22 @@ void OverlayPainter::mark_missing(cv::Mat& picture) const {
 
 }  // namespace
 
+std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
+                                                      const OverlayOptions& options) {
+  tracking::SourceOptions source;
+  source.colour = true;
+  source.from = options.from;
+  source.to = options.to;
+  if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
+  source.untimed_rate_hz = rate_of(input.tracks);
+  return tracking::open_video(input.video, source);
+}
+
 OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& options,
                             const std::filesystem::path& path) {
   if (path.extension() != ".mp4")
     throw InputError(fmt::format("{}: an overlay is an mp4 file; name it .mp4", path.string()));
-  auto source =
-      tracking::decode_ahead(tracking::open_video(input.video, source_options(input, options)));
+  auto source = tracking::decode_ahead(open_recording(input, options));
   const tracking::VideoInfo info = source->info();
   const OverlayContent content(input, info.width_px, info.height_px);
   content.check_pictures(info.width_px, info.height_px, input.video.string());

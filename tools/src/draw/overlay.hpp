@@ -2,10 +2,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "draw/overlay_content.hpp"
+#include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tools {
 
@@ -26,6 +28,11 @@ struct OverlayFrames {
   std::vector<std::int64_t> frame;
   std::vector<double> t_s;
 };
+
+/// Opens the recording that is drawn into, in colour. Pictures that carry no times have those of
+/// the track.
+std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
+                                                      const OverlayOptions& options);
 
 /// Writes the recording with observed points and their fading trail, the predicted path and body,
 /// scale bar, time, residual strip, and a mark on frames without a detection. H.264 in mp4, whole

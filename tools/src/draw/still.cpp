@@ -71,12 +71,7 @@ cv::Rect cutting_of(const OverlayContent& content, cv::Size frame) {
 // The frame the path starts on, or the nearest one the recording still has.
 cv::Mat first_tracked_frame(const OverlayInput& input, const OverlayOptions& options,
                             tracking::VideoInfo& info) {
-  tracking::SourceOptions source;
-  source.colour = true;
-  source.from = options.from;
-  source.to = options.to;
-  if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
-  const auto video = tracking::open_video(input.video, source);
+  const auto video = open_recording(input, options);
   info = video->info();
   std::int64_t wanted = std::numeric_limits<std::int64_t>::max();
   for (const data::Track& track : input.tracks.tracks)

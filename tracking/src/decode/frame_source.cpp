@@ -122,6 +122,7 @@ class LibavSource final : public FrameSource {
   /// Of a series the first picture, which tells how the others are coded.
   void open_container(const fs::path& path) {
     series_ = find_image_sequence(path);
+    if (series_ && !options_.frame_rate_hz) options_.frame_rate_hz = options_.untimed_rate_hz;
     if (series_ && !options_.frame_rate_hz)
       fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
     const fs::path& file = series_ ? series_->pictures.front() : path;
@@ -169,7 +170,7 @@ class LibavSource final : public FrameSource {
 
   void describe() {
     if (decoder_->width <= 0 || decoder_->height <= 0)
-      fail("no picture size: not a readable video");
+      fail(series_ ? undecodable(0) : "no picture size: not a readable video");
     turn_ = turn_of(*stream_, photographs_ ? picture_.get() : nullptr);
     info_.orientation = turn_.orientation();
     const cv::Size upright = turn_.upright(decoder_->width, decoder_->height);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <string>
@@ -91,7 +92,7 @@ Pictures pictures_like(const fs::path& pattern) {
   return pictures;
 }
 
-/// The numbers by which alone the names differ; nothing if they differ by more, or some are equal.
+/// The numbers by which alone the names differ; nothing if they differ by more.
 std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
   constexpr std::size_t kMostDigits = 18;
   std::vector<std::string> names;
@@ -109,9 +110,6 @@ std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
     if (end == head || end - head > kMostDigits || name.substr(end) != tail) return std::nullopt;
     numbers.push_back(std::stoll(name.substr(head, end - head)));
   }
-  std::vector<std::int64_t> sorted = numbers;
-  std::sort(sorted.begin(), sorted.end());
-  if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) return std::nullopt;
   return numbers;
 }
 
@@ -126,6 +124,12 @@ ImageSequence in_order(Pictures pictures) {
   for (std::size_t i = 0; i < pictures.size(); ++i)
     numbered.emplace_back((*numbers)[i], std::move(pictures[i]));
   std::sort(numbered.begin(), numbered.end());
+  const auto twice =
+      std::adjacent_find(numbered.begin(), numbered.end(),
+                         [](const auto& a, const auto& b) { return a.first == b.first; });
+  if (twice != numbered.end())
+    throw InputError(fmt::format("{} has the same number as {}: which comes first? remove one",
+                                 twice->second.string(), std::next(twice)->second.string()));
   std::int64_t step = 0;
   for (const auto& [number, picture] : numbered)
     step = std::gcd(step, number - numbered.front().first);

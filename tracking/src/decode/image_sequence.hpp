@@ -23,7 +23,7 @@ struct ImageSequence {
 
 /// The pictures of a folder (of the type it holds most of), of a numbered series ("img/%04d.png")
 /// or that match a pattern ("img/*.png"); nothing for any other path.
-/// @throws InputError if there are none.
+/// @throws InputError if there are none, or two have the same number.
 [[nodiscard]] std::optional<ImageSequence> find_image_sequence(const std::filesystem::path& path);
 
 }  // namespace trochoid::tracking

@@ -34,7 +34,9 @@ struct VideoInfo {
 struct SourceOptions {
   bool colour = false;
   std::optional<double>
-      frame_rate_hz{};       ///< overrides the time stamps: slow motion, image sequences
+      frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences
+  std::optional<double>
+      untimed_rate_hz{};     ///< of an image sequence where frame_rate_hz is not given
   std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
   int decoder_threads = 0;   ///< 0 = the decoder's choice
   /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
@@ -43,7 +45,7 @@ struct SourceOptions {
 };
 
 /// Frames in order from a video file or an image sequence: printf-style ("img/%04d.png"), a pattern
-/// ("img/*.png") or a folder of images; a sequence needs SourceOptions::frame_rate_hz. Pictures
+/// ("img/*.png") or a folder of images; a sequence needs a rate of SourceOptions. Pictures
 /// whose names differ by a number come in its order, and those after one that is missing keep index
 /// and time of theirs (where no more than half are).
 class FrameSource {
