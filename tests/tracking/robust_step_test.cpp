@@ -28,13 +28,15 @@ std::vector<EdgeEquation> round_a_circle(double noise_px, double common_px, std:
   return equations;
 }
 
-RobustSolution solved(std::vector<EdgeEquation> equations) {
+RobustSolution solved(std::vector<EdgeEquation> equations,
+                      const PoseMotion::Step& prior = PoseMotion::Step::Constant(2, 30.0)) {
   RobustSolution solution;
-  const PoseMotion::Step prior = PoseMotion::Step::Constant(2, 30.0);
   EXPECT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
   find_uncertainty(equations, prior, solution);
   return solution;
 }
+
+const PoseMotion::Step kShiftsAndTurn = Eigen::Vector3d(30.0, 30.0, 0.5);
 
 // All edges of the lit side 0.05 px too far out, those of the dark side as much too far in, move
 // the centre by 0.05 px and leave no residual: whatever the noise, it is no better known than that.
@@ -83,10 +85,7 @@ TEST(RobustStep, LongSidesMoveAgainstEnds) {
         Eigen::Vector3d(e.normal.x(), e.normal.y(), -kRadius_px * e.normal.x() * e.normal.x());
     e.flank_px = kFlank_px * along;
   }
-  RobustSolution solution;
-  const PoseMotion::Step prior = Eigen::Vector3d(30.0, 30.0, 0.5);
-  ASSERT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
-  find_uncertainty(equations, prior, solution);
+  const RobustSolution solution = solved(equations, kShiftsAndTurn);
   // cos^2 = (1 + cos 2) / 2, and a circle of free size takes the one.
   const double tilted_rad = 2.0 * kFlank_px / kRadius_px;
   EXPECT_NEAR(std::sqrt(solution.common(2, 2)), tilted_rad, 0.15 * tilted_rad);
@@ -104,10 +103,7 @@ TEST(RobustStep, DiagonalsMoveAgainstEachOther) {
     e.motion = Eigen::Vector3d(e.normal.x(), e.normal.y(), kLonger_px * across);
     e.twist_px = kTwist_px * across;
   }
-  RobustSolution solution;
-  const PoseMotion::Step prior = Eigen::Vector3d(30.0, 30.0, 0.5);
-  ASSERT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
-  find_uncertainty(equations, prior, solution);
+  const RobustSolution solution = solved(equations, kShiftsAndTurn);
   const double turned_rad = kTwist_px / kLonger_px;
   EXPECT_NEAR(std::sqrt(solution.common(2, 2)), turned_rad, 0.15 * turned_rad);
   EXPECT_LT(std::sqrt(solution.common(0, 0)), 0.05 * kTwist_px);

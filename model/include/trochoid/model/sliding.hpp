@@ -141,10 +141,6 @@ struct Sliding {
     dy[Rim::ut] = at + q.at.slope * q.w1 * q.w1 + q.at.z * r.a.w1;
   }
 
-  [[nodiscard]] ContactForce<S> contact_force(const NodeMotion<S>& q) const {
-    return contact(q, slip_velocity(body, q)).force;
-  }
-
   /// Face contact, the other rim's touch, lift-off, no admissible force, end of slip.
   void events(double, const State<S, kStates>& y, State<S, kEvents>& g) const {
     const NodeMotion<S> q = motion(y);
