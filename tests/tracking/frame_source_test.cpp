@@ -275,6 +275,8 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
   EXPECT_EQ(frames_of({"t101502033.png", "t101502066.png", "t101502101.png", "t101502133.png"}),
             one_by_one);
   EXPECT_EQ(frames_of({"1015_1.png", "1015_2.png", "1016_1.png", "1016_9.png"}), one_by_one);
+  EXPECT_EQ(frames_of({"1_9.png", "1_10.png", "cover.png", "._1_9.png"}),
+            (std::vector<std::int64_t>{0, 1, 2}));
   EXPECT_EQ(frames_of({"only.png"}), (std::vector<std::int64_t>{0}));
 }
 

@@ -368,6 +368,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
               const FitOptions& options, Rung& rung, Reach reach) {
   FitOptions own = options;
   if (below != nullptr) own.rolls_at_first = rung.rolls_at_first = below->rolls_at_first;
+  const data::Scene asked = rung.scene;
   try_rung(rung, [&] {
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
     if (extends) {
@@ -386,6 +387,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
         hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
                             parameters_of(rung.scene));
       own.strategy = "auto";
+      rung.scene = asked;  // a search may find another law of friction than what it goes on from
       if (softness_is_open(rung))
         fit_softly(tracks, own, rung);
       else

@@ -209,7 +209,7 @@ void add_init_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("init", "Write a scene file from a first look at a recording");
-  command->add_option("video", options->video, "Recording")->required();
+  command->add_option("video", options->video, "Recording")->required()->transform(without_slash());
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
   command
       ->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known: 0.1 to 10000")

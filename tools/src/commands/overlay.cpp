@@ -92,7 +92,9 @@ void add_overlay_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("overlay", "Draw observed and predicted path into the recording");
-  command->add_option("video", options->video, "Recording the track was made from")->required();
+  command->add_option("video", options->video, "Recording the track was made from")
+      ->required()
+      ->transform(without_slash());
   command->add_option("--track", options->track, "Track CSV")->required();
   command->add_option("--fit", options->fit, "Fit JSON; without it only the observation is drawn");
   command->add_option("--scene", options->scene, "Scene TOML (default: the one stored in the fit)");

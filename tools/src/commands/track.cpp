@@ -138,6 +138,7 @@ void add_track_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
   track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
+      ->transform(without_slash())
       ->required();
   track->add_option("--scene", options->scene,
                     "Scene file (docs/formats.md); without body and camera a track in pixels");

@@ -67,6 +67,15 @@ CLI::Validator frame_rate() {
   return number_within(kSlowest_Hz, kFastest_Hz);
 }
 
+CLI::Validator without_slash() {
+  return CLI::Validator(
+      [](std::string& path) {
+        while (path.size() > 1 && path.back() == '/') path.pop_back();
+        return std::string();
+      },
+      "");
+}
+
 CLI::Validator fitted_model() {
   return CLI::IsMember({"top", "smooth", "rolling", "sliding", "puck", "pivot", "auto"});
 }

@@ -17,6 +17,9 @@ namespace trochoid::tools {
 /// Pictures per second, from a time lapse's to more than cameras reach.
 [[nodiscard]] CLI::Validator frame_rate();
 
+/// Takes the slash off the name of a folder, which has a name of its own without it.
+[[nodiscard]] CLI::Validator without_slash();
+
 /// A model that can be fitted, or auto.
 [[nodiscard]] CLI::Validator fitted_model();
 

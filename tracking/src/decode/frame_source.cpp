@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <new>
 #include <optional>
 #include <utility>
@@ -226,16 +225,17 @@ class LibavSource final : public FrameSource {
 
   /// The next picture of a series, stamped with its place in it.
   bool feed_picture() {
+    constexpr std::streamoff kMostBytes = 1 << 30;
     if (next_picture_ == series_->pictures.size()) {
       flushing_ = true;
       avcodec_send_packet(decoder_.get(), nullptr);
       return true;
     }
-    std::ifstream file(series_->pictures[next_picture_], std::ios::binary);
-    const std::string bytes(std::istreambuf_iterator<char>(file), {});
-    if (bytes.empty()) fail(undecodable(next_picture_));
-    if (av_new_packet(packet_.get(), static_cast<int>(bytes.size())) < 0) throw std::bad_alloc();
-    std::copy(bytes.begin(), bytes.end(), packet_->data);
+    std::ifstream file(series_->pictures[next_picture_], std::ios::binary | std::ios::ate);
+    const std::streamoff bytes = file ? std::streamoff(file.tellg()) : 0;
+    if (bytes <= 0 || bytes > kMostBytes) fail(undecodable(next_picture_));
+    if (av_new_packet(packet_.get(), static_cast<int>(bytes)) < 0) throw std::bad_alloc();
+    file.seekg(0).read(reinterpret_cast<char*>(packet_->data), bytes);
     packet_->pts = packet_->dts = static_cast<std::int64_t>(next_picture_++);
     packet_->flags |= AV_PKT_FLAG_KEY;
     if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;

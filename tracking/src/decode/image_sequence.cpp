@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -42,7 +43,8 @@ bool is_image(const fs::path& path) {
 Pictures pictures_in(const fs::path& folder) {
   std::map<std::string, Pictures> by_type;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_image(entry.path()))
+    if (entry.is_regular_file() && is_image(entry.path()) &&
+        !entry.path().filename().string().starts_with('.'))  // a Mac's ._f1.png is none
       by_type[lower_extension(entry.path())].push_back(entry.path());
   if (by_type.empty())
     throw InputError(
@@ -114,7 +116,10 @@ std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
 }
 
 ImageSequence in_order(Pictures pictures) {
-  std::sort(pictures.begin(), pictures.end());
+  // Numbers in names by value, for where names differ by more than one: f9, f10, cover.
+  std::sort(pictures.begin(), pictures.end(), [](const fs::path& a, const fs::path& b) {
+    return ::strverscmp(a.c_str(), b.c_str()) < 0;
+  });
   std::vector<std::int64_t> frames(pictures.size());
   std::iota(frames.begin(), frames.end(), 0);
   const auto numbers = numbers_of(pictures);

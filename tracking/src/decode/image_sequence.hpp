@@ -9,7 +9,7 @@ namespace trochoid::tracking {
 /// A recording stored as pictures, one to a file.
 struct ImageSequence {
   /// By number where that alone tells their names apart (of "p9.png" and "p10.png" the latter comes
-  /// second), else by name.
+  /// second), else by name, numbers in it by value.
   std::vector<std::filesystem::path> pictures;
   /// The frames they show, from 0 on. A number that is missing is a frame that was lost; where more
   /// than half are, numbers count something else and only order the pictures. Every tenth picture
