@@ -280,6 +280,20 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
   EXPECT_EQ(frames_of({"only.png"}), (std::vector<std::int64_t>{0}));
 }
 
+TEST_F(FrameSourceTest, ASeriesCountsByItsOwnNumberAndFoldersFollowEachOther) {
+  const cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(9));
+  for (int i = 1; i < 13; ++i)
+    cv::imwrite((folder_ / cv::format("cam1%d.png", i)).string(), picture);
+  const auto series = open_video(folder_ / "cam1%d.png", {.frame_rate_hz = 10.0});
+  EXPECT_EQ(series->info().missing, 0);
+  for (const auto& [name, level] : {std::pair{"100C/p9.png", 10}, {"101C/p1.png", 20}}) {
+    fs::create_directory((folder_ / name).parent_path());
+    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(level)));
+  }
+  const auto folders = open_video(folder_ / "*C" / "p*.png", {.frame_rate_hz = 10.0});
+  for (const int level : {10, 20}) EXPECT_EQ(folders->next().value().luma.at<uchar>(0, 0), level);
+}
+
 TEST_F(FrameSourceTest, TwoPicturesOfOneNumberHaveNoOrder) {
   for (const char* name : {"1.png", "01.png", "2.png"})
     cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));

@@ -94,16 +94,22 @@ Pictures pictures_like(const fs::path& pattern) {
   return pictures;
 }
 
-/// The numbers by which alone the names differ; nothing if they differ by more.
-std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
+/// The numbers by which alone the names differ; nothing if they differ by more, or in their folder.
+/// @param begin  where in a name the number begins, if that is known.
+std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures,
+                                                    std::optional<std::size_t> begin) {
   constexpr std::size_t kMostDigits = 18;
   std::vector<std::string> names;
-  for (const fs::path& picture : pictures) names.push_back(picture.filename().string());
+  for (const fs::path& picture : pictures) {
+    if (picture.parent_path() != pictures.front().parent_path()) return std::nullopt;
+    names.push_back(picture.filename().string());
+  }
   const auto [least, most] = std::minmax_element(names.begin(), names.end());
   std::size_t head = static_cast<std::size_t>(
       std::mismatch(least->begin(), least->end(), most->begin(), most->end()).first -
       least->begin());
   while (head > 0 && is_digit((*least)[head - 1])) --head;
+  head = begin.value_or(head);
   const std::size_t dot = names.front().find_first_not_of("0123456789", head);
   const std::string tail = dot == std::string::npos ? "" : names.front().substr(dot);
   std::vector<std::int64_t> numbers;
@@ -115,14 +121,14 @@ std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures) {
   return numbers;
 }
 
-ImageSequence in_order(Pictures pictures) {
+ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std::nullopt) {
   // Numbers in names by value, for where names differ by more than one: f9, f10, cover.
   std::sort(pictures.begin(), pictures.end(), [](const fs::path& a, const fs::path& b) {
     return ::strverscmp(a.c_str(), b.c_str()) < 0;
   });
   std::vector<std::int64_t> frames(pictures.size());
   std::iota(frames.begin(), frames.end(), 0);
-  const auto numbers = numbers_of(pictures);
+  const auto numbers = numbers_of(pictures, begin);
   if (!numbers) return {std::move(pictures), std::move(frames)};
 
   std::vector<std::pair<std::int64_t, fs::path>> numbered;
@@ -153,7 +159,8 @@ std::optional<ImageSequence> find_image_sequence(const fs::path& path) {
   if (fs::is_directory(path)) return in_order(pictures_in(path));
   if (fs::exists(path)) return std::nullopt;
   const std::string text = path.string();
-  if (text.find('%') != std::string::npos) return in_order(pictures_of_series(path));
+  if (text.find('%') != std::string::npos)
+    return in_order(pictures_of_series(path), path.filename().string().find('%'));
   if (text.find_first_of("*?[") != std::string::npos) return in_order(pictures_like(path));
   return std::nullopt;
 }
