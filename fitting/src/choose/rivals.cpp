@@ -47,7 +47,7 @@ std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms
     if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
-    // Stronger evidence against what usually acts would else count for it.
+    // By BIC, what usually acts would weigh less than where the evidence against it is stronger.
     const bool by_bic = larger && !too_large && !acts;
     const double lead = by_bic ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
     rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});

@@ -235,7 +235,8 @@ class LibavSource final : public FrameSource {
     const std::streamoff bytes = file ? std::streamoff(file.tellg()) : 0;
     if (bytes <= 0 || bytes > kMostBytes) fail(undecodable(next_picture_));
     if (av_new_packet(packet_.get(), static_cast<int>(bytes)) < 0) throw std::bad_alloc();
-    file.seekg(0).read(reinterpret_cast<char*>(packet_->data), bytes);
+    if (!file.seekg(0).read(reinterpret_cast<char*>(packet_->data), bytes))
+      fail(undecodable(next_picture_));
     packet_->pts = packet_->dts = static_cast<std::int64_t>(next_picture_++);
     packet_->flags |= AV_PKT_FLAG_KEY;
     if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;

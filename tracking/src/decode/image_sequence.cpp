@@ -149,7 +149,7 @@ ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std
     sequence.pictures.push_back(std::move(picture));
     sequence.frames.push_back((number - numbered.front().first) / std::max<std::int64_t>(step, 1));
   }
-  if (2 * sequence.missing() > sequence.frames.back()) sequence.frames = std::move(frames);
+  if (2 * sequence.missing() > sequence.frames.back() + 1) sequence.frames = std::move(frames);
   return sequence;
 }
 

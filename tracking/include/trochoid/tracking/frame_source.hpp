@@ -24,7 +24,7 @@ struct VideoInfo {
   int width_px = 0, height_px = 0;  ///< upright
   double frame_rate_hz = 0.0;       ///< average of the time stamps
   std::int64_t frames = 0;          ///< as the container says, 0 if it does not
-  std::int64_t missing = 0;  ///< frames lost among them, by the numbers of a series' pictures
+  std::int64_t missing = 0;         ///< beside those, by the numbers of a series' pictures
   std::string codec;
   bool variable_rate = false;
   std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
@@ -45,9 +45,9 @@ struct SourceOptions {
 };
 
 /// Frames in order from a video file or an image sequence: printf-style ("img/%04d.png"), a pattern
-/// ("img/*.png") or a folder of images; a sequence needs a rate of SourceOptions. Pictures
-/// whose names differ by a number come in its order, and those after one that is missing keep index
-/// and time of theirs (where no more than half are).
+/// ("img/*.png") or a folder of images; a sequence needs one of the rates of SourceOptions.
+/// Pictures whose names differ by a number come in its order, and those after one that is missing
+/// keep index and time of theirs (where no more than half are).
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
