@@ -679,6 +679,20 @@ TEST_F(SlidesLater, RollsFromTheBeginningWhereNothingSpeaksForASlip) {
   EXPECT_EQ(rung.fit.find("vx_m_s")->status, data::ParameterStatus::derived);
 }
 
+// It was fitted with Coulomb's law, however softly friction sets in beside it.
+TEST_F(SlidesLater, StaysAsPromisedBesideOneThatRollsAtFirst) {
+  const data::Track track = data::read_track(folder_ + "/track.csv").tracks.front();
+  const Rung known = fitted(track, 0.0);
+  Rung rung = rung_;
+  rung.fit = known.fit;
+  rung.fitted = rung.as_promised = true;
+  rung.bic = known.bic + 1.0;
+  begin_as(std::span(&track, 1), known, {}, rung);
+  EXPECT_TRUE(rung.as_promised);
+  EXPECT_FALSE(rung.rolls_at_first);
+  EXPECT_EQ(rung.bic, known.bic + 1.0);
+}
+
 // It lasts for little more than a sample, and leaves the body a millimetre elsewhere.
 TEST_F(SlidesLater, SlipsAtFirstWhereThatIsSeen) {
   constexpr double kSlip_m_s = -0.09;

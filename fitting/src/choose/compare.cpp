@@ -82,11 +82,19 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
   const std::vector<Rung*> near = near_ones(rungs, chosen);
   const auto own = std::find(near.begin(), near.end(), &chosen);
   if (own == near.end()) return;
+  const double aicc = chosen.aicc, bic = chosen.bic;
+  const int parameters = chosen.parameters;
   let_roll_at_first(contest.tracks, contest.options, **own);
   if (!chosen.rolls_at_first) return;
   side_by_side(contest, near, [&](std::size_t, Rung& rung, const FitOptions& options) {
     if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);
   });
+  for (Rung& rung : rungs) {
+    if (!rung.as_promised) continue;  // beside the chosen one, whose scores are others now
+    rung.aicc += chosen.aicc - aicc;
+    rung.bic += chosen.bic - bic;
+    rung.parameters += chosen.parameters - parameters;
+  }
 }
 
 }  // namespace

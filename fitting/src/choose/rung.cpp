@@ -263,6 +263,12 @@ void keep_better(Draft draft, Rung& rung) {
     take(std::move(draft), rung);
 }
 
+// By BIC: one of the two may have the softness of its friction as a parameter more.
+void keep_better(Rung searched, Rung& rung) {
+  if (!usable(rung.fit) || (usable(searched.fit) && searched.fit.bic < rung.fit.bic))
+    rung = std::move(searched);
+}
+
 // Scores and reason, once the fit is made.
 void conclude(Rung& rung) {
   if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
@@ -387,11 +393,15 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
         hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
                             parameters_of(rung.scene));
       own.strategy = "auto";
-      rung.scene = asked;  // a search may find another law of friction than what it goes on from
-      if (softness_is_open(rung))
-        fit_softly(tracks, own, rung);
-      else
-        keep_better(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
+      Rung searched = rung;
+      searched.scene =
+          asked;  // a search may find another law of friction than what it goes on from
+      if (softness_is_open(searched)) {
+        fit_softly(tracks, own, searched);
+        keep_better(std::move(searched), rung);
+      } else {
+        keep_better(draft_one_of_several(tracks, asked, own, &rung.first_part), rung);
+      }
     }
     rung.fitted = usable(rung.fit);
   });
@@ -400,7 +410,9 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 
 void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
               Rung& rung) {
-  if (rung.scene.model.name != "sliding" || rung.rolls_at_first || !usable(rung.fit)) return;
+  if (rung.scene.model.name != "sliding" || rung.rolls_at_first || rung.as_promised ||
+      !usable(rung.fit))
+    return;
   Values start = values_of(rung.fit);
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())

@@ -92,7 +92,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 
 /// The same for a rung beside one that rolls at first, from where that begins: what it says of the
-/// start is comparable then. As it is where that leads nowhere.
+/// start is comparable then. As it is where that leads nowhere, or where it is only promised.
 void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
               Rung& rung);
 
