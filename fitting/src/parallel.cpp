@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -26,7 +27,10 @@ void in_parallel(int count, int threads, const std::function<void(int)>& work) {
   };
   const int used = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
   std::vector<std::thread> team;
-  for (int i = 1; i < std::min(used, count); ++i) team.emplace_back(worker);
+  try {
+    for (int i = 1; i < std::min(used, count); ++i) team.emplace_back(worker);
+  } catch (const std::system_error&) {  // no more threads to be had: those there are do the work
+  }
   worker();
   for (std::thread& member : team) member.join();
   if (failure) std::rethrow_exception(failure);

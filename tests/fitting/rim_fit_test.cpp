@@ -206,6 +206,31 @@ TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   EXPECT_THAT(with.warnings, testing::Contains(testing::HasSubstr("error bars allow for mass_kg")));
 }
 
+// A disc cannot have more of one moment than twice the other, which no prior knows.
+TEST_F(RimFit, WhatNoBodyCanBeIsNoDoubt) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  const double mass_kg = *c.scene.body->mass_kg, R = c.scene.body->radius_m;
+  const double most = 0.5 * mass_kg * R * R;  // of a disc without thickness
+  c.scene.fit.prior["Is_kg_m2"] = {most, 0.01 * most};
+  c.scene.body->I_kg_m2 = 0.5 * most;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_TRUE(fit.converged) << fit.reason;
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("error bars allow for Is_kg_m2")));
+}
+
+// Whoever predicts from the fit alone has to know of it.
+TEST_F(RimFit, KeepsWhatIsFixedOfTheStart) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
+  c.scene.fit.fixed["w3_rad_s"] = free.find("w3_rad_s")->value;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  const data::FitParameter* fixed = fit.find("w3_rad_s");
+  ASSERT_NE(fixed, nullptr);
+  EXPECT_EQ(fixed->status, data::ParameterStatus::fixed);
+  EXPECT_EQ(fixed->value, free.find("w3_rad_s")->value);
+  EXPECT_EQ(fit.find("psi_rad"), nullptr) << "unseen, not fixed";
+}
+
 TEST_F(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
   using testing::Contains;
   using testing::HasSubstr;

@@ -49,8 +49,8 @@ void take_priors_for_given(data::Scene& scene) {
 
 namespace {
 
-// Residuals with a given quantity off by some standard deviations of its prior; empty if the model
-// has no prediction there.
+// Residuals with a given quantity off by some standard deviations of its prior; empty if there is
+// no such body, or the model has no prediction for it.
 class Moved {
  public:
   Moved(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
@@ -66,27 +66,34 @@ class Moved {
     data::Scene scene = scene_;
     scene.model.name = problem_.predictor->model_name();
     given_.set(scene, prior_.value + deviations * prior_.sigma);
-    const auto plain = model::make_predictor(scene);
-    const auto wrapped = observed(*plain, scene, frame_time_s_);
-    const Problem other = for_predictor(problem_, wrapped ? *wrapped : *plain);
-    Eigen::VectorXd residuals;
-    if (other.free.size() != problem_.free.size() || !all_residuals(other, u_, residuals))
-      return {};
-    return residuals;
+    try {
+      const auto plain = model::make_predictor(scene);
+      const auto wrapped = observed(*plain, scene, frame_time_s_);
+      const Problem other = for_predictor(problem_, wrapped ? *wrapped : *plain);
+      Eigen::VectorXd residuals;
+      if (other.free.size() == problem_.free.size() && all_residuals(other, u_, residuals))
+        return residuals;
+    } catch (const InputError&) {  // a ring that is wider than its disc, say
+    }
+    return {};
   }
 
   // Derivative of the residuals by the deviation. A track may see the thousandth part of a prior's:
   // the step moves the residuals by about their noise, where they are straight and well above the
-  // integration error.
+  // integration error. One-sided where the other side has no body.
   [[nodiscard]] Eigen::VectorXd derivative(const Eigen::VectorXd& here) const {
     constexpr double kFirst = 1e-2, kLeast = 1e-6;
-    const Eigen::VectorXd there = by(kFirst);
+    double first = kFirst;
+    Eigen::VectorXd there = by(first);
+    if (there.size() == 0) there = by(first = -kFirst);
     if (there.size() == 0) return {};
     const double moved = (there - here).norm(), noise = std::sqrt(static_cast<double>(here.size()));
     const double step = std::clamp(kFirst * noise / std::max(moved, 1e-300), kLeast, 1.0);
     const Eigen::VectorXd up = by(step), down = by(-step);
-    if (up.size() == 0 || down.size() == 0) return {};
-    return (up - down) / (2.0 * step);
+    if (up.size() > 0 && down.size() > 0) return (up - down) / (2.0 * step);
+    if (up.size() > 0) return (up - here) / step;
+    if (down.size() > 0) return (here - down) / step;
+    return (there - here) / first;
   }
 
  private:

@@ -29,7 +29,8 @@ Eigen::VectorXd sigma_of_one_camera(const Problem& problem, const Eigen::MatrixX
   return reduced.diagonal().cwiseMax(0.0).cwiseSqrt();
 }
 
-void report_parameters(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+void report_parameters(const Problem& problem, const Uncertainty& error,
+                       const data::FitSettings& asked, data::Fit& fit) {
   const auto& infos = problem.predictor->parameters();
   fit.covariance = error.covariance;
   const Eigen::VectorXd one_camera = sigma_of_one_camera(problem, error.covariance);
@@ -59,7 +60,9 @@ void report_parameters(const Problem& problem, const Uncertainty& error, data::F
     const bool is_free = std::any_of(problem.free.begin(), problem.free.end(),
                                      [&](const FreeParameter& p) { return p.index == index; });
     // An unseen spin angle is not a fixed value, it is simply absent.
-    if (is_free || (infos[index].role == model::ParameterInfo::Role::initial)) continue;
+    const bool unseen = infos[index].role == model::ParameterInfo::Role::initial &&
+                        !asked.fixed.contains(infos[index].name);
+    if (is_free || unseen) continue;
     fit.parameters.push_back({infos[index].name, problem.base[0][index], 0.0, infos[index].unit,
                               data::ParameterStatus::fixed, true, infos[index].meaning});
   }
@@ -153,7 +156,7 @@ void describe_arcs(const Problem& problem, data::Fit& fit) {
 void describe(const Problem& problem, const Solution& solution, const Uncertainty& error,
               const data::Scene& scene, data::Fit& fit) {
   describe_quality(problem, solution.u, error, fit);
-  report_parameters(problem, error, fit);
+  report_parameters(problem, error, scene.fit, fit);
   describe_arcs(problem, fit);
   warn(problem, error, fit);
   tell_whether_one_friction(problem, fit);

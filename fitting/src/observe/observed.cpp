@@ -1,9 +1,12 @@
 #include "observe/observed.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <limits>
 
 #include "observe/timing.hpp"
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -104,20 +107,31 @@ Prediction ObservedPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& v
 
 }  // namespace
 
+namespace {
+
+// What a scale or a rate is reckoned from.
+const data::Prior& positive(const std::string& name, const data::Prior& prior) {
+  if (!(prior.value > 0.0))
+    throw InputError(fmt::format("[fit] prior: {} = {} must be greater than 0", name, prior.value));
+  return prior;
+}
+
+}  // namespace
+
 std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene,
                                            double frame_s) {
   auto& prior = scene.fit.prior;
   const bool from_radius = scene.camera.file.empty() && !scene.camera.scale_px_per_m;
   if (const auto radius = prior.find("radius_m");
-      radius != prior.end() && from_radius && scene.body && !prior.contains(kScale))
-    prior[kScale] = {scene.body->radius_m / radius->second.value,
-                     scene.body->radius_m * radius->second.sigma /
-                         (radius->second.value * radius->second.value)};
+      radius != prior.end() && from_radius && scene.body && !prior.contains(kScale)) {
+    const auto [value_m, sigma_m] = positive(radius->first, radius->second);
+    prior[kScale] = {scene.body->radius_m / value_m,
+                     scene.body->radius_m * sigma_m / (value_m * value_m)};
+  }
   if (const auto rate = prior.find("frame_rate_hz"); rate != prior.end()) {
-    const double assumed_hz = scene.camera.frame_rate_hz.value_or(rate->second.value);
-    prior[kTimeFactor] = {
-        assumed_hz / rate->second.value,
-        assumed_hz * rate->second.sigma / (rate->second.value * rate->second.value)};
+    const auto [value_hz, sigma_hz] = positive(rate->first, rate->second);
+    const double assumed_hz = scene.camera.frame_rate_hz.value_or(value_hz);
+    prior[kTimeFactor] = {assumed_hz / value_hz, assumed_hz * sigma_hz / (value_hz * value_hz)};
   }
   const auto asked_for = [&](const char* name, double usual) {
     const auto& free = scene.fit.free;
