@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "trochoid/model/events.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "trochoid/model/simulate.hpp"
 
@@ -25,9 +24,6 @@ Trajectory simulate_top_euler(const data::Scene& scene);
 Trajectory simulate_rim(const data::Scene& scene, const std::string& law);
 Trajectory simulate_puck(const data::Scene& scene);
 Trajectory simulate_pivot(const data::Scene& scene);
-
-/// What a run that an integrator ended is called to the outside.
-[[nodiscard]] Outcome outcome_of(RunEnd end);
 
 /// The rung a scene means: its model.name, or for "auto" what its support and terms say.
 [[nodiscard]] std::string law_of(const data::Scene& scene);

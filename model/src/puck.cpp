@@ -6,6 +6,7 @@
 #include "factories.hpp"
 #include "puck_run.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/model/events.hpp"
 #include "trochoid/model/inertia.hpp"
 
 // The puck as a function of its parameters and as a table; position and spin angle are cyclic.
@@ -46,6 +47,9 @@ PuckScene puck_scene(const data::Scene& scene) {
     throw InputError(
         "body.mass_kg is missing: model.air_force_N_s_m acts as coefficient over mass; weigh the "
         "body");
+  if (!(scene.model.gravity_m_s2 > 0.0))
+    throw InputError(
+        fmt::format("model.gravity_m_s2 = {} must be greater than 0", scene.model.gravity_m_s2));
   PuckScene puck;
   puck.gravity = scene.model.gravity_m_s2;
   puck.radius_m = scene.body->radius_m;
@@ -201,9 +205,7 @@ void PuckPredictor::fill(const PuckPath<S>& path, const S& contact_radius_m,
   for (const auto& s : path.rows)
     for (const Observable what : request.observables)
       put(row++, seen(s, what), kind_of(what), out.values, out.jacobian);
-  out.outcome = path.end == StepEnd::accepted     ? Outcome::reached_end
-                : path.end == StepEnd::step_limit ? Outcome::step_limit
-                                                  : Outcome::tolerance_not_reachable;
+  out.outcome = outcome_of(run_end_of(path.end));
   out.valid_until_s = path.rows.empty() ? request.start_s : request.t_s[path.rows.size() - 1];
   out.steps = path.statistics.steps;
   const double run_m = path.rows.empty()
@@ -303,7 +305,7 @@ Trajectory simulate_puck(const data::Scene& scene) {
   }
   run.statistics = path.statistics;
   run.end_s = path.rows.empty() ? 0.0 : t_s[path.rows.size() - 1];
-  run.outcome = path.end == StepEnd::accepted ? Outcome::reached_end : Outcome::step_limit;
+  run.outcome = outcome_of(run_end_of(path.end));
   if (std::isfinite(path.rest_s) && path.rest_s <= t_s.back()) {
     run.events.push_back({path.rest_s, "at_rest"});
     run.outcome = Outcome::at_rest;

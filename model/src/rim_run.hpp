@@ -216,18 +216,7 @@ class RimRun {
   }
   template <class Result>
   void stopped(const Result& result) {
-    switch (result.end) {
-      case RunEnd::reached_end:
-        return finish(Outcome::reached_end);
-      case RunEnd::step_limit:
-        return finish(Outcome::step_limit);
-      case RunEnd::rounding_limit:
-        return finish(Outcome::tolerance_not_reachable);
-      case RunEnd::not_finite:
-        return finish(Outcome::out_of_domain);
-      case RunEnd::event:
-        break;
-    }
+    if (result.end != RunEnd::event) finish(outcome_of(result.end));
   }
 
   template <class Sink>

@@ -27,21 +27,6 @@ Choice choose_integrator(const std::string& asked) {
       asked));
 }
 
-Outcome outcome_of(RunEnd end) {
-  switch (end) {
-    case RunEnd::step_limit:
-      return Outcome::step_limit;
-    case RunEnd::rounding_limit:
-      return Outcome::tolerance_not_reachable;
-    case RunEnd::not_finite:
-      return Outcome::out_of_domain;
-    case RunEnd::reached_end:
-    case RunEnd::event:
-      break;
-  }
-  return Outcome::reached_end;
-}
-
 SundialsOptions sundials_options(Method method, double rtol, const double* atol, int states) {
   SundialsOptions options;
   options.method = method == Method::cvode_adams ? SundialsMethod::cvode_adams

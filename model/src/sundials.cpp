@@ -357,6 +357,7 @@ SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::Vect
     run.states.row(rows) = state.transpose();
     if (run.end_s > start_s) stepper->sensitivities(carried);
     run.sensitivities.row(rows++) = carried;
+    if (run.event >= 0) break;  // right at a time asked for
   }
   run.states.conservativeResize(rows, Eigen::NoChange);
   run.sensitivities.conservativeResize(rows, Eigen::NoChange);

@@ -223,10 +223,7 @@ class Run {
 
   void finish(Stepper& stepper, StepEnd end) {
     result_.written = next_;
-    result_.end_reason = static_cast<int>(end == StepEnd::accepted         ? RunEnd::reached_end
-                                          : end == StepEnd::step_limit     ? RunEnd::step_limit
-                                          : end == StepEnd::rounding_limit ? RunEnd::rounding_limit
-                                                                           : RunEnd::not_finite);
+    result_.end_reason = static_cast<int>(run_end_of(end));
     result_.reached_s = stepper.t_s();
     const StepCounts& counts = stepper.counts();
     result_.steps = counts.steps;

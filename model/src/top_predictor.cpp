@@ -4,6 +4,7 @@
 #include "factories.hpp"
 #include "top_dispatch.hpp"
 #include "top_scene.hpp"
+#include "trochoid/model/events.hpp"
 
 // The top as a function of its parameters: the kernel follows the axis k, everything else (length,
 // pivot, azimuth, spin) enters the observation in closed form.

@@ -209,12 +209,12 @@ void fill_row(const TopSettings& top, const TopColumns& run, int n, double pivot
 }
 
 template <class Runner>
-Trajectory tabulate(const data::Scene& scene, const TopSettings& top, const Choice& choice,
-                    const Runner& run) {
+Trajectory tabulate(const char* model, const data::Scene& scene, const TopSettings& top,
+                    const Choice& choice, const Runner& run) {
   const std::vector<double> t_s = output_times_s(scene.run);
   const TopColumns columns = run(t_s, scene.run.tolerance);
   Trajectory trajectory;
-  trajectory.model = scene.model.name;
+  trajectory.model = model;
   trajectory.integrator = choice.name;
   trajectory.integrator_reason = choice.reason;
   trajectory.columns = euler_columns();
@@ -239,7 +239,7 @@ Trajectory tabulate(const data::Scene& scene, const TopSettings& top, const Choi
 Trajectory simulate_top(const data::Scene& scene) {
   const TopSettings top = top_for_simulation(scene);
   const Choice choice = choose_integrator(scene.run.integrator);
-  return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
+  return tabulate("top", scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
     if (choice.method == Method::taylor) return run_kernel(run_top_here, top, t_s, tolerance);
     if (choice.method == Method::dop853) return run_kernel(run_top_dop853, top, t_s, tolerance);
     return run_sundials(top, t_s, tolerance, choice.method);
@@ -249,9 +249,10 @@ Trajectory simulate_top(const data::Scene& scene) {
 Trajectory simulate_top_euler(const data::Scene& scene) {
   const TopSettings top = without_drag(top_for_simulation(scene));
   const Choice choice{Method::dop853, "dop853", "the only one for the thesis' form"};
-  return tabulate(scene, top, choice, [&](const std::vector<double>& t_s, double tolerance) {
-    return run_kernel(run_top_euler, top, t_s, tolerance);
-  });
+  return tabulate("top-euler", scene, top, choice,
+                  [&](const std::vector<double>& t_s, double tolerance) {
+                    return run_kernel(run_top_euler, top, t_s, tolerance);
+                  });
 }
 
 }  // namespace trochoid::model

@@ -120,6 +120,12 @@ TEST(Puck, StopsLikeABlockWhenItDoesNotSpin) {
   }
 }
 
+TEST(Puck, NeedsAWeight) {
+  data::Scene scene = puck_scene();
+  scene.model.gravity_m_s2 = 0.0;
+  EXPECT_THROW(static_cast<void>(simulate(scene)), InputError);
+}
+
 // Pure spinning: dw/dt = -mu g R (2/3) / (C/m), C/m = R^2/2.
 TEST(Puck, SpinsDownUniformlyInPlace) {
   data::Scene scene = puck_scene();

@@ -61,6 +61,32 @@ TEST_P(EveryMethod, StopsAtAnEventAndNamesIt) {
   EXPECT_NEAR(run.end_s, 0.5 * M_PI, 1e-7);
 }
 
+// y' = -1 from 1: nothing at 0.5 s, which is asked for.
+struct Descent {
+  using Scalar = Dual<4>;
+  static constexpr int kStates = 1;
+  void derivative(double, const State<Scalar, 1>&, State<Scalar, 1>& dy) const { dy[0] = -1.0; }
+  struct Plain {
+    using Scalar = double;
+    static constexpr int kStates = 1;
+    void derivative(double, const State<double, 1>&, State<double, 1>& dy) const { dy[0] = -1.0; }
+  };
+  [[nodiscard]] Plain values() const { return {}; }
+};
+
+TEST_P(EveryMethod, StopsAtAnEventRightWhereATimeIsAskedFor) {
+  Ode ode = make_ode(Descent{});
+  ode.events = 1;
+  ode.event_functions = [](double, const double* y, double* g) { g[0] = y[0] - 0.5; };
+  const std::array<double, 5> times{0.0, 0.25, 0.5, 0.75, 1.0};
+  SundialsOptions own = options(GetParam(), 1e-8);
+  own.atol.conservativeResize(1);
+  const SundialsRun run = integrate_sundials(ode, 0.0, Eigen::VectorXd::Ones(1), times, own);
+  EXPECT_EQ(run.event, 0);
+  EXPECT_LE(run.states.rows(), 3);
+  EXPECT_NEAR(run.end_s, 0.5, 1e-7);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sundials, EveryMethod,
                          testing::Values(SundialsMethod::cvode_adams, SundialsMethod::cvode_bdf,
                                          SundialsMethod::arkode_erk, SundialsMethod::arkode_dirk));

@@ -1,5 +1,6 @@
 #pragma once
 #include "trochoid/model/dormand_prince.hpp"
+#include "trochoid/model/outcome.hpp"
 
 /// Runs a stepper to an end time, hands out the output times each step covers, and finds events.
 /// At a terminal event the run stops on the event; restart with across_event() and start().
@@ -12,6 +13,37 @@ struct EventRule {
 };
 
 enum class RunEnd { reached_end, event, step_limit, rounding_limit, not_finite };
+
+/// What a run is ended by whose last step came to this.
+[[nodiscard]] constexpr RunEnd run_end_of(StepEnd step) {
+  switch (step) {
+    case StepEnd::step_limit:
+      return RunEnd::step_limit;
+    case StepEnd::rounding_limit:
+      return RunEnd::rounding_limit;
+    case StepEnd::not_finite:
+      return RunEnd::not_finite;
+    case StepEnd::accepted:
+      break;
+  }
+  return RunEnd::reached_end;
+}
+
+/// What that is called to the outside; a run that an event ended came as far as that.
+[[nodiscard]] constexpr Outcome outcome_of(RunEnd end) {
+  switch (end) {
+    case RunEnd::step_limit:
+      return Outcome::step_limit;
+    case RunEnd::rounding_limit:
+      return Outcome::tolerance_not_reachable;
+    case RunEnd::not_finite:
+      return Outcome::out_of_domain;
+    case RunEnd::reached_end:
+    case RunEnd::event:
+      break;
+  }
+  return Outcome::reached_end;
+}
 
 template <class System>
 struct RunResult {
@@ -220,10 +252,7 @@ RunResult<System> integrate(Stepper<System>& stepper, double t_end_s, const doub
     const StepEnd step = stepper.step(t_end_s);
     if (step != StepEnd::accepted) {
       result.y = stepper.y();
-      return stop(step == StepEnd::step_limit       ? RunEnd::step_limit
-                  : step == StepEnd::rounding_limit ? RunEnd::rounding_limit
-                                                    : RunEnd::not_finite,
-                  stepper.t_s());
+      return stop(run_end_of(step), stepper.t_s());
     }
     if constexpr (kHasEvents<System>) {
       stepper.prepare_dense();
