@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <cmath>
 
 #include "json_read.hpp"
@@ -36,12 +37,15 @@ Eigen::Matrix3d rotation(const JsonReader& json, const char* key) {
     for (int column = 0; column < 3; ++column) R(row, column) = values[column];
   }
   constexpr double kRoundedByHand = 1e-3;  // three printed digits still make a usable rotation
-  const bool orthonormal =
-      (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < kRoundedByHand;
-  if (!orthonormal || R.determinant() < 0.0)
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (!(error < kRoundedByHand) || R.determinant() < 0.0)
     json.fail(
         fmt::format("\"{}\" is no rotation (its rows must be orthonormal, right-handed)", key));
-  return R;
+  // Its transpose is taken for its inverse: of rounded digits that would be off by pixels.
+  constexpr double kExact = 1e-12;
+  if (error < kExact) return R;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.matrixV().transpose();  // the nearest rotation
 }
 
 Camera::Projection projection_of(const JsonReader& json) {

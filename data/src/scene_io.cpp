@@ -100,8 +100,12 @@ void check_camera(const TableReader& reader, const CameraSettings& camera) {
 }
 
 void check_start(const TableReader& reader) {
-  constexpr std::array<std::pair<const char*, const char*>, 3> kPairs{
-      {{"w1_rad_s", "dtheta_rad_s"}, {"w2_rad_s", "dphi_rad_s"}, {"w3_rad_s", "dpsi_rad_s"}}};
+  constexpr std::array<std::pair<const char*, const char*>, 5> kPairs{
+      {{"w1_rad_s", "dtheta_rad_s"},
+       {"w2_rad_s", "dphi_rad_s"},
+       {"w3_rad_s", "dpsi_rad_s"},
+       {"omega_s_rad_s", "w3_rad_s"},
+       {"omega_s_rad_s", "dpsi_rad_s"}}};
   for (const auto& [rate, derivative] : kPairs)
     if (reader.has(rate) && reader.has(derivative))
       reader.fail(derivative,

@@ -35,6 +35,17 @@ TEST(CameraFile, KeepsEverythingThroughAFile) {
   EXPECT_EQ(content(folder / "d.json"), content(folder / "e.json"));
 }
 
+// Its transpose taken for its inverse, this one put a point 0.2 m off axis 0.1 px elsewhere.
+TEST(CameraFile, OfARotationWithThreeDigitsLooksBackAlongItsOwnRays) {
+  const TestFolder folder;
+  const Camera camera = read_camera(folder.write(
+      "c.json", with("[0, -1, 0], [0, 0, -1]", "[0, -0.940, -0.342], [0, 0.342, -0.940]")));
+  const Eigen::Vector3d point_m(0.2, 0.1, 0.0);
+  const Eigen::Vector3d back_m =
+      camera.table_from_image(camera.image_from_table(point_m), point_m.z());
+  EXPECT_LT((back_m - point_m).norm(), 1e-12);
+}
+
 TEST(CameraFile, KeepsAnOrthographicCameraOrthographic) {
   const TestFolder folder;
   write_camera(Camera::from_scale(640, 480, 2000.0), folder / "c.json");

@@ -169,7 +169,6 @@ phi_rad = 0.25
 psi_rad = -0.5
 w1_rad_s = 1.5
 w2_rad_s = 2.5
-w3_rad_s = 3.5
 omega_s_rad_s = 155.0
 x_m = 0.1
 y_m = 0.2
@@ -310,6 +309,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"NegativeFriction", "[model]\nfriction = -0.1", ":2:", "0 or greater"},
         Refusal{"ScalarDrag", "[model]\nair_linear_N_m_s = 1e-6", ":2:", "three numbers"},
         Refusal{"BothRates", "[start]\nw2_rad_s = 1\ndphi_rad_s = 2", ":3:", "same thing"},
+        Refusal{"SpinTwice", "[start]\nomega_s_rad_s = 0.5\nw3_rad_s = 50", ":3:", "same thing"},
         Refusal{"TiltBeyondPi", "[start]\ntheta_rad = 4", ":2:", "pi"},
         Refusal{"LooseTolerance", "[run]\ntolerance = 1", ":2:", "1e-15"},
         Refusal{"EndlessRun", "[run]\nuntil_s = 1e300", ":2:", "rows"},
