@@ -132,7 +132,7 @@ const Rung* as_good(const Rungs& rungs, const Rung& chosen,
   const Rung* best = nullptr;
   if (chosen.fit.model == "sliding") return best;
   for (const Rung& rung : rungs)
-    if (rung.fitted && rung.fit.converged && !exchanged.contains(&rung) &&
+    if (rung.fitted && rung.fit.converged && !rung.as_promised && !exchanged.contains(&rung) &&
         rung.bic < chosen.bic + kBareMention && (best == nullptr || rung.bic < best->bic))
       best = &rung;
   return best;

@@ -52,7 +52,7 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
                        rungs.size(), chosen.name);
   std::string words = fmt::format(
       "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
-      chosen.name, chosen.parameters, chosen.fit.whiteness_p > 0.01 ? "white" : "not white",
+      chosen.name, chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white",
       chosen.held_back_rms_sigma);
   std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
   for (const Rung& rung : rungs) {

@@ -100,7 +100,7 @@ void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, 
   if (gentle && gentle->fit.converged) {
     if (!shows_without_asking(*gentle))
       sharp = fit_sharply(tracks, options, rung.scene, gentle->fit);
-  } else if (from_nothing || !gentle || !usable(gentle->fit)) {
+  } else {
     sharp = fit_named(tracks, rung.scene, exact, kCoulomb);
     const bool asks = !rolls_first || (sharp && sharp->fit.whiteness_p < kWhite);
     if (from_nothing && sharp && sharp->fit.converged && asks) {

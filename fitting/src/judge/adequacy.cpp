@@ -15,7 +15,16 @@ namespace trochoid::fitting {
 
 namespace {
 
-// Positions as predicted, given whitened residuals.
+// Whitened by the track's own sigmas, none weighed down; empty where the model has no prediction.
+Eigen::VectorXd plain_residuals(const Problem& problem, int arc, const Eigen::VectorXd& u) {
+  Problem plain = problem;
+  plain.noise_scale.fill(1.0);
+  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
+  Eigen::VectorXd residuals;
+  return evaluate(plain, arc, u, residuals, nullptr) ? residuals : Eigen::VectorXd();
+}
+
+// Positions as predicted, given those.
 Eigen::MatrixX2d predicted_m(const ArcData& data, const Eigen::VectorXd& residuals) {
   Eigen::MatrixX2d xy = data.positions_m();
   for (const Reading& reading : data.readings)
@@ -44,9 +53,12 @@ Squares squares(const Problem& problem, const Solution& solution) {
     const Eigen::MatrixX2d xy = data.positions_m();
     const Eigen::RowVector2d mean = xy.colwise().mean();
     const double noise_m = noise_about_smooth_curve(data.t_s, xy);
-    const bool motion =
-        !data.sigma_unknown &&
-        noise_about_smooth_curve(data.t_s, predicted_m(data, r)) > kMostlyMotion * noise_m;
+    const auto predicted_noise_m = [&] {
+      const Eigen::VectorXd plainly = plain_residuals(problem, arc, solution.u);
+      return plainly.size() > 0 ? noise_about_smooth_curve(data.t_s, predicted_m(data, plainly))
+                                : 0.0;
+    };
+    const bool motion = !data.sigma_unknown && predicted_noise_m() > kMostlyMotion * noise_m;
     for (const Reading& reading : data.readings) {
       if (reading.channel != Channel::position) continue;
       const Eigen::Matrix2d wt = reading.whitener.transpose();
@@ -140,14 +152,10 @@ struct Counting {
 std::vector<Counting> counting(const Problem& problem, int arc, const Eigen::VectorXd& u) {
   // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
   constexpr double kNothing = 1e-5;
-  Problem plain = problem;
-  plain.noise_scale.fill(1.0);
-  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
   const ArcData& data = problem.arcs[arc];
-  Eigen::VectorXd residuals;
-  if (data.observable_index(model::Observable::x_m) < 0 ||
-      !evaluate(plain, arc, u, residuals, nullptr))
-    return {};
+  if (data.observable_index(model::Observable::x_m) < 0) return {};
+  const Eigen::VectorXd residuals = plain_residuals(problem, arc, u);
+  if (residuals.size() == 0) return {};
   const Eigen::MatrixX2d off = predicted_m(data, residuals) - data.positions_m();
   const double nothing_m = kNothing * extent_m(data);
   const std::vector<int> consistent = consistent_samples(data);

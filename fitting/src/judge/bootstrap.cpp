@@ -100,11 +100,12 @@ data::Bootstrap bootstrap(const Problem& problem, const Solution& solution,
   std::vector<Eigen::VectorXd> residuals(plain.arcs.size());
   std::vector<std::vector<SeriesOfReadings>> series(plain.arcs.size());
   data::Bootstrap result;
+  result.draws = result.failed = draws;
   for (int arc = 0; arc < arcs; ++arc) {
     if (!evaluate(plain, arc, solution.u, residuals[arc], nullptr)) return result;
     series[arc] = series_of(plain.arcs[arc], correlation_time_s);
   }
-  result.draws = draws;
+  result.failed = 0;
   if (!series[0].empty())
     result.block_s = series[0][0].block * plain.arcs[0].duration_s() /
                      static_cast<double>(series[0][0].readings.size());

@@ -18,7 +18,6 @@
 #include "judge/profile.hpp"
 #include "judge/statistics.hpp"
 #include "observe/observed.hpp"
-#include "observe/smoothing.hpp"
 #include "problem/prepare.hpp"
 #include "start/find.hpp"
 #include "start/starter.hpp"
@@ -196,12 +195,11 @@ bool leads_nowhere(const Problem& problem, const Found& found) {
   return !explains(weighed, solution);
 }
 
-data::Fit& refuse(const Problem& problem, const std::string& reason, data::Fit& fit) {
+void refuse(const Problem& problem, const std::string& reason, data::Fit& fit) {
   fit.outcome = "no_convergence";
   fit.verdict = "unexplained";
   fit.reason = fit.verdict_words = reason;
   describe_arcs(problem, fit);
-  return fit;
 }
 
 void add_what_was_asked_for(const Problem& problem, const Solution& solution,

@@ -25,7 +25,6 @@ struct Uncertainty {
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
   /// their correlation allowed for, without its constant.
   double surprise = 0.0;
-  std::vector<std::string> remarks;
 };
 
 /// The size at which a parameter of a free index counts as "known to 100 %" [its unit].

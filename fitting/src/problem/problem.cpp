@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "observe/observed.hpp"
-#include "observe/smoothing.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {

@@ -104,7 +104,7 @@ struct Problem {
   [[nodiscard]] double value(int free_index, const Eigen::VectorXd& u) const;
   void set_base(const Eigen::VectorXd& u);  ///< writes the values of u back into `base`
   [[nodiscard]] int rows() const;
-  [[nodiscard]] int max_steps() const;  ///< of one integration; 0 = the model's own limit
+  [[nodiscard]] int max_steps() const;  ///< of one integration
 };
 
 /// One arc of a problem with the parameters it sees.

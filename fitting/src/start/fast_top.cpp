@@ -4,7 +4,6 @@
 #include <complex>
 #include <numbers>
 
-#include "observe/smoothing.hpp"
 #include "start/starts.hpp"
 
 // A fast top precesses slowly and trembles: nutation with the frequency nu near b, too small and

@@ -113,7 +113,7 @@ bool Chain::linearise(int j, const Eigen::VectorXd& s, const Eigen::VectorXd& p,
   return out.jacobian.allFinite() && (last || out.end_jacobian.allFinite());
 }
 
-// Difference of two states; angles by the shortest way, and the tilt's mirror image accounted for.
+// Difference of two states; angles by the shortest way.
 Eigen::VectorXd gap(const model::Predictor& predictor, const std::vector<int>& state,
                     const Eigen::VectorXd& to, const Eigen::VectorXd& from) {
   Eigen::VectorXd difference = to - from;
@@ -161,15 +161,9 @@ class Shooter {
       const FreeParameter& parameter = problem_.free[chain_.dynamics()[i]];
       polished.base[0][parameter.index] = parameter.transform.value(iterate.p[static_cast<int>(i)]);
     }
-    Found found;
-    found.solution =
-        seek(polished, polished.start(), {.iterations = 30, .function_tolerance = 1e-3});
-    found.path = "multiple_shooting";
-    const int dof = std::max(1, problem_.rows() - static_cast<int>(problem_.free.size()));
-    found.reduced_chi2 =
-        found.solution.usable ? found.solution.chi2 / dof : std::numeric_limits<double>::infinity();
-    found.passed = found.solution.usable && found.reduced_chi2 < chi2_gate(problem_.rows());
-    return found;
+    return judged(polished,
+                  seek(polished, polished.start(), {.iterations = 30, .function_tolerance = 1e-3}),
+                  "multiple_shooting");
   }
 
   [[nodiscard]] const Chain& chain() const { return chain_; }

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "observe/direction.hpp"
-#include "observe/smoothing.hpp"
 
 namespace trochoid::fitting {
 namespace {

@@ -70,8 +70,8 @@ struct Growth {
 
 /// Where a cost has ripples, as events that come and go with the parameters make them: steps off
 /// the best known point, as far as the misfit lets the linearised problem, and downhill again,
-/// until one passes the gate or `tries` are used up. Reproducible.
-[[nodiscard]] Found hop(const Problem& problem, Found best, int tries);
+/// until `misses` rounds in a row, or a dozen altogether, gained nothing. Reproducible.
+[[nodiscard]] Found hop(const Problem& problem, Found best, int misses);
 
 /// Where a solution that falls flat does not pass: a body nods as it falls, and the dip of its tilt
 /// in which it comes to lie decides when and where. From one dip to the next the path jumps, and
@@ -79,12 +79,13 @@ struct Growth {
 /// from: looks about as far as that lets it, and goes downhill on all of the track from the best.
 [[nodiscard]] Found fall_anew(const Problem& problem, Found found);
 
+enum class Effort { brief, full };
+
 /// The search for a single arc without a guess: windows of 1, 1/2, 1/4, ... of the arc, starts from
 /// each that already say something about it, grown; stops at the first solution that passes the
 /// gate, or after the window in which the path got explained but for a per cent (a track's sigmas
 /// may be too small, or the model not the whole truth). Where nothing passes, more starts are taken
 /// downhill on short windows, which then grow more slowly. Returns the best one.
-enum class Effort { brief, full };
 [[nodiscard]] Found search(const Problem& problem, const Starter& starter,
                            Effort effort = Effort::full);
 
