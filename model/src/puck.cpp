@@ -208,11 +208,6 @@ void PuckPredictor::fill(const PuckPath<S>& path, const S& contact_radius_m,
   out.outcome = outcome_of(run_end_of(path.end));
   out.valid_until_s = path.rows.empty() ? request.start_s : request.t_s[path.rows.size() - 1];
   out.steps = path.statistics.steps;
-  const double run_m = path.rows.empty()
-                           ? 0.0
-                           : std::hypot(value_of(path.rows.back()[3] - path.rows[0][3]),
-                                        value_of(path.rows.back()[4] - path.rows[0][4]));
-  out.error_estimate = request.tolerance * path.error_sum * run_m;
   if (!request.want_end_state || path.rows.empty()) return;
   const auto end = parameters_of(path.rows.back(), contact_radius_m);
   out.end_state.resize(kInitial);

@@ -14,7 +14,6 @@ struct PuckPath {
   std::vector<State<S, 7>> rows;  ///< states at the times; the last component is not used
   double rest_s = INFINITY;       ///< when it came to rest
   Statistics statistics;
-  double error_sum = 0.0;
   StepEnd end = StepEnd::accepted;
 };
 
@@ -89,7 +88,6 @@ template <class S>
   }
   const StepCounts& counts = stepper.counts();
   path.statistics = {counts.steps, counts.rejected, counts.evaluations};
-  path.error_sum = counts.error_sum;
   return path;
 }
 

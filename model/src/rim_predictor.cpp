@@ -216,10 +216,6 @@ void RimPredictor::fill_values(const RimPath<S>& path, Call& call, Prediction& o
   out.outcome = path.end.outcome;
   out.valid_until_s = call.request.start_s + path.end.end_s;
   out.steps = path.end.work;
-  // Local errors add up; those of the angles act on the path through its size.
-  const double reach_m = model_.body.R + std::hypot(value_of(path.end.y[Rim::x]) - call.values[kX],
-                                                    value_of(path.end.y[Rim::y]) - call.values[kY]);
-  out.error_estimate = call.request.tolerance * path.end.error_sum * reach_m;
   if (!call.request.want_end_state) return;
   const auto end = end_parameters(model_.body, path.end);
   out.end_state.resize(initial_count());

@@ -42,7 +42,6 @@ struct RimRunEnd {
   std::vector<Event> events;
   Statistics statistics;
   int work = 0;  ///< steps, each implicit one, which takes so much longer, counted as three
-  double error_sum = 0.0;  ///< local errors in units of the tolerance
 };
 
 /// Tolerances by component: angles and rates by their own size, positions by the radius.
@@ -210,7 +209,6 @@ class RimRun {
     end_.work += counts.steps * Stepper::kWork;
     end_.statistics.rejected += counts.rejected;
     end_.statistics.evaluations += counts.evaluations;
-    end_.error_sum += counts.error_sum;
     end_.end_s = result.t_s;
     return result;
   }

@@ -139,11 +139,12 @@ LossValues<double> loss_values(const data::ModelSettings& model) {
     const Eigen::Vector3d value = c.value_or(Eigen::Vector3d::Zero());
     first = value[0];
     third = value[2];
-    if (value[0] > 0.0) ratio = value[1] / value[0];
-    if (value[0] == 0.0 && value[1] != 0.0)
+    if (!(value[1] >= 0.0) || !std::isfinite(value[1]) || (value[0] == 0.0 && value[1] != 0.0))
       throw InputError(
-          "air couples: the first of the two transverse coefficients is 0, the second "
-          "is not; an axisymmetric body has them equal");
+          fmt::format("air couples: of the two transverse coefficients the first is {}, the second "
+                      "{}; an axisymmetric body has them equal, 0 or greater",
+                      value[0], value[1]));
+    if (value[0] > 0.0) ratio = value[1] / value[0];
   };
   double* out = v.value;
   vector(model.air_linear_N_m_s, out[0], out[1], v.air_ratio);

@@ -125,7 +125,6 @@ class Cvode : public Stepper {
     require(CVodeSVtolerances(memory_, options.rtol, atol.get()), "CVodeSVtolerances");
     CVodeSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: C interface, never written
     CVodeSetMaxNumSteps(memory_, options.max_steps);
-    if (options.max_step_s > 0.0) CVodeSetMaxStep(memory_, options.max_step_s);
     if (stiff)
       use_newton(ode, y, context);
     else
@@ -154,7 +153,6 @@ class Cvode : public Stepper {
     CVodeGetNumSteps(memory_, &run.steps);
     CVodeGetNumRhsEvals(memory_, &run.evaluations);
     CVodeGetNumErrTestFails(memory_, &run.failed);
-    if (linear_) CVodeGetNumJacEvals(memory_, &run.jacobians);
   }
   std::string flag_name(int flag) const override { return named(CVodeGetReturnFlagName(flag)); }
 
@@ -212,7 +210,6 @@ class Erk : public Stepper {
     require(ERKStepSetTableNum(memory_, ARKODE_FEHLBERG_13_7_8), "ERKStepSetTableNum");
     ERKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
     ERKStepSetMaxNumSteps(memory_, options.max_steps);
-    if (options.max_step_s > 0.0) ERKStepSetMaxStep(memory_, options.max_step_s);
     if (ode.events > 0)
       require(ERKStepRootInit(memory_, ode.events, call_events), "ERKStepRootInit");
   }
@@ -248,7 +245,6 @@ class Dirk : public Stepper {
             "ARKStepSetTableNum");
     ARKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
     ARKStepSetMaxNumSteps(memory_, options.max_steps);
-    if (options.max_step_s > 0.0) ARKStepSetMaxStep(memory_, options.max_step_s);
     matrix_.reset(SUNDenseMatrix(ode.states, ode.states, context));
     linear_.reset(SUNLinSol_Dense(y.get(), matrix_.get(), context));
     require(ARKStepSetLinearSolver(memory_, linear_.get(), matrix_.get()),
@@ -269,7 +265,6 @@ class Dirk : public Stepper {
     ARKStepGetNumSteps(memory_, &run.steps);
     ARKStepGetNumRhsEvals(memory_, &explicit_evaluations, &run.evaluations);
     ARKStepGetNumErrTestFails(memory_, &run.failed);
-    ARKStepGetNumJacEvals(memory_, &run.jacobians);
   }
   std::string flag_name(int flag) const override { return named(ARKStepGetReturnFlagName(flag)); }
 
@@ -362,8 +357,6 @@ SundialsRun integrate_sundials(const Ode& ode, double start_s, const Eigen::Vect
   run.states.conservativeResize(rows, Eigen::NoChange);
   run.sensitivities.conservativeResize(rows, Eigen::NoChange);
   run.end_state = state;
-  if (run.event >= 0) stepper->sensitivities(carried);
-  run.end_sensitivities = carried.transpose();
   stepper->count(run);
   return run;
 }

@@ -44,7 +44,6 @@ void run_with(const TopRun& run, TopResult& result) {
   result.steps = counts.steps;
   result.rejected = counts.rejected;
   result.evaluations = counts.evaluations;
-  result.error_sum = counts.error_sum * run.tolerance;
   const S last[kTopEndValues] = {end.y[1], end.y[0], end.y[3], end.y[2], b, end.y[4]};
   for (int i = 0; i < kTopEndValues; ++i) store_end(result, i, last[i]);
 }

@@ -65,7 +65,6 @@ struct TopResult {
   int end_reason = 0;  ///< RunEnd
   double reached_s = 0.0;
   int steps = 0, rejected = 0, evaluations = 0;
-  double error_sum = 0.0;  ///< local errors of k added up
 };
 
 }  // namespace trochoid::model

@@ -229,7 +229,6 @@ class Run {
     result_.steps = counts.steps;
     result_.rejected = counts.rejected;
     result_.evaluations = counts.evaluations;
-    result_.error_sum = counts.error_sum * run_.tolerance;
     store_end_state(stepper);
   }
   void store_end_state(Stepper& stepper) {

@@ -270,7 +270,6 @@ Prediction TopPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   if (request.want_end_state) fill_end(work, prediction);
   prediction.outcome = outcome_of(static_cast<RunEnd>(work.result.end_reason));
   prediction.valid_until_s = work.result.reached_s;
-  prediction.error_estimate = work.l_m * work.result.error_sum;
   prediction.steps = work.result.steps;
   return prediction;
 }

@@ -19,7 +19,7 @@ double positive(double value, const char* field) {
   return value;
 }
 
-/// Pivot to CoM: stated, or the pivot's height over a body lying at it.
+/// Pivot to CoM, if it is stated.
 std::optional<double> pivot_distance_m(const data::Scene& scene) {
   if (!scene.body || !scene.body->l_m) return std::nullopt;
   return positive(*scene.body->l_m, "body.l_m");

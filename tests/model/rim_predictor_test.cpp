@@ -31,7 +31,7 @@ Eigen::VectorXd defaults(const Predictor& predictor) {
 }
 
 struct Errors {
-  double theta_rad = 0.0, phi_rad = 0.0, xy_m = 0.0, estimate_m = 0.0;
+  double theta_rad = 0.0, phi_rad = 0.0, xy_m = 0.0;
   Outcome outcome = Outcome::reached_end;
 };
 
@@ -52,7 +52,6 @@ Errors errors_against_reference(const std::string& name, double tolerance) {
     errors.theta_rad = std::max(errors.theta_rad, std::abs(at(2) - table.column("theta")[n]));
     errors.phi_rad = std::max(errors.phi_rad, std::abs(at(3) - table.column("phi")[n]));
   }
-  errors.estimate_m = run.error_estimate;
   errors.outcome = run.outcome;
   return errors;
 }

@@ -58,7 +58,6 @@ struct Prediction {
   Eigen::MatrixXd end_state_jacobian;  ///< one column per requested derivative
   Outcome outcome = Outcome::reached_end;
   double valid_until_s = 0.0;
-  double error_estimate = 0.0;  ///< largest estimated global error of x, y [m]
   int steps = 0;  ///< that took the time of an explicit one: an implicit one counts as three
 };
 

@@ -34,7 +34,6 @@ struct StepCounts {
   int steps = 0;
   int rejected = 0;
   int evaluations = 0;
-  double error_sum = 0.0;  ///< accepted local errors in units of the tolerance, added up
 };
 
 /// What came of trying a step.
@@ -67,7 +66,7 @@ class Stepping {
       if (tried.end == Attempt::End::done && tried.error <= 1.0) {
         const double t_new = last ? t_limit_s : t_ + h;
         self().accept(h, t_new);
-        count(h, t_new, tried.error);
+        count(h, t_new);
         // A step cut short by the limit says little about the next one: keep the longer of the two.
         const double next = h * (rejected_before_ && factor > 1.0 ? 1.0 : factor);
         h_ = last && next < h_ ? h_ : next;
@@ -112,12 +111,11 @@ class Stepping {
     if (tried.end == Attempt::End::done) return Stepper::step_factor(tried.error);
     return tried.end == Attempt::End::diverged ? 0.4 : 0.1;
   }
-  void count(double h, double t_new, double error) {
+  void count(double h, double t_new) {
     t_previous_ = t_;
     t_ = t_new;
     step_ = h;
     ++counts_.steps;
-    counts_.error_sum += error;
   }
 
   double h_ = 0.0;  ///< of the next step

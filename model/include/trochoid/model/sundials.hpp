@@ -46,22 +46,20 @@ struct SundialsOptions {
   Eigen::VectorXd atol;  ///< one per state, >= 0; with regularised friction the velocities' must be
                          ///< well below the regularisation, or stick is not resolved
   int max_steps = 5000000;
-  double max_step_s = 0.0;  ///< 0: unlimited
   /// Outputs from the solver's own interpolation instead of steps that end there: fewer steps on a
   /// dense grid, but the derivative is also evaluated a little beyond the last time.
   bool interpolate = false;
 };
 
 struct SundialsRun {
-  Eigen::MatrixXd states;             ///< one row per time reached
-  Eigen::MatrixXd sensitivities;      ///< one row per time reached: states x parameters, by column
-  Eigen::VectorXd end_state;          ///< where the run ended: last time, or the event
-  Eigen::VectorXd end_sensitivities;  ///< there, as a row of `sensitivities`
+  Eigen::MatrixXd states;         ///< one row per time reached
+  Eigen::MatrixXd sensitivities;  ///< one row per time reached: states x parameters, by column
+  Eigen::VectorXd end_state;      ///< where the run ended: last time, or the event
   double end_s = 0.0;
   int event = -1;  ///< index of the event function that changed sign, -1 if none
   Outcome outcome = Outcome::reached_end;
   std::string message;  ///< SUNDIALS' own words if it gave up
-  long steps = 0, evaluations = 0, jacobians = 0, failed = 0;
+  long steps = 0, evaluations = 0, failed = 0;
 };
 
 /// Integrates from (start_s, y0) through ascending times; stops at the first sign change of an

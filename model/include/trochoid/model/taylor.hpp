@@ -79,8 +79,7 @@ class Taylor {
   [[nodiscard]] StepEnd step(double t_limit_s) {
     if (counts_.steps >= control_.max_steps) return StepEnd::step_limit;
     expand();
-    double error = 0.0;
-    double h = longest_step(error);
+    double h = longest_step();
     if (!(h > 0.0)) return StepEnd::not_finite;
     const bool last = t_ + h >= t_limit_s;
     if (last) h = t_limit_s - t_;
@@ -94,7 +93,6 @@ class Taylor {
     }
     ++counts_.steps;
     counts_.evaluations += kOrder;
-    counts_.error_sum += error;
     return StepEnd::accepted;
   }
 
@@ -155,16 +153,14 @@ class Taylor {
   }
   /// The last two terms each stay within the tolerance; two, since one may vanish by symmetry.
   /// @returns NaN if the series is not finite.
-  [[nodiscard]] double longest_step(double& error) const {
+  [[nodiscard]] double longest_step() const {
     const double last = size(kOrder), before = size(kOrder - 1);
     if (!__builtin_isfinite(last) || !__builtin_isfinite(before)) return __builtin_nan("");
     constexpr double kSafety = 0.9;
     // A constant solution has no terms: any step will do.
     const double by_last = last > 0.0 ? __builtin_pow(last, -1.0 / kOrder) : 1e300;
     const double by_before = before > 0.0 ? __builtin_pow(before, -1.0 / (kOrder - 1)) : 1e300;
-    const double h = kSafety * (by_last < by_before ? by_last : by_before);
-    error = last > 0.0 ? __builtin_pow(h / by_last, kOrder) : 0.0;
-    return h;
+    return kSafety * (by_last < by_before ? by_last : by_before);
   }
 
   System system_;
