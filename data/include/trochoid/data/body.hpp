@@ -4,7 +4,8 @@
 
 namespace trochoid::data {
 
-/// disc and ring: a right circular cylinder (with a bore); top: no shape, only moments about a pivot.
+/// disc and ring: a right circular cylinder (with a bore); top: no shape, only moments about a
+/// pivot.
 enum class BodyKind { disc, ring, top };
 
 /// A dot painted on a face, the only thing on an axisymmetric body that shows its spin.
@@ -26,7 +27,8 @@ struct Body {
   double axle_radius_m = 0.0;   ///< thin axle along k (tops), 0 = none
   double axle_above_m = 0.0;    ///< how far the axle sticks out of the upper face
   std::optional<double> mass_kg;
-  std::optional<double> I_kg_m2;   ///< transverse moment; about the pivot for tops, else about the CoM
+  std::optional<double>
+      I_kg_m2;  ///< transverse moment; about the pivot for tops, else about the CoM
   std::optional<double> Is_kg_m2;  ///< axial moment
   std::optional<double> l_m;       ///< pivot to CoM along k (tops)
   std::vector<SpinMark> marks;
@@ -36,9 +38,5 @@ struct Body {
   [[nodiscard]] bool faces_look_alike() const;
   friend bool operator==(const Body&, const Body&) = default;
 };
-inline bool operator==(const SpinMark& a, const SpinMark& b) {
-  return a.distance_m == b.distance_m && a.size_m == b.size_m && a.angle_rad == b.angle_rad &&
-         a.on_upper_face == b.on_upper_face && a.on_lower_face == b.on_lower_face;
-}
 
 }  // namespace trochoid::data

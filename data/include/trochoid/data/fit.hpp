@@ -91,12 +91,15 @@ struct Fit {
   /// residuals beyond twice their noise; no_feature; unexplained.
   std::string verdict;
   std::string verdict_words;  ///< the same as a sentence
-  /// Which start won: integral_matching, windows, shooting, multistart, slip (a rim that slips at
-  /// first), rolls_first (one that rolls at first), given.
+  /// Which start won: integral_matching, integrals (the motion of a pin), windows, spectrum (a fast
+  /// top), spin (a rim in steady rolling), slip (one that slips at first), rolls_first (one that
+  /// rolls at first), multiple_shooting, multistart, given; mixed if those of several arcs differ.
   std::string start_path;
   std::vector<FitParameter> parameters;       ///< free, fixed and derived ones
   std::vector<std::string> covariance_names;  ///< free parameters, in the order of the rows
-  Eigen::MatrixXd covariance;                 ///< [product of the two parameters' units]
+  /// [product of the two parameters' units]. Of a top whose nutation is not seen by curvature,
+  /// while the sigmas that this hides are infinite.
+  Eigen::MatrixXd covariance;
   double chi2 = 0.0;                ///< of the residuals over their sigmas, robustly weighted, >= 0
   int dof = 0;                      ///< degrees of freedom: measurements less free parameters
   double noise_scale = 1.0;         ///< factor by which the track's sigmas were re-estimated

@@ -82,8 +82,9 @@ struct RunSettings {
   double until_s = 10.0;
   double rate_hz = 100.0;
   double tolerance = 1e-10;
-  std::string integrator = "auto";  ///< auto | dop853 | taylor | cvode-adams | cvode-bdf | arkode
-  std::string rim_switch = "end";   ///< what theta = pi/2 does to a thick body: end | impact
+  /// auto | dop853 | taylor | radau | cvode-adams | cvode-bdf | arkode
+  std::string integrator = "auto";
+  std::string rim_switch = "end";  ///< what theta = pi/2 does to a thick body: end | impact
 };
 
 /// value and standard deviation from outside the recording (a scale, a caliper).
