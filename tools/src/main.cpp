@@ -5,9 +5,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <string>
+#include <system_error>
 
 #include "commands.hpp"
 #include "common/interruption.hpp"
@@ -100,6 +104,18 @@ int run(int argc, char** argv) {
   return kDone;
 }
 
+/// stderr may be closed or full as well.
+void complain(const std::string& words) {
+  std::fputs(("trochoid: " + words + "\n").c_str(), stderr);
+}
+
+/// Whoever stops reading what we print (head) has seen enough, and wants no complaint.
+void check_printed() {
+  if (std::fflush(stdout) == 0) return;
+  if (errno == EPIPE) trochoid::tools::end_by(SIGPIPE);
+  throw trochoid::InputError("standard output cannot be written (is the disk full?)");
+}
+
 }  // namespace
 
 // The only place that catches: libraries throw, commands do not print errors.
@@ -107,17 +123,20 @@ int main(int argc, char** argv) try {
   open_standard_streams();
   trochoid::tools::clean_up_when_interrupted();
   const int status = run(argc, argv);
-  if (std::fflush(stdout) != 0)
-    throw trochoid::InputError("standard output cannot be written (is the disk full?)");
+  check_printed();
   return status;
 } catch (const trochoid::tools::NotGood& answer) {
   std::fflush(stdout);  // where both go into one file, the complaint follows the results
-  fmt::print(stderr, "trochoid: {}\n", answer.what());
+  complain(answer.what());
   return kNotGood;
 } catch (const std::filesystem::filesystem_error& error) {
-  fmt::print(stderr, "trochoid: {}: {}\n", error.path1().string(), error.code().message());
+  complain(error.path1().string() + ": " + error.code().message());
+  return kError;
+} catch (const std::system_error& error) {
+  if (error.code() == std::errc::broken_pipe) trochoid::tools::end_by(SIGPIPE);
+  complain(error.what());
   return kError;
 } catch (const std::exception& error) {
-  fmt::print(stderr, "trochoid: {}\n", error.what());
+  complain(error.what());
   return kError;
 }

@@ -23,12 +23,6 @@ void on_signal(int number) {
   errno = before;
 }
 
-[[noreturn]] void end_by(int number) {
-  std::signal(number, SIG_DFL);
-  std::raise(number);
-  _exit(128 + number);
-}
-
 void wait_for_signal() {
   unsigned char number = 0;
   while (read(wake_up[0], &number, 1) != 1) {
@@ -41,10 +35,17 @@ void wait_for_signal() {
 
 }  // namespace
 
+void end_by(int number) {
+  std::signal(number, SIG_DFL);
+  std::raise(number);
+  _exit(128 + number);
+}
+
 void clean_up_when_interrupted() {
-  // A file beyond the caller's limit (ulimit -f) is then a write that fails, and told like a full
-  // disk.
+  // A file beyond the caller's limit (ulimit -f), or a program that was to read from us and did not
+  // start, is then a write that fails, and told like a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
   if (pipe2(wake_up.data(), O_CLOEXEC) != 0) return;
   std::thread(wait_for_signal).detach();
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {

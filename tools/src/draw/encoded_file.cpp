@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -74,7 +73,6 @@ EncodedFile::EncodedFile(const fs::path& target, cv::Size size, double rate_hz,
       workshop_(target),
       file_(workshop_.file("coded" + target.extension().string())),
       log_(workshop_.file("ffmpeg.log")) {
-  std::signal(SIGPIPE, SIG_IGN);  // an encoder that ended is told by write()
   std::vector<std::string> words = words_of(
       fmt::format("ffmpeg -y -loglevel error -f rawvideo -pix_fmt bgr24 -s {}x{} -r {:.9g} -i - {}",
                   size.width, size.height, rate_hz, coding));

@@ -42,6 +42,7 @@ class Workshop {
 /// Pictures of one size on their way into a video, or a single one into a picture file, that comes
 /// to be whole or not at all. An ffmpeg process codes them: libavcodec's own encoders would tie us
 /// to one version of its options, OpenCV's writers load two hundred libraries into every command.
+/// The program ignores SIGPIPE: an encoder that ended early is told by write().
 class EncodedFile {
  public:
   /// The kind of file goes by the ending of `target`. @throws InputError naming `target`, here and
