@@ -396,6 +396,41 @@ TEST_F(FrameSourceTest, APictureOfASeriesThatCannotBeDecodedIsNotPassedOver) {
   EXPECT_EQ(error_of(folder_ / "p*.jpg", rate), "");
 }
 
+/// Wipes the header of one JPEG picture in a file of many.
+void wipe_picture(const fs::path& path, int which) {
+  constexpr int kHeader_bytes = 200;  // of some 230 in all
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(file), {});
+  size_t at = bytes.find("\xff\xd8\xff");
+  for (int i = 0; i < which && at != std::string::npos; ++i)
+    at = bytes.find("\xff\xd8\xff", at + 1);
+  ASSERT_NE(at, std::string::npos);
+  file.seekp(static_cast<std::streamoff>(at));
+  file.write(std::string(kHeader_bytes, '\0').c_str(), kHeader_bytes);
+}
+
+TEST_F(FrameSourceTest, APictureLostInsideAVideoShiftsNoOthersInTime) {
+  constexpr int kLost = 5;
+  for (const char* name : {"clip.mkv", "clip.avi"}) {
+    const fs::path path = write_clip(name, "MJPG", 50.0);
+    wipe_picture(path, kLost);
+    for (const double rate_hz : {50.0, 500.0}) {
+      SourceOptions options;
+      if (rate_hz != 50.0) options.frame_rate_hz = rate_hz;
+      const auto source = open_video(path, options);
+      for (int i = 0; i < kFrames; ++i) {
+        if (i == kLost) continue;
+        const auto frame = source->next();
+        ASSERT_TRUE(frame);
+        EXPECT_EQ(frame->index, i - (i > kLost ? 1 : 0));
+        EXPECT_NEAR(frame->t_s, i / rate_hz, 1e-4) << name;
+        EXPECT_EQ(frame->missing_before, i == kLost + 1 ? 1 : 0) << name << ", picture " << i;
+      }
+      EXPECT_FALSE(source->next());
+    }
+  }
+}
+
 TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {
   cv::imwrite((folder_ / "half.png").string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)));
   fs::rename(folder_ / "half.png", folder_ / "50%d.png");

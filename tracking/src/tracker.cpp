@@ -143,7 +143,7 @@ class Tracking {
       others.emplace_back(seen->centre_px, seen->rim.semi_major_px());
       paths_[k].frames[frame.index] = {frame.t_s, trimmed(std::move(*seen))};
     }
-    ++frames_;
+    if (frames_++ > 0) missing_ += frame.missing_before;
     damaged_ += frame.damaged ? 1 : 0;
     if (frames_ % 16 == 0) report_progress();
   }
@@ -481,6 +481,10 @@ class Tracking {
           "by their numbers {} of {} pictures are missing; the others keep the times of "
           "theirs",
           missing, recording_.info().frames + missing));
+    else if (missing_ > 0)
+      result.file.notes.push_back(fmt::format(
+          "by their time stamps {} of {} pictures are missing; the others keep their times",
+          missing_, frames_ + missing_));
     result.file.camera = words;
     result.summary.camera_words = words;
     if (options_.edges) write_edges(*options_.edges);
@@ -519,7 +523,7 @@ class Tracking {
   std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;
-  std::int64_t frames_ = 0, damaged_ = 0;
+  std::int64_t frames_ = 0, damaged_ = 0, missing_ = 0;
   /// The last frames of a window open the next.
   static constexpr std::size_t kOverlap = 12;
 };

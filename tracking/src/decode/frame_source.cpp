@@ -99,7 +99,9 @@ class LibavSource final : public FrameSource {
       check_in_place();
       Frame frame{.luma = {}, .bgr = {}, .index = index(), .t_s = 0.0, .damaged = false};
       ++frames_read_;
-      frame.t_s = presentation_time_s(frame.index);
+      const std::int64_t place_before = std::exchange(place_, place(frame.index));
+      frame.missing_before = place_ - place_before - 1;
+      frame.t_s = presentation_time_s();
       if (after(window_.to, frame)) {
         finished_ = true;
         return std::nullopt;
@@ -180,6 +182,7 @@ class LibavSource final : public FrameSource {
     info_.frame_rate_hz = has_average ? average : (std::isfinite(base) ? base : 0.0);
     info_.variable_rate =
         has_average && std::isfinite(base) && std::abs(average - base) > 0.02 * base;
+    if (!info_.variable_rate) steady_rate_hz_ = steady_rate_hz();
     if (options_.frame_rate_hz) {
       if (!(*options_.frame_rate_hz > 0.0)) fail("the frame rate must be positive");
       info_.frame_rate_hz = *options_.frame_rate_hz;
@@ -192,13 +195,21 @@ class LibavSource final : public FrameSource {
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }
 
+  /// Rate by which the stamps of a video count its pictures; 0 where they do not: stamps coarser
+  /// than half a picture may make two of one.
+  [[nodiscard]] double steady_rate_hz() const {
+    const double rate_hz = av_q2d(stream_->r_frame_rate);
+    if (series_ || !std::isfinite(rate_hz) || !(rate_hz > 0.0)) return 0.0;
+    const double ticks = 1.0 / (rate_hz * av_q2d(stream_->time_base));  // of a picture
+    return ticks > 2.0 || std::abs(ticks - 1.0) < 1e-6 ? rate_hz : 0.0;
+  }
+
   /// Next picture into picture_; false at the end of the stream.
   bool decode_one() {
     while (true) {
       const int status = avcodec_receive_frame(decoder_.get(), picture_.get());
       if (status == 0) return true;
       if (status == AVERROR_EOF) return false;
-      if (status != AVERROR(EAGAIN)) ++decode_errors_;
       if (!feed()) return false;
     }
   }
@@ -217,7 +228,7 @@ class LibavSource final : public FrameSource {
       }
       const bool ours = packet_->stream_index == stream_->index;
       const bool wanted = ours && (!options_.key_frames_only || (packet_->flags & AV_PKT_FLAG_KEY));
-      if (wanted && avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;
+      if (wanted) avcodec_send_packet(decoder_.get(), packet_.get());
       av_packet_unref(packet_.get());
       if (wanted) return true;
     }
@@ -239,7 +250,7 @@ class LibavSource final : public FrameSource {
       fail(undecodable(next_picture_));
     packet_->pts = packet_->dts = static_cast<std::int64_t>(next_picture_++);
     packet_->flags |= AV_PKT_FLAG_KEY;
-    if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) ++decode_errors_;
+    avcodec_send_packet(decoder_.get(), packet_.get());
     av_packet_unref(packet_.get());
     return true;
   }
@@ -249,18 +260,41 @@ class LibavSource final : public FrameSource {
     return series_ ? series_->frames[static_cast<std::size_t>(frames_read_)] : frames_read_;
   }
 
-  /// Time since the first picture: the stamp in the file, or index / rate when overridden.
-  double presentation_time_s(std::int64_t index) {
-    if (options_.frame_rate_hz) return static_cast<double>(index) / *options_.frame_rate_hz;
-    std::int64_t stamp = picture_->best_effort_timestamp;
-    if (stamp == AV_NOPTS_VALUE) {
-      if (!(info_.frame_rate_hz > 0.0))
-        fail("carries no time stamps; give its rate (rate, or camera.frame_rate_hz)");
-      return static_cast<double>(index) / info_.frame_rate_hz;
+  /// Number of the picture that was decoded last, counted with those before it that are lost: a
+  /// stamp some whole pictures after that of one in its place tells of them. Seen from one before,
+  /// for a phone's rate wanders; any other step is of a camera that does not keep time.
+  std::int64_t place(std::int64_t index) {
+    constexpr double kNear = 0.25;
+    if (series_) return index;
+    const std::int64_t stamp = picture_->best_effort_timestamp, next = place_ + 1;
+    if (steady_rate_hz_ == 0.0 || stamp == AV_NOPTS_VALUE) return next;
+    std::int64_t place = next;
+    if (anchor_stamp_ != AV_NOPTS_VALUE) {
+      const double step =
+          static_cast<double>(stamp - anchor_stamp_) * av_q2d(stream_->time_base) * steady_rate_hz_;
+      const double whole = std::round(step);
+      if (std::abs(step - whole) < kNear) {
+        const std::int64_t told = anchor_place_ + static_cast<std::int64_t>(whole);
+        if (told < next) return next;  // one stamp twice
+        place = told;
+      }
     }
+    anchor_stamp_ = stamp;
+    anchor_place_ = place;
+    return place;
+  }
+
+  /// Time since the first picture: the stamp in the file, or place / rate when overridden.
+  double presentation_time_s() {
+    const std::int64_t stamp = picture_->best_effort_timestamp;
     if (first_stamp_ == AV_NOPTS_VALUE) first_stamp_ = stamp;
-    last_stamp_ = stamp;
-    return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
+    if (stamp != AV_NOPTS_VALUE) last_stamp_ = stamp;
+    if (!options_.frame_rate_hz && stamp != AV_NOPTS_VALUE)
+      return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
+    const double rate_hz = options_.frame_rate_hz.value_or(info_.frame_rate_hz);
+    if (!(rate_hz > 0.0))
+      fail("carries no time stamps; give its rate (rate, or camera.frame_rate_hz)");
+    return static_cast<double>(place_) / rate_hz;
   }
 
   /// A picture of a series that cannot be decoded would shift all after it in time.
@@ -351,7 +385,9 @@ class LibavSource final : public FrameSource {
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
-  std::int64_t decode_errors_ = 0;
+  double steady_rate_hz_ = 0.0;  ///< 0 = stamps do not tell of a lost picture
+  std::int64_t place_ = -1;      ///< in time, of the picture that was decoded last
+  std::int64_t anchor_stamp_ = AV_NOPTS_VALUE, anchor_place_ = 0;  ///< a picture in its place
   std::string read_error_;
   bool flushing_ = false, finished_ = false;
 };

@@ -16,6 +16,8 @@ struct Frame {
   std::int64_t index = 0;
   double t_s = 0.0;
   bool damaged = false;  ///< the decoder reported an error in it
+  /// Pictures between the one before and this one that the file lost, as far as stamps tell.
+  std::int64_t missing_before = 0;
   /// CV_8UC2 (Cb, Cr) at half the size; empty unless asked for and coded as YUV with a luma plane.
   cv::Mat chroma{};
 };
@@ -34,7 +36,8 @@ struct VideoInfo {
 struct SourceOptions {
   bool colour = false;
   std::optional<double>
-      frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences
+      frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences; a picture
+                        ///< that is lost inside keeps its time all the same
   std::optional<double>
       untimed_rate_hz{};     ///< of an image sequence where frame_rate_hz is not given
   std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
