@@ -98,13 +98,6 @@ void track(Run& run, const Options& options) {
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
 }
 
-bool has_metres(const data::TrackFile& file) {
-  for (const data::Track& track : file.tracks)
-    for (const data::TrackSample& sample : track.samples)
-      if (sample.has_metres()) return true;
-  return false;
-}
-
 fitting::FitOptions fit_options(const Options& options, Progress& progress) {
   fitting::FitOptions how;
   how.free_pivot = options.free_pivot;

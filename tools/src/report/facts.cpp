@@ -50,17 +50,24 @@ double rms_spin_rad(const data::TrackFile& tracks, const PredictedPath& path) {
 
 }  // namespace
 
+bool has_metres(const data::TrackFile& file) {
+  for (const data::Track& track : file.tracks)
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.has_metres()) return true;
+  return false;
+}
+
 ReportFacts gather(const ReportInput& input) {
   ReportFacts facts{.input = input, .prediction = {}, .residuals = {}};
   facts.first_s = std::numeric_limits<double>::infinity();
   facts.last_s = -facts.first_s;
+  facts.metres = has_metres(input.tracks);
   std::vector<double> sigmas_m;
   for (const data::Track& track : input.tracks.tracks) {
     count_gaps(track, facts);
     for (const data::TrackSample& sample : track.samples) {
       facts.first_s = std::min(facts.first_s, sample.t_s);
       facts.last_s = std::max(facts.last_s, sample.t_s);
-      if (!sample.has_metres()) facts.metres = false;
       if (sample.has_covariance())
         for (int axis = 0; axis < 2; ++axis)
           sigmas_m.push_back(std::sqrt(sample.covariance_m2(axis, axis)));

@@ -20,9 +20,12 @@ constexpr std::size_t kMostPoints = 6000;  // per curve: more cannot be told apa
 // x-y of the samples in millimetres or pixels (then y up, as on paper).
 std::vector<Eigen::Vector2d> observed_points(const ReportFacts& facts, const data::Track& track) {
   std::vector<Eigen::Vector2d> points;
-  for (const data::TrackSample& sample : track.samples)
-    points.push_back(facts.metres ? Eigen::Vector2d(sample.centre_m * kMmPerM)
-                                  : Eigen::Vector2d(sample.centre_px.x(), -sample.centre_px.y()));
+  for (const data::TrackSample& sample : track.samples) {
+    const Eigen::Vector2d point =
+        facts.metres ? Eigen::Vector2d(sample.centre_m * kMmPerM)
+                     : Eigen::Vector2d(sample.centre_px.x(), -sample.centre_px.y());
+    if (point.allFinite()) points.push_back(point);
+  }
   return points;
 }
 

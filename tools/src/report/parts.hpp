@@ -16,7 +16,7 @@ struct ReportFacts {
   const ReportInput& input;
   PredictedPath prediction;                      ///< empty without a fit
   std::vector<std::vector<Residual>> residuals;  ///< one list per track
-  bool metres = true;                            ///< whether the track has a scale
+  bool metres = true;  ///< any sample has its place in metres; else all are shown in pixels
   int samples = 0;
   int gaps = 0;      ///< runs of frames without a sample between two samples
   int missing = 0;   ///< frames in those gaps
@@ -29,6 +29,8 @@ struct ReportFacts {
   double rms_spin_rad = 0.0;    ///< residual of the spin angle; NaN if it is not seen or predicted
   double median_sigma_m = 0.0;  ///< of the track per axis; NaN if unknown
 };
+/// Whether any sample of a track has its place in metres.
+[[nodiscard]] bool has_metres(const data::TrackFile& file);
 [[nodiscard]] ReportFacts gather(const ReportInput& input);
 
 // --- words ---
