@@ -7,10 +7,30 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstring>
 
 namespace trochoid::tools {
+namespace {
+
+constexpr const char* kNotStarted = "cannot be started: ";
+
+/// In the child, between fork() and exec(), where nothing may be called that takes a lock.
+[[noreturn]] void end_unstarted(int error) {
+  for (const char* words : {kNotStarted, strerrordesc_np(error)})
+    if (words != nullptr && write(STDERR_FILENO, words, std::strlen(words)) < 0) break;
+  _exit(127);
+}
+
+ChildRun not_started(int error) {
+  ChildRun run;
+  run.error_output = kNotStarted + std::string(std::strerror(error));
+  return run;
+}
+
+}  // namespace
 
 ChildRun run_child(const std::vector<std::string>& arguments, const std::filesystem::path& output) {
   ChildRun run;
@@ -18,7 +38,7 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   std::array<int, 2> pipe_ends{};
-  if (pipe2(pipe_ends.data(), O_CLOEXEC) != 0) return run;
+  if (pipe2(pipe_ends.data(), O_CLOEXEC) != 0) return not_started(errno);
   const auto start = std::chrono::steady_clock::now();
   const pid_t parent = getpid();
   const pid_t child = fork();
@@ -31,8 +51,9 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
     dup2(written, STDOUT_FILENO);
     dup2(pipe_ends[1], STDERR_FILENO);
     execvp(argv[0], argv.data());
-    _exit(127);
+    end_unstarted(errno);
   }
+  if (child < 0) run = not_started(errno);
   close(pipe_ends[1]);
   if (child > 0) {
     std::array<char, 4096> buffer{};
@@ -52,7 +73,7 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
 }
 
 std::string own_path() {
-  return std::filesystem::read_symlink("/proc/self/exe").string();
+  return "/proc/self/exe";
 }
 
 }  // namespace trochoid::tools

@@ -11,7 +11,7 @@ struct ChildRun {
   int exit_status = -1;
   double seconds = 0.0;      ///< wall time, start of the process included
   double peak_mb = 0.0;      ///< resident memory
-  std::string error_output;  ///< what it wrote to stderr
+  std::string error_output;  ///< what it wrote to stderr, or why it did not start
 };
 
 /// Runs a program (found on PATH) to its end with nothing on stdin and stdout going to a file
@@ -19,7 +19,8 @@ struct ChildRun {
 [[nodiscard]] ChildRun run_child(const std::vector<std::string>& arguments,
                                  const std::filesystem::path& output = "/dev/null");
 
-/// Path of the running program.
+/// The running program, as run_child() takes it: the one that runs, also once another lies in its
+/// place or it has been moved.
 [[nodiscard]] std::string own_path();
 
 }  // namespace trochoid::tools
