@@ -9,6 +9,7 @@
 
 #include "commands.hpp"
 #include "common/child_process.hpp"
+#include "common/recording_name.hpp"
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -190,7 +191,7 @@ std::vector<CampaignLine> collect(const Campaign& campaign) {
       line.known = true;
     }
     const fs::path folder = folder_of(campaign, item.name);
-    const fs::path fit = folder / (item.video.stem().string() + ".fit.json");
+    const fs::path fit = folder / (recording_name(item.video) + ".fit.json");
     if (line.record.done) {
       const Json run = read_json(folder / kRunFile);
       if (run.is_object()) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "campaign/campaign.hpp"
+#include "common/recording_name.hpp"
 #include "common/track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -80,7 +81,7 @@ fs::path filled_in(std::string text, const fs::path& video, const fs::path& base
 }
 
 std::string unique_name(const fs::path& video, std::set<std::string>& taken) {
-  std::string name = video.stem().string();
+  std::string name = recording_name(video);
   if (taken.contains(name)) name = video.parent_path().filename().string() + "_" + name;
   const std::string base = name;
   for (int i = 2; taken.contains(name); ++i) name = fmt::format("{}_{}", base, i);

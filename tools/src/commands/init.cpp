@@ -14,6 +14,7 @@
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
+#include "common/recording_name.hpp"
 #include "common/validators.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -180,8 +181,7 @@ void tell_json(const Options& options, const Inspection& seen) {
 }
 
 void run(Options options) {
-  if (options.output.empty())
-    options.output = fs::path(options.video).replace_extension(".toml").filename();
+  if (options.output.empty()) options.output = recording_name(options.video) + ".toml";
   check_output(options.output, {options.video});
   if (fs::exists(options.output) && !options.force)
     throw InputError(

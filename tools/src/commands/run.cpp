@@ -11,6 +11,7 @@
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
+#include "common/recording_name.hpp"
 #include "common/scene_library.hpp"
 #include "common/track_options.hpp"
 #include "common/validators.hpp"
@@ -62,11 +63,11 @@ struct Run {
 
 fs::path folder_of(const Options& options) {
   if (!options.output.empty()) return options.output;
-  return fs::path(options.video).stem().string() + ".trochoid";
+  return recording_name(options.video) + ".trochoid";
 }
 
 std::string stem_of(const Options& options) {
-  return fs::path(options.video).stem().string();
+  return recording_name(options.video);
 }
 
 Run prepared(const Options& options) {
