@@ -71,10 +71,17 @@ std::vector<fs::path> expanded(const fs::path& path) {
   return found;
 }
 
+/// The folder of a recording as the manifest would name it.
+fs::path folder_of(const fs::path& video, const fs::path& base) {
+  const fs::path folder = video.parent_path(), seen_from_base = folder.lexically_relative(base);
+  return seen_from_base.empty() ? folder : seen_from_base;
+}
+
 /// {stem} and {folder} of the recording put into a scene's or camera's name.
 fs::path filled_in(std::string text, const fs::path& video, const fs::path& base) {
-  for (const auto& [word, value] : {std::pair<std::string, std::string>{"{stem}", video.stem()},
-                                    {"{folder}", video.parent_path()}})
+  for (const auto& [word, value] :
+       {std::pair<std::string, std::string>{"{stem}", recording_name(video)},
+        {"{folder}", folder_of(video, base)}})
     for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; at += value.size())
       text.replace(at, word.size(), value);
   return text.empty() ? fs::path() : base / text;
@@ -100,7 +107,9 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
     const toml::node* node = table.get(key);
     return node == nullptr ? std::string() : text_of(campaign.manifest, *node, key);
   };
-  const std::vector<fs::path> videos = expanded(base / text("video"));
+  std::string named = text("video");
+  while (named.size() > 1 && named.back() == '/') named.pop_back();  // a folder of pictures
+  const std::vector<fs::path> videos = expanded(base / named);
   if (videos.empty())
     fail(campaign.manifest, *table.get("video"),
          fmt::format("video = '{}' matches no file", text("video")));
