@@ -54,17 +54,34 @@ std::vector<std::string> command_of(const Campaign& campaign, const CampaignItem
   return command;
 }
 
+/// Size and time of a file; " missing" for one that is not there.
+std::string state_of(const fs::path& file) {
+  std::error_code code;
+  const auto size = fs::file_size(file, code);
+  const auto time = code ? fs::file_time_type() : fs::last_write_time(file, code);
+  return code ? " missing" : fmt::format(" {}@{}", size, time.time_since_epoch().count());
+}
+
+/// Of a video its file's; of pictures, what all of theirs come to.
+std::string state_of_recording(const fs::path& recording) {
+  try {
+    const std::vector<fs::path> files = tracking::files_of_recording(recording);
+    if (files.front() == recording) return state_of(recording);
+    std::string all;
+    for (const fs::path& file : files) all += file.filename().string() + state_of(file) + "\n";
+    return " " + data::sha256_of_text(all);
+  } catch (const InputError&) {  // the run will say what is wrong with it
+    return " missing";
+  }
+}
+
 /// Size and time stand for the content: reading a thousand recordings again to see that nothing has
 /// changed would take as long as copying them.
 std::string key_of(const Campaign& campaign, const CampaignItem& item) {
   std::string key =
       fmt::format("{} {}", TROCHOID_VERSION, fmt::join(command_of(campaign, item), " "));
-  for (const fs::path& file : inputs_of(item)) {
-    std::error_code code;
-    const auto size = fs::is_directory(file, code) ? 0 : fs::file_size(file, code);
-    const auto time = fs::last_write_time(file, code);
-    key += code ? " missing" : fmt::format(" {}@{}", size, time.time_since_epoch().count());
-  }
+  for (const fs::path& file : inputs_of(item))
+    key += file == item.video ? state_of_recording(file) : state_of(file);
   return key;
 }
 

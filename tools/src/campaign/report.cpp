@@ -99,21 +99,34 @@ std::string failures(const std::vector<CampaignLine>& lines) {
          "</table>\n";
 }
 
+/// A name as part of an address: what means something there, and what is not ASCII, in hexadecimal.
+std::string in_address(const std::string& name) {
+  std::string address;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+                       c == '-' || c == '.' || c == '_' || c == '~';
+    address += plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
+  }
+  return address;
+}
+
 std::string all_items(const std::vector<CampaignLine>& lines) {
   std::string html =
       "<h2>All recordings</h2>\n<table><tr><th>recording<th>status<th>model<th>found<th>noise "
       "&times;<th>whiteness p<th>time [s]<th>verdict</tr>\n";
   for (const CampaignLine& line : lines) {
     const std::string name = escaped(line.record.name);
-    html += fmt::format(
-        "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
-        line.record.done ? fmt::format("<a href=\"{0}.trochoid/report.html\">{0}</a>", name) : name,
-        status_of(line), line.fit ? escaped(line.fit->model) : "",
-        line.record.done ? fmt::format("{} of {}", line.found, line.frames) : "",
-        line.fit ? short_number(line.fit->noise_scale) : "",
-        line.fit ? short_number(line.fit->whiteness_p) : "",
-        line.known ? fmt::format("{:.2f}", line.record.seconds) : "",
-        escaped(line.record.done ? line.record.verdict : line.record.message));
+    html += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+                        line.record.done ? fmt::format("<a href=\"{}.trochoid/report.html\">{}</a>",
+                                                       in_address(line.record.name), name)
+                                         : name,
+                        status_of(line), line.fit ? escaped(line.fit->model) : "",
+                        line.record.done ? fmt::format("{} of {}", line.found, line.frames) : "",
+                        line.fit ? short_number(line.fit->noise_scale) : "",
+                        line.fit ? short_number(line.fit->whiteness_p) : "",
+                        line.known ? fmt::format("{:.2f}", line.record.seconds) : "",
+                        escaped(line.record.done ? line.record.verdict : line.record.message));
   }
   return html + "</table>\n";
 }

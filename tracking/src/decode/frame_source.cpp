@@ -394,6 +394,12 @@ class LibavSource final : public FrameSource {
 
 }  // namespace
 
+std::vector<fs::path> files_of_recording(const fs::path& path) {
+  if (std::optional<ImageSequence> series = find_image_sequence(path))
+    return std::move(series->pictures);
+  return {path};
+}
+
 std::string sha256_of_recording(const fs::path& path) {
   const std::optional<ImageSequence> series = find_image_sequence(path);
   if (!series) return data::sha256_of_file(path);

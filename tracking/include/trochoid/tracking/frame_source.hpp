@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace trochoid::tracking {
 
@@ -65,6 +66,10 @@ class FrameSource {
 /// @throws InputError (missing, not a video, no picture stream) before any frame is handed out.
 [[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,
                                                       const SourceOptions& options = {});
+/// The files that hold a recording: itself, or the pictures of a sequence in the order they are
+/// read.  @throws InputError if a sequence has none.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_recording(
+    const std::filesystem::path& path);
 /// SHA-256 of a video file; of an image sequence, of the list of its pictures' own in the order
 /// they are read, one to a line.  @throws InputError if it is not there.
 [[nodiscard]] std::string sha256_of_recording(const std::filesystem::path& path);
