@@ -292,17 +292,16 @@ void check_points(const Options& options) {
     throw InputError("--circle-points needs --radius-mm, the radius of the circle");
 }
 
-void check_outputs(const Options& options) {
+void check_names(const Options& options) {
   std::vector<fs::path> inputs = options.inputs;
   inputs.push_back(options.floor_points);
   inputs.push_back(options.circle_points);
-  check_output(options.picture, inputs);
-  inputs.push_back(options.picture);
-  check_output(options.output, inputs);
+  check_outputs({options.picture, options.output}, inputs);
+  if (!options.picture.empty()) check_picture_name(options.picture);
 }
 
 void run(const Options& options) {
-  check_outputs(options);
+  check_names(options);
   check_points(options);
   const tracking::BoardPattern pattern = pattern_of(options);
   Views views = look_at_inputs(options, pattern);

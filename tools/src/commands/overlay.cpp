@@ -57,9 +57,10 @@ OverlayInput read_inputs(const Options& options) {
 }
 
 void run(const Options& options) {
-  for (const std::string& output : {options.output, options.still})
-    check_output(output,
-                 {options.video, options.track, options.fit, options.scene, options.camera});
+  check_outputs({options.output, options.still},
+                {options.video, options.track, options.fit, options.scene, options.camera});
+  if (!options.still.empty()) check_picture_name(options.still);
+  if (!options.output.empty()) check_overlay_name(options.output);
   if (options.output.empty() && options.still.empty())
     throw InputError("overlay: nothing to write; give -o overlay.mp4, --still path.png or both");
   const OverlayInput input = read_inputs(options);

@@ -39,11 +39,13 @@ ReportInput inputs(const Options& options) {
 }
 
 void run(const Options& options) {
-  for (const std::string& output : {options.output, options.path_svg})
-    check_output(output, {options.track, options.fit});
+  check_outputs({options.output, options.path_svg}, {options.track, options.fit});
   if (const std::string ending = std::filesystem::path(options.output).extension().string();
       ending != ".html" && ending != ".htm")
     throw InputError(fmt::format("-o {}: the report is a page, name it .html", options.output));
+  if (!options.path_svg.empty() && std::filesystem::path(options.path_svg).extension() != ".svg")
+    throw InputError(fmt::format("--path-svg {}: the picture is drawn in lines, name it .svg",
+                                 options.path_svg));
   const ReportInput input = inputs(options);
   const std::string html = make_report(input);
   data::write_text(html, options.output);

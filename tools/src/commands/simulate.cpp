@@ -143,7 +143,7 @@ void simulate_scene(const Options& options) {
   const std::string stem = stem_of(options);
   const fs::path output =
       options.output.empty() ? fs::path(stem + ".trajectory.csv") : options.output;
-  for (const fs::path& file : {output, options.animation}) check_output(file, {named});
+  check_outputs({output, options.animation}, {named});
   if (!options.plots.empty()) check_folder(options.plots);
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) check_animation_name(options.animation);

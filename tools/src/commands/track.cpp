@@ -41,14 +41,16 @@ data::Scene scene_of(const Options& options) {
 }
 
 /// Run times live beside the track, so that the track itself is the same from run to run.
+fs::path timing_file(fs::path track) {
+  return track.replace_extension(".timing.json");
+}
+
 void write_timing(const fs::path& track, double seconds, const tracking::TrackSummary& summary) {
   const nlohmann::json timing = {{"command", "track"},
                                  {"seconds", seconds},
                                  {"frames", summary.frames},
                                  {"frames_per_s", static_cast<double>(summary.frames) / seconds}};
-  fs::path path = track;
-  path.replace_extension(".timing.json");
-  data::write_text(timing.dump(2) + "\n", path);
+  data::write_text(timing.dump(2) + "\n", timing_file(track));
 }
 
 /// Frame by frame what deserves a look: gaps, and samples to be doubted.
@@ -99,9 +101,8 @@ void tell(const Options& options, const tracking::TrackResult& result,
 
 void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
-  check_output(options.output, {options.video, options.scene, options.camera});
-  check_output(options.edges, {options.video, options.scene, options.camera, options.output});
-  check_output(options.smooth, {options.video, options.scene, options.camera, options.output});
+  check_outputs({options.output, options.edges, options.smooth, timing_file(options.output)},
+                {options.video, options.scene, options.camera});
   const data::Scene scene = scene_of(options);
   std::optional<data::Camera> camera;
   if (!options.camera.empty()) camera = data::read_camera(options.camera);

@@ -48,6 +48,13 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   }
 }
 
+void check_outputs(const std::vector<fs::path>& outputs, std::vector<fs::path> inputs) {
+  for (const fs::path& output : outputs) {
+    check_output(output, inputs);
+    inputs.push_back(output);
+  }
+}
+
 void check_folder(const fs::path& folder) {
   std::error_code ignored;  // what cannot be looked at is not there
   const std::string ending = folder.extension().string();

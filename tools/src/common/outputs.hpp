@@ -12,6 +12,10 @@ namespace trochoid::tools {
 void check_output(const std::filesystem::path& output,
                   const std::vector<std::filesystem::path>& inputs);
 
+/// The same for all that one command writes, none of which may be another.
+void check_outputs(const std::vector<std::filesystem::path>& outputs,
+                   std::vector<std::filesystem::path> inputs);
+
 /// The same for a folder of results that is there or is to be made: no file may be in its place,
 /// nor its name be a picture's or a table's. @throws InputError naming it.
 void check_folder(const std::filesystem::path& folder);
