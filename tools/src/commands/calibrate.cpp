@@ -346,8 +346,10 @@ void add_calibrate_command(CLI::App& app) {
       ->needs("--marker-mm");
   command->add_option("--floor", options->floor,
                       "Picture in which the board lies on the floor [the first]");
-  command->add_option("--floor-height-mm", options->floor_height_mm,
-                      "Height of that board, of the points or of the circle above the floor [0]");
+  command
+      ->add_option("--floor-height-mm", options->floor_height_mm,
+                   "Height of that board, of the points or of the circle above the floor [0]")
+      ->check(number_within(-1e5, 1e5).description(""));
   command
       ->add_option("--floor-points", options->floor_points,
                    "CSV with x_px, y_px, x_m, y_m of four or more points of the floor")

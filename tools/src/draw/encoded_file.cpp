@@ -38,6 +38,10 @@ void check_whole(const fs::path& written, std::int64_t pictures, const fs::path&
                                  : fmt::format("{} of {} pictures are in it", promised, pictures)));
 }
 
+bool is_jpeg(const fs::path& path) {
+  return path.extension() == ".jpg" || path.extension() == ".jpeg";
+}
+
 std::vector<std::string> words_of(const std::string& line) {
   std::istringstream words(line);
   return {std::istream_iterator<std::string>(words), {}};
@@ -146,12 +150,14 @@ void EncodedFile::fail(int status) {
   throw InputError(fmt::format("{}: cannot be encoded: ffmpeg: {}", target_.string(), words));
 }
 
-void write_picture(const cv::Mat& picture, const fs::path& path) {
-  const std::string extension = path.extension().string();
-  const bool jpeg = extension == ".jpg" || extension == ".jpeg";
-  if (!jpeg && extension != ".png")
+void check_picture_name(const fs::path& path) {
+  if (path.extension() != ".png" && !is_jpeg(path))
     throw InputError(fmt::format("{}: a picture is a .png or .jpg file", path.string()));
-  EncodedFile file(path, picture.size(), 1.0, jpeg ? coding::kJpeg : coding::kPng);
+}
+
+void write_picture(const cv::Mat& picture, const fs::path& path) {
+  check_picture_name(path);
+  EncodedFile file(path, picture.size(), 1.0, is_jpeg(path) ? coding::kJpeg : coding::kPng);
   file.write(picture);
   file.finish();
   file.commit();

@@ -73,8 +73,11 @@ class EncodedFile {
   std::int64_t pictures_ = 0;
 };
 
-/// Writes a picture whole or not at all. @throws InputError unless it is named .png or .jpg and can
-/// be written.
+/// Before the work. @throws InputError unless a picture is named .png or .jpg.
+void check_picture_name(const std::filesystem::path& path);
+
+/// Writes a picture whole or not at all. @throws InputError unless it is named so and can be
+/// written.
 void write_picture(const cv::Mat& picture, const std::filesystem::path& path);
 
 }  // namespace trochoid::tools
