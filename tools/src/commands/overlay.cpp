@@ -13,6 +13,7 @@
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
 #include "common/validators.hpp"
+#include "draw/encoded_file.hpp"
 #include "draw/overlay.hpp"
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"

@@ -184,6 +184,18 @@ void OverlayPainter::mark_missing(cv::Mat& picture) const {
 
 }  // namespace
 
+void check_recording(const OverlayInput& input, const std::string& track) {
+  const std::string& tracked = input.tracks.source_sha256;
+  if (tracked.empty() || tracked == tracking::sha256_of_recording(input.video)) return;
+  throw InputError(fmt::format("{}: was tracked in another recording than {}; track this one",
+                               track, input.video.string()));
+}
+
+void check_overlay_name(const std::filesystem::path& path) {
+  if (path.extension() != ".mp4")
+    throw InputError(fmt::format("{}: an overlay is an mp4 file; name it .mp4", path.string()));
+}
+
 std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
                                                       const OverlayOptions& options) {
   tracking::SourceOptions source;
@@ -197,8 +209,7 @@ std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
 
 OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& options,
                             const std::filesystem::path& path) {
-  if (path.extension() != ".mp4")
-    throw InputError(fmt::format("{}: an overlay is an mp4 file; name it .mp4", path.string()));
+  check_overlay_name(path);
   auto source = tracking::decode_ahead(open_recording(input, options));
   const tracking::VideoInfo info = source->info();
   const OverlayContent content(input, info.width_px, info.height_px);

@@ -29,6 +29,14 @@ struct OverlayFrames {
   std::vector<double> t_s;
 };
 
+/// Refuses to draw into a recording what was tracked in another: it would lie beside the bodies.
+/// @param track  what the user knows the track by.  @throws InputError if the track tells the
+/// checksum of its recording and this is not it.
+void check_recording(const OverlayInput& input, const std::string& track);
+
+/// Before the work. @throws InputError unless the name ends in .mp4.
+void check_overlay_name(const std::filesystem::path& path);
+
 /// Opens the recording that is drawn into, in colour. Pictures that carry no times have those of
 /// the track.
 std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
