@@ -170,7 +170,10 @@ void write_data(Run& run, const Options& options, const fs::path& folder) {
 OverlayOptions overlay_options(const Run& run, const Options& options) {
   constexpr double kMostlyTracked = 0.7;
   constexpr std::int64_t kLeadFrames = 20;
-  OverlayOptions how{.from = options.from, .to = options.to, .slow = options.slow};
+  const data::TrackingSettings& scene = run.scene.tracking;
+  OverlayOptions how{.from = options.from.empty() ? scene.from : options.from,
+                     .to = options.to.empty() ? scene.to : options.to,
+                     .slow = options.slow};
   std::int64_t first = std::numeric_limits<std::int64_t>::max(), last = 0;
   for (const data::Track& track : run.tracked.file.tracks) {
     if (track.samples.empty() || track.samples.front().frame < 0) return how;
