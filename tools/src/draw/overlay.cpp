@@ -6,12 +6,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "draw/encoded_file.hpp"
+#include "draw/frame_times.hpp"
 #include "draw/overlay_drawing.hpp"
 #include "draw/residual_strip.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/moment.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tools {
@@ -45,6 +46,18 @@ std::optional<double> rate_of(const data::TrackFile& file) {
       return static_cast<double>(last.frame - first.frame) / (last.t_s - first.t_s);
   }
   return std::nullopt;
+}
+
+/// Seconds of the track as the frame it has first from then on, or last until then: the file may
+/// play at another rate. What is a frame already, and what the track cannot tell, is left as it is.
+std::string as_frame(const FrameTimes& times, const std::string& text, bool is_first) {
+  const auto moment = data::parse_moment(text);
+  if (!moment || !moment->t_s) return text;
+  const auto at = times.frame_at(*moment->t_s);
+  if (!at) return text;
+  constexpr double kRounding = 1e-4;  // of a frame
+  const double frame = is_first ? std::ceil(*at - kRounding) : std::floor(*at + kRounding);
+  return fmt::format("f{:.0f}", std::max(0.0, frame));
 }
 
 /// Draws the pictures of an overlay one after the other; strokes of the past are kept between
@@ -200,8 +213,10 @@ std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
                                                       const OverlayOptions& options) {
   tracking::SourceOptions source;
   source.colour = true;
-  source.from = options.from;
-  source.to = options.to;
+  const FrameTimes times(input.tracks);
+  (void)data::parse_window(options.from, options.to);  // what is wrong is told as it was given
+  source.from = as_frame(times, options.from, true);
+  source.to = as_frame(times, options.to, false);
   if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
   source.untimed_rate_hz = rate_of(input.tracks);
   return tracking::open_video(input.video, source);

@@ -38,7 +38,7 @@ void check_recording(const OverlayInput& input, const std::string& track);
 void check_overlay_name(const std::filesystem::path& path);
 
 /// Opens the recording that is drawn into, in colour. Pictures that carry no times have those of
-/// the track.
+/// the track; seconds of `options` are the track's, too, where it numbers its frames.
 std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
                                                       const OverlayOptions& options);
 

@@ -4,11 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -71,7 +69,10 @@ void OverlayContent::check_pictures(int width_px, int height_px,
 }
 
 OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int height_px)
-    : tracks_(input.tracks), scene_(scene_of(input)), camera_(input.camera) {
+    : tracks_(input.tracks),
+      scene_(scene_of(input)),
+      camera_(input.camera),
+      frame_times_(input.tracks) {
   if (!camera_ && scene_) camera_ = camera_of(*scene_);
   if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
   if (input.fit && !input.fit->parameters.empty())
@@ -123,46 +124,21 @@ void OverlayContent::collect(const data::Track& track) {
 }
 
 void OverlayContent::collect_times() {
-  std::map<std::int64_t, double> times;
   first_s_ = std::numeric_limits<double>::infinity();
   last_s_ = -first_s_;
   for (const ObjectPaths& paths : objects_)
     for (const ObservedPoint& point : paths.observed) {
-      if (point.frame >= 0) times.emplace(point.frame, point.t_s);
       first_s_ = std::min(first_s_, point.t_s);
       last_s_ = std::max(last_s_, point.t_s);
     }
-  frame_times_.assign(times.begin(), times.end());
-  std::vector<double> steps_s;
-  for (std::size_t i = 1; i < frame_times_.size(); ++i)
-    steps_s.push_back((frame_times_[i].second - frame_times_[i - 1].second) /
-                      static_cast<double>(frame_times_[i].first - frame_times_[i - 1].first));
-  frame_s_ = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
 }
 
 double OverlayContent::time_of_frame(std::int64_t frame, double fallback_s) const {
-  if (frame_times_.size() < 2) return fallback_s;
-  const auto after = std::lower_bound(frame_times_.begin(), frame_times_.end(),
-                                      std::pair(frame, -std::numeric_limits<double>::infinity()));
-  if (after == frame_times_.end()) {
-    const auto& [last, t_s] = frame_times_.back();
-    return t_s + static_cast<double>(frame - last) * frame_s_;
-  }
-  if (after->first == frame || after == frame_times_.begin())
-    return after->second - static_cast<double>(after->first - frame) * frame_s_;
-  const auto& [low, low_s] = *std::prev(after);
-  const auto& [high, high_s] = *after;
-  return low_s +
-         (high_s - low_s) * static_cast<double>(frame - low) / static_cast<double>(high - low);
+  return frame_times_.time_of(frame).value_or(fallback_s);
 }
 
 bool OverlayContent::detected(std::int64_t frame, double t_s) const {
-  if (!frame_times_.empty()) {
-    const auto at =
-        std::lower_bound(frame_times_.begin(), frame_times_.end(), frame,
-                         [](const auto& known, std::int64_t f) { return known.first < f; });
-    return at != frame_times_.end() && at->first == frame;
-  }
+  if (frame_times_.numbered()) return frame_times_.has(frame);
   return t_s >= first_s_ && t_s <= last_s_;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/prediction.hpp"
+#include "draw/frame_times.hpp"
 #include "trochoid/data/camera.hpp"
 #include "trochoid/data/fit.hpp"
 #include "trochoid/data/outline.hpp"
@@ -82,9 +83,9 @@ class OverlayContent {
   std::optional<data::Camera> camera_;
   PredictedPath prediction_;
   std::vector<ObjectPaths> objects_;
-  std::vector<std::pair<std::int64_t, double>> frame_times_;
+  FrameTimes frame_times_;
   std::optional<double> scale_px_per_m_;
-  double first_s_ = 0.0, last_s_ = 0.0, frame_s_ = 0.0;
+  double first_s_ = 0.0, last_s_ = 0.0;
 };
 
 /// The camera of a scene: its file, or nothing if there is none or it cannot be found any more.
