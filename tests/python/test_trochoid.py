@@ -288,6 +288,9 @@ class Recording(unittest.TestCase):
             with self.assertRaisesRegex(trochoid.InputError, "name another output"):
                 trochoid.overlay(copy, file, scene=SAMPLE / "scene.toml", output=copy)
             self.assertEqual(copy.read_bytes(), before)
+            file.source_sha256 = 64 * "0"
+            with self.assertRaisesRegex(trochoid.InputError, "track: was tracked in another recording"):
+                trochoid.overlay(copy, file, still=pathlib.Path(folder) / "other.png")
         for wrong in ({"effort": None}, {"objects": 1.5}, {"at_px": 3}, {"rate_hz": "fast"}):
             with self.assertRaisesRegex(trochoid.InputError, next(iter(wrong))):
                 trochoid.track(SAMPLE / "video.mp4", **wrong)

@@ -9,6 +9,7 @@
 #include "common/outputs.hpp"
 #include "common/prediction.hpp"
 #include "common/progress.hpp"
+#include "common/provenance.hpp"
 #include "common/scene_library.hpp"
 #include "common/trajectory_table.hpp"
 #include "interruptible.hpp"
@@ -186,13 +187,17 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
   tools::OverlayInput input;
   input.video = video;
   input.tracks = file_of(file);
+  const auto fit_file = options["fit_file"].cast<fs::path>();  // where they are files, not values
   if (fit != nullptr) input.fit = *fit;
   if (scene != nullptr)
     input.scene = scene->scene;
   else if (fit != nullptr)
-    input.scene = tools::scene_of_fit(*fit, fs::path("."));
+    input.scene = tools::scene_of_fit(*fit, fit_file.empty() ? fs::path("fit") : fit_file);
   if (camera_file) input.camera = data::read_camera(*camera_file);
   input.fit_track = options["fit_track"].cast<int>();
+  const auto track_file = options["track_file"].cast<fs::path>();
+  tools::check_recording(input, track_file.empty() ? "track" : track_file.string());
+  if (!fit_file.empty() && !track_file.empty()) tools::check_made_from(*fit, fit_file, track_file);
   tools::OverlayOptions how{.from = options["from"].cast<std::string>(),
                             .to = options["to"].cast<std::string>(),
                             .slow = options["slow"].cast<double>(),

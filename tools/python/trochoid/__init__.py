@@ -447,6 +447,8 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
                "still": _output("still", still, *inputs, output) or "",
                "from": _moment("from_", from_), "to": _moment("to", to),
                "slow": float(slow),
+               "fit_file": fit if isinstance(fit, (str, os.PathLike)) else "",
+               "track_file": track if isinstance(track, (str, os.PathLike)) else "",
                "fit_track": _whole("fit_track", fit_track)}
     file = track if isinstance(track, TrackFile) else TrackFile(_all_tracks(track)[0])
     frames = _core.overlay(_path("video", video), _file_dict(file),

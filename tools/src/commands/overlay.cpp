@@ -18,7 +18,6 @@
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -30,20 +29,11 @@ struct Options {
   bool json = false;
 };
 
-/// What was tracked elsewhere would be drawn beside the bodies.
-void check_recording(const data::TrackFile& track, const Options& options) {
-  if (track.source_sha256.empty() ||
-      track.source_sha256 == tracking::sha256_of_recording(options.video))
-    return;
-  throw InputError(fmt::format("{}: was tracked in another recording than {}; track this one",
-                               options.track, options.video));
-}
-
 OverlayInput read_inputs(const Options& options) {
   OverlayInput input;
   input.video = options.video;
   input.tracks = data::read_track(options.track);
-  check_recording(input.tracks, options);
+  check_recording(input, options.track);
   if (!options.fit.empty()) {
     input.fit = data::read_fit(options.fit);
     check_made_from(*input.fit, options.fit, options.track);

@@ -124,8 +124,9 @@ ReportInput read_run_folder(const fs::path& folder) {
   }
   if (fs::exists(folder / "overlay.mp4", code)) input.video = folder / "overlay.mp4";
   if (fs::exists(folder / kRunFile, code)) read_facts(read_json(folder / kRunFile), input);
-  if (const auto timing = file_ending(folder, ".timing.json")) {
-    const json times = read_json(*timing);
+  const std::string stem = track->stem().stem().string();
+  if (const fs::path timing = folder / (stem + ".timing.json"); fs::exists(timing, code)) {
+    const json times = read_json(timing);
     for (const auto& [stage, seconds] : times.items())
       if (seconds.is_number() && stage.ends_with("_s"))
         input.times_s.emplace_back(stage.substr(0, stage.size() - 2), seconds.get<double>());
@@ -135,11 +136,16 @@ ReportInput read_run_folder(const fs::path& folder) {
 
 data::Scene scene_of_fit(const data::Fit& fit, const fs::path& fit_file) {
   data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in " + fit_file.string());
+  // A run leaves the camera beside the fit and names it so; a fit of its own names it as the scene
+  // did, and both may have been moved.
+  const fs::path named = scene.camera.file, folder = fit_file.parent_path();
   std::error_code code;
-  if (!scene.camera.file.empty()) {  // a run leaves the camera beside the fit
-    const fs::path beside = fit_file.parent_path() / fs::path(scene.camera.file).filename();
-    if (fs::exists(beside, code)) scene.camera.file = beside.string();
-  }
+  if (!named.empty())
+    for (const fs::path& camera : {folder / named, named, folder / named.filename()})
+      if (fs::exists(camera, code)) {
+        scene.camera.file = camera.string();
+        break;
+      }
   return scene;
 }
 

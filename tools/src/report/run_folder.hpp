@@ -37,11 +37,12 @@ class PendingFolder {
 inline constexpr const char* kRunFile = "run.json";
 
 /// Everything a run left in its folder, ready for a report: *.track.csv, and if present *.fit.json,
-/// scene.toml, overlay.mp4, run.json, *.timing.json.
+/// scene.toml, overlay.mp4, run.json, and *.timing.json named like the track.
 /// @throws InputError if the folder holds no track or more than one.
 [[nodiscard]] ReportInput read_run_folder(const std::filesystem::path& folder);
 
-/// The scene stored in a fit, its camera file found beside the fit when it is not where it says.
+/// The scene stored in a fit, its camera file as it is named, seen from the fit's folder or from
+/// here, else beside the fit.
 [[nodiscard]] data::Scene scene_of_fit(const data::Fit& fit, const std::filesystem::path& fit_file);
 
 }  // namespace trochoid::tools
