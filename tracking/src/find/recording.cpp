@@ -70,8 +70,9 @@ void Recording::remember_window() {
   if (elsewhere_.size() > kSamples) elsewhere_ = spread(elsewhere_, kSamples / 2);
 }
 
-/// A long recording has many frames that decode alone; keeps every n-th, doubling n when full.
-void Recording::read_ahead() {
+/// A long recording has many frames that decode alone; keeps every n-th, doubling n when full. What
+/// cannot be read is told when it is its turn, and may lie beyond the end that was asked for.
+void Recording::read_ahead() try {
   if (std::exchange(looked_ahead_, true)) return;
   SourceOptions options = options_;
   options.key_frames_only = true;
@@ -86,6 +87,7 @@ void Recording::read_ahead() {
     elsewhere_ = spread(elsewhere_, kSamples / 2);
     stride *= 2;
   }
+} catch (const InputError&) {
 }
 
 void Recording::stop_sampling() {

@@ -1,0 +1,29 @@
+#include "find/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fmt/core.h>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "drawn_clip.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+// Whoever asks for the first part of a recording need not have the rest of it whole.
+TEST(Recording, LooksAheadAsFarAsItCan) {
+  constexpr int kPictures = 60, kBroken = 50;
+  const ScratchFolder folder("recording");
+  for (int i = 0; i < kPictures; ++i)
+    cv::imwrite(folder / fmt::format("{:02}.png", i), cv::Mat(48, 64, CV_8U, cv::Scalar(i)));
+  std::ofstream(folder / fmt::format("{:02}.png", kBroken), std::ios::trunc);
+  constexpr std::size_t kFewest = 1;  // bytes: more pictures than one window follow
+  Recording recording(folder / "", {.frame_rate_hz = 100.0, .to = "f45"}, kFewest);
+  ASSERT_TRUE(recording.advance(0));
+  ASSERT_LT(recording.window().back().index, 45);
+  EXPECT_GE(recording.samples().luma.size(), Background::kSamples);
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
