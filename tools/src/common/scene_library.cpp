@@ -19,7 +19,9 @@ std::string_view BundledScene::summary() const {
 }
 
 data::Scene load_scene(const std::string& file_or_name) {
-  if (std::filesystem::exists(file_or_name)) return data::read_scene(file_or_name);
+  std::error_code ignored;  // of what cannot be looked at reading tells more
+  const bool folder = std::filesystem::is_directory(file_or_name, ignored);
+  if (!folder && std::filesystem::exists(file_or_name)) return data::read_scene(file_or_name);
   const auto& scenes = bundled_scenes();
   const auto found = std::find_if(scenes.begin(), scenes.end(), [&](const BundledScene& scene) {
     return scene.name == file_or_name;

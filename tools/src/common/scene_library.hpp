@@ -16,8 +16,8 @@ struct BundledScene {
 };
 [[nodiscard]] const std::vector<BundledScene>& bundled_scenes();
 
-/// A scene file, or a bundled scene by name.
-/// @throws InputError naming the nearest bundled name if it is neither.
+/// A scene file, or a bundled scene by name, though a folder may be called like it.
+/// @throws InputError that tells how to list the bundled ones if it is neither.
 [[nodiscard]] data::Scene load_scene(const std::string& file_or_name);
 
 /// Says in one line on stderr which keys of the scene its model passes over, if any.
