@@ -38,15 +38,21 @@ constexpr double kFlatRatio =
     0.9;  // an outline that never gets narrower belongs to a body that lies flat
 constexpr double kPlaceholder_mm = 25.0;  // a large coin
 
-/// Asks on a terminal only; nothing is asked of a script.
+CLI::Validator radius_in_mm() {
+  return number_within(0.1, 10000.0);
+}
+
+/// Asks on a terminal only, until the answer is a radius or nothing; nothing is asked of a script.
 double ask_radius_mm() {
   if (isatty(STDIN_FILENO) == 0 || isatty(STDERR_FILENO) == 0) return 0.0;
-  fmt::print(stderr, "radius of the body in mm (Enter if not known yet): ");
-  std::string line;
-  std::getline(std::cin, line);
-  char* end = nullptr;
-  const double value = std::strtod(line.c_str(), &end);
-  return end != line.c_str() && value > 0.0 ? value : 0.0;
+  while (true) {
+    fmt::print(stderr, "radius of the body in mm (Enter if not known yet): ");
+    std::string line;
+    if (!std::getline(std::cin, line) || line.empty()) return 0.0;
+    const std::string wrong = radius_in_mm()(line);
+    if (wrong.empty()) return std::stod(line);
+    fmt::print(stderr, "{}\n", wrong);
+  }
 }
 
 std::string video_words(const tracking::VideoInfo& video) {
@@ -213,7 +219,7 @@ void add_init_command(CLI::App& app) {
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
   command
       ->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known: 0.1 to 10000")
-      ->check(number_within(0.1, 10000.0));
+      ->check(radius_in_mm());
   command
       ->add_option("--rate", options->rate_hz,
                    "True frame rate [Hz]: of slow motion, or of an image folder or series")

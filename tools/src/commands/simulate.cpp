@@ -216,11 +216,13 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--animate", options->animation,
                       "Write a clip of the path being drawn (.mp4)");
 #endif
-  command
-      ->add_flag("--steady", options->steady,
-                 "List the steady motions of the scene's body instead of running it")
-      ->excludes("--output")
-      ->excludes("--plots");
+  CLI::Option* steady =
+      command->add_flag("--steady", options->steady,
+                        "List the steady motions of the scene's body instead of running it");
+  for (const char* option : {"--output", "--plots", "--thesis"}) steady->excludes(option);
+#ifdef TROCHOID_HAS_TRACKING
+  steady->excludes("--animate");
+#endif
   command->add_flag("--list", options->list, "List the bundled scenes");
   add_json_flag(*command, options->json);
   command->footer("Example: trochoid simulate --scene thesis-base -o base.csv --plots plots/");
