@@ -149,13 +149,12 @@ Inspection inspect_video(const std::filesystem::path& path, std::optional<double
   how.frame_rate_hz = frame_rate_hz;
   how.chroma = true;
   Recording recording(path, how, TrackOptions{}.held_bytes);
-  const auto finder = make_rim_finder(false);
+  const auto finder = make_rim_finder();
   Inspection result;
   // A body may come into view late.
   while (!result.body && recording.advance(0)) {
     const auto& window = recording.window();
     const Background background = Background::from_samples(recording.samples());
-    result.watched_s = window.back().t_s;
     result.restless = background.restless();
     result.body = most_plainly_moving(window, background, *finder);
   }

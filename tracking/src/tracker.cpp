@@ -92,7 +92,7 @@ class Tracking {
                                      options_.effort);
       return;
     }
-    finder_ = make_rim_finder(false);
+    finder_ = make_rim_finder();
   }
 
   [[nodiscard]] double exposure_fraction() const {
@@ -103,11 +103,6 @@ class Tracking {
 
   [[nodiscard]] bool bodies_missing() const {
     return paths_.size() < static_cast<std::size_t>(objects_);
-  }
-
-  /// Where the camera moves everything does; a body that stood out would have at once.
-  [[nodiscard]] bool worth_looking() const {
-    return bodies_missing() && !(camera_moved_ && recording_.windows() > 1);
   }
 
   [[noreturn]] void nothing_found() const {
@@ -238,7 +233,7 @@ class Tracking {
   /// A body that turns in place about its own axis, with nothing but a mark that moves.
   bool follow_one_in_plate() {
     constexpr double kMost = 0.6;  // of what changes
-    const auto rim = find_seed_turning(recording_.window(), background_, *make_rim_finder(false));
+    const auto rim = find_seed_turning(recording_.window(), background_, *make_rim_finder());
     if (!rim) return false;
     const Background before = background_;
     if (const auto seed = seed_in_plate(rim)) {
@@ -278,7 +273,7 @@ class Tracking {
     // Of a body in its plate no edge is new.
     constexpr double kNew = 0.3;
     if (!seed)
-      seed = seed_in_plate(find_seed_at(window, background_, *make_rim_finder(false), at_px));
+      seed = seed_in_plate(find_seed_at(window, background_, *make_rim_finder(), at_px));
     else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
       seed = seed_in_plate(seed);
     if (!seed)

@@ -5,12 +5,10 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "campaign/campaign.hpp"
 #include "commands.hpp"
 #include "common/json_summary.hpp"
-#include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/validators.hpp"
 #include "trochoid/data/error.hpp"

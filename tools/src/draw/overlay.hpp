@@ -55,7 +55,6 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
                  const std::filesystem::path& path);
 
 /// Writes the residuals of the whole track as one picture. Without a fit nothing is written.
-/// @returns whether there was something to write.
-bool write_residual_picture(const OverlayInput& input, const std::filesystem::path& path);
+void write_residual_picture(const OverlayInput& input, const std::filesystem::path& path);
 
 }  // namespace trochoid::tools

@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
 #include "trochoid/data/error.hpp"
 

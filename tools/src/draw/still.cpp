@@ -169,16 +169,15 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
   write_picture(page, path);
 }
 
-bool write_residual_picture(const OverlayInput& input, const std::filesystem::path& path) {
+void write_residual_picture(const OverlayInput& input, const std::filesystem::path& path) {
   constexpr int kWidthPx = 1400;
   constexpr double kTextPx = 16.0;
-  if (!input.fit) return false;
+  if (!input.fit) return;
   const OverlayContent content(input, 1, 1);
   const ResidualStrip strip(content, content.first_s(), content.last_s(), kWidthPx, kTextPx);
   cv::Mat page(strip.height_px(), kWidthPx, CV_8UC3);
   strip.draw(page, std::numeric_limits<double>::quiet_NaN());
   write_picture(page, path);
-  return true;
 }
 
 }  // namespace trochoid::tools

@@ -7,8 +7,6 @@
 
 #include "draw/svg.hpp"
 #include "report/parts.hpp"
-#include "trochoid/data/error.hpp"
-#include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::tools {
@@ -17,7 +15,7 @@ namespace {
 constexpr double kMmPerM = 1000.0;
 constexpr std::size_t kMostPoints = 6000;  // per curve: more cannot be told apart in print
 
-// x-y of the samples in millimetres or pixels (then y up, as on paper).
+// x-y of the samples in millimetres or pixels (then y up, as on paper), where they have one.
 std::vector<Eigen::Vector2d> observed_points(const ReportFacts& facts, const data::Track& track) {
   std::vector<Eigen::Vector2d> points;
   for (const data::TrackSample& sample : track.samples) {

@@ -9,7 +9,6 @@
 #include "commands.hpp"
 #include "common/child_process.hpp"
 #include "common/outputs.hpp"
-#include "common/progress.hpp"
 #include "study/tracking_baselines.hpp"
 #include "study/tracking_scores.hpp"
 #include "trochoid/data/error.hpp"

@@ -22,12 +22,9 @@ double gap_px(const Look& look, const Eigen::Vector2d& normal_px, double exposur
 
 class RimFinder final : public BodyFinder {
  public:
-  explicit RimFinder(bool circle) : circle_(circle) {}
-
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     RimSearch search{.reach_px = look.reach_px,
                      .noise_levels = look.background.noise_levels,
-                     .circle = circle_,
                      .background = &look.background.luma};
     Ellipse start;
     if (look.predicted != nullptr) {
@@ -74,8 +71,6 @@ class RimFinder final : public BodyFinder {
     }
     return weigh(look.frame, look.background, face, outline);
   }
-
-  bool circle_;
 };
 
 class CylinderFinder final : public BodyFinder {
@@ -215,8 +210,8 @@ class CylinderFinder final : public BodyFinder {
 
 }  // namespace
 
-std::unique_ptr<BodyFinder> make_rim_finder(bool circle) {
-  return std::make_unique<RimFinder>(circle);
+std::unique_ptr<BodyFinder> make_rim_finder() {
+  return std::make_unique<RimFinder>();
 }
 
 std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,

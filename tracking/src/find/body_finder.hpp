@@ -82,8 +82,7 @@ class BodyFinder {
 };
 
 /// By its rim alone: an ellipse in the picture. For want of a camera or a body.
-/// @param circle the rim is known to appear as a circle (lying flat under an overhead camera).
-[[nodiscard]] std::unique_ptr<BodyFinder> make_rim_finder(bool circle);
+[[nodiscard]] std::unique_ptr<BodyFinder> make_rim_finder();
 
 /// By the outline of the known cylinder under the known camera.
 /// @param exposure_fraction shutter time over frame interval, 0 if unknown.

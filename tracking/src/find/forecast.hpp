@@ -34,7 +34,6 @@ class Forecast {
   [[nodiscard]] const Sighting& last() const { return past_.back().seen; }
   /// Whether the body has been seen more than once: after a single sighting it is taken for still.
   [[nodiscard]] bool knows_speed() const { return past_.size() > 1; }
-  [[nodiscard]] double last_t_s() const { return past_.back().t_s; }
   /// Frames between the last sighting and t_s.
   [[nodiscard]] double frames_since(double t_s) const;
 

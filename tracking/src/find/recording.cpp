@@ -50,7 +50,6 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
     }
     if (fresh++ == 0) {
       remember_window();
-      ++windows_;
       window_.erase(window_.begin(), window_.end() - static_cast<std::ptrdiff_t>(keep));
     }
     if (each) each(*frame);

@@ -23,8 +23,6 @@ class Recording {
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
   [[nodiscard]] const std::vector<Frame>& window() const { return window_; }
-  /// How many windows there were, the present one included.
-  [[nodiscard]] int windows() const { return windows_; }
   /// Lets all but the last `keep` frames of the window go and reads on until it is full again.
   /// `each`, if given, sees every new frame as it comes.
   /// @return false if nothing followed: the window is then as it was.
@@ -45,7 +43,6 @@ class Recording {
   std::size_t held_bytes_;
   std::unique_ptr<FrameSource> source_;
   std::vector<Frame> window_;
-  int windows_ = 0;
   bool ended_ = false;
   std::vector<Frame> elsewhere_;  ///< pictures of other parts of the recording
   bool looked_ahead_ = false, sampled_ = true;

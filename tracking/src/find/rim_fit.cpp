@@ -234,25 +234,13 @@ class EllipseFit {
   }
 
   void add_shape_knowledge() {
-    if (search_.known_shape_px) {
-      const double w = 1.0 / (search_.known_shape_sigma_px * search_.known_shape_sigma_px);
-      const Eigen::Matrix2d off = *search_.known_shape_px - ellipse_.shape_px;
-      const Eigen::Vector3d target(off(0, 0), off(0, 1), off(1, 1));
-      for (int k = 0; k < 3; ++k) {
-        normal_(2 + k, 2 + k) += w;
-        gradient_[2 + k] += w * target[k];
-      }
-    }
-    if (search_.circle) {  // m01 = 0 and m00 = m11, stiffly
-      constexpr double kStiff = 1e8;
-      const double m01 = ellipse_.shape_px(0, 1);
-      const double difference = ellipse_.shape_px(0, 0) - ellipse_.shape_px(1, 1);
-      normal_(3, 3) += kStiff;
-      gradient_[3] -= kStiff * m01;
-      Vector5 row = Vector5::Zero();
-      row[2] = 1.0, row[4] = -1.0;
-      normal_ += kStiff * row * row.transpose();
-      gradient_ -= kStiff * difference * row;
+    if (!search_.known_shape_px) return;
+    const double w = 1.0 / (search_.known_shape_sigma_px * search_.known_shape_sigma_px);
+    const Eigen::Matrix2d off = *search_.known_shape_px - ellipse_.shape_px;
+    const Eigen::Vector3d target(off(0, 0), off(0, 1), off(1, 1));
+    for (int k = 0; k < 3; ++k) {
+      normal_(2 + k, 2 + k) += w;
+      gradient_[2 + k] += w * target[k];
     }
   }
 
@@ -334,10 +322,6 @@ double Ellipse::angle_rad() const {
 
 std::optional<RimFit> fit_rim(const cv::Mat& luma, const Ellipse& start, const RimSearch& search) {
   Ellipse ellipse = start;
-  if (search.circle) {
-    const double radius = 0.5 * ellipse.shape_px.trace();
-    ellipse.shape_px = radius * Eigen::Matrix2d::Identity();
-  }
   RimSearch pass = search;
   std::optional<RimFit> result;
   for (int round = 0; round < 3; ++round) {

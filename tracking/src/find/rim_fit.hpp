@@ -28,7 +28,6 @@ struct RimSearch {
   /// Shape known from other frames, and how well; carries the fit where rim is hidden.
   std::optional<Eigen::Matrix2d> known_shape_px{};
   double known_shape_sigma_px = 0.1;
-  bool circle = false;
   /// Static background at the frame's brightness, or null: an edge it has too belongs to the scene
   /// (a bar in front of the body), unless most edges do (a body that turns in place).
   const cv::Mat* background = nullptr;

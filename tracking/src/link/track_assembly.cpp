@@ -58,7 +58,7 @@ bool lies(const BodyPath& path) {
 
 void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
   if (!rule.camera) return;
-  const Eigen::Vector3d p = rule.camera->table_from_image(seen.centre_px, rule.height_m);
+  const Eigen::Vector3d p = rule.camera->table_from_image(seen.centre_px, 0.0);
   const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
   const Eigen::Matrix2d m_per_px = px_per_m.inverse();
   sample.centre_m = p.head<2>();

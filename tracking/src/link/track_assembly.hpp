@@ -30,8 +30,7 @@ struct BodyPath {
 
 /// How pixels become metres in a track measured by rims alone.
 struct MetreRule {
-  std::optional<data::Camera> camera;  ///< of the floor plane
-  double height_m = 0.0;               ///< of the measured rim above the floor
+  std::optional<data::Camera> camera;  ///< of the floor plane, in which rims are taken to lie
 };
 
 struct AssemblyOptions {

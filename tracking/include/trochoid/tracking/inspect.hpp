@@ -17,7 +17,6 @@ struct Inspection {
     int frames = 0;                 ///< in which it was followed
   };
   VideoInfo video;
-  double watched_s = 0.0;    ///< length of what was looked at
   double restless = 0.0;     ///< share of the picture that changes most of the time
   std::optional<Body> body;  ///< the body that moves most plainly, if any
 };
