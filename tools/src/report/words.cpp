@@ -34,10 +34,9 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                 std::isfinite(facts.rms_axis_sigma)
                     ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
                     : "");
-  const bool doubtful = !fit.converged;
   const bool weak = fit.verdict == "weak";
   const bool wide = facts.rms_axis_sigma > kTooWide;
-  if (doubtful) {
+  if (!fit.converged) {
     const std::string& why = fit.verdict_words.empty() ? fit.reason : fit.verdict_words;
     return {"bad",
             fit.verdict == "no_feature" ? "nothing to fit" : "not trustworthy",

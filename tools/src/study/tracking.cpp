@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands.hpp"
@@ -173,7 +174,7 @@ void print_labels(const Recording& r, const data::TrackFile& file, const Options
   }
 }
 
-void print_speed(const ChildRun& ours, const ChildRun& ffmpeg, std::size_t frames) {
+void print_speed(const ChildRun& ours, const ChildRun& ffmpeg, std::int64_t frames) {
   const auto count = static_cast<double>(frames);
   if (!ffmpeg.started || ffmpeg.exit_status != 0) {
     fmt::print("  {:.0f} frames/s; peak memory {:.0f} MB (no ffmpeg to compare with)\n",
@@ -185,13 +186,10 @@ void print_speed(const ChildRun& ours, const ChildRun& ffmpeg, std::size_t frame
              ours.peak_mb);
 }
 
-/// Frames of the recording from the timing file the track command leaves.
-std::size_t frames_tracked(const fs::path& track_file) {
-  const data::TrackFile file = data::read_track(track_file);
-  std::int64_t last = 0;
-  for (const auto& t : file.tracks)
-    if (!t.samples.empty()) last = std::max(last, t.samples.back().frame + 1);
-  return static_cast<std::size_t>(last);
+/// Frames of the recording, from the timing file that the track command leaves.
+std::int64_t frames_tracked(fs::path track_file) {
+  const std::string timing = data::read_text(track_file.replace_extension(".timing.json"));
+  return nlohmann::json::parse(timing).at("frames").get<std::int64_t>();
 }
 
 /// False if the recording could not be tracked.

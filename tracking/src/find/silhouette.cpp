@@ -10,7 +10,7 @@
 namespace trochoid::tracking {
 namespace {
 
-/// Integer factor that brings the longer side to about 400 px, at least 1.
+/// Integer factor that brings the longer side to 320 px or as little more as it can, at least 1.
 int reduction(const cv::Size& size) {
   return std::max(1, std::max(size.width, size.height) / 320);
 }
