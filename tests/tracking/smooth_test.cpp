@@ -79,5 +79,20 @@ TEST(SmoothTrack, InterpolatesShortGapsMarksThemAndLeavesLongOnes) {
   EXPECT_NEAR(smoothed.table.column("x_px")[31], 131.0, 0.05);
 }
 
+TEST(Smooth, TellsHowManySamplesWereTooFewTogether) {
+  data::TrackFile file;
+  file.tracks.emplace_back();
+  for (const int frame : {0, 1, 2, 3, 4, 5, 6, 7, 100, 101, 102}) {
+    data::TrackSample sample;
+    sample.frame = frame;
+    sample.t_s = 0.01 * frame;
+    sample.centre_px = {truth(sample.t_s), 0.1 * truth(2.0 * sample.t_s)};
+    file.tracks.front().samples.push_back(sample);
+  }
+  const SmoothTrack smoothed = smooth_track(file);
+  EXPECT_EQ(smoothed.table.values.rows(), 8);
+  EXPECT_EQ(smoothed.left_out, 3);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -67,9 +67,16 @@ void detail_tracks(const data::TrackFile& file) {
   }
 }
 
+std::string smooth_words(const tracking::SmoothTrack& smoothed) {
+  std::string words = fmt::format(" {} interpolated,", smoothed.interpolated);
+  if (smoothed.left_out > 0)
+    words += fmt::format(" {} too few together to be smoothed,", smoothed.left_out);
+  return words;
+}
+
 /// How many frames showed what, for people or for scripts.
 void tell(const Options& options, const tracking::TrackResult& result,
-          std::optional<std::int64_t> interpolated) {
+          const std::optional<tracking::SmoothTrack>& smoothed) {
   const tracking::TrackSummary& s = result.summary;
   if (!options.json) {
     const std::size_t count = result.file.tracks.size();
@@ -78,8 +85,7 @@ void tell(const Options& options, const tracking::TrackResult& result,
         fmt::format("{}: {} in {} frames: {} found, {} lost, {} doubtful,{} {} frames "
                     "damaged; metres: {}",
                     options.output.string(), bodies, s.frames, s.found, s.lost, s.doubtful,
-                    interpolated ? fmt::format(" {} interpolated,", *interpolated) : "", s.damaged,
-                    s.camera_words));
+                    smoothed ? smooth_words(*smoothed) : "", s.damaged, s.camera_words));
     for (const std::string& line : result.file.notes) note(line);
     return;
   }
@@ -92,9 +98,10 @@ void tell(const Options& options, const tracking::TrackResult& result,
                                  {"damaged", s.damaged},
                                  {"metres", s.camera_words},
                                  {"notes", result.file.notes}};
-  if (interpolated) {
+  if (smoothed) {
     summary["smooth"] = options.smooth.string();
-    summary["interpolated"] = *interpolated;
+    summary["interpolated"] = smoothed->interpolated;
+    summary["left_out"] = smoothed->left_out;
   }
   print_json(summary);
 }
@@ -120,16 +127,15 @@ void run(const Options& options) {
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   data::write_track(result.file, options.output);
-  std::optional<std::int64_t> interpolated;
+  std::optional<tracking::SmoothTrack> smoothed;
   if (!options.smooth.empty()) {
-    const tracking::SmoothTrack smoothed = tracking::smooth_track(result.file);
-    data::write_table(smoothed.table, options.smooth);
-    interpolated = smoothed.interpolated;
+    smoothed = tracking::smooth_track(result.file);
+    data::write_table(smoothed->table, options.smooth);
   }
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   write_timing(options.output, elapsed.count(), result.summary);
   detail_tracks(result.file);
-  tell(options, result, interpolated);
+  tell(options, result, smoothed);
   check_found(result.file, scene.tracking.objects);
 }
 

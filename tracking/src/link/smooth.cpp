@@ -150,6 +150,8 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
 
 namespace {
 
+constexpr std::int64_t kFewest = 6;  // samples that tell how a body moves
+
 /// Consecutive frames of one body, measured or interpolated.
 struct Stretch {
   std::vector<std::int64_t> frame;
@@ -179,13 +181,13 @@ std::vector<Stretch> stretches_of(const data::Track& track) {
     all.back().t_s.push_back(sample.t_s);
     all.back().sample.push_back(&sample);
   }
-  // Too short to tell how it moves.
-  std::erase_if(all, [](const Stretch& s) {
-    return s.frame.size() -
-               static_cast<std::size_t>(std::count(s.sample.begin(), s.sample.end(), nullptr)) <
-           6;
-  });
   return all;
+}
+
+/// Samples of a stretch.
+std::int64_t measured(const Stretch& stretch) {
+  return std::count_if(stretch.sample.begin(), stretch.sample.end(),
+                       [](const auto* sample) { return sample != nullptr; });
 }
 
 std::vector<SmoothState> smoothed(const Stretch& stretch, int axis, bool metres) {
@@ -210,6 +212,10 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
   std::vector<double> cells;
   for (const data::Track& track : file.tracks)
     for (const Stretch& stretch : stretches_of(track)) {
+      if (measured(stretch) < kFewest) {
+        result.left_out += measured(stretch);
+        continue;
+      }
       const bool metres = std::all_of(stretch.sample.begin(), stretch.sample.end(), [](auto* s) {
         return s == nullptr || (s->has_metres() && s->has_covariance());
       });

@@ -23,10 +23,12 @@ struct SmoothState {
                                               const std::vector<double>& sigma);
 
 /// The smoothed columns of a track (docs/formats.md), one row per frame from its first to its last,
-/// frames of short gaps interpolated and marked; longer gaps stay gaps.
+/// frames of short gaps interpolated and marked; longer gaps stay gaps. Between two of them at
+/// least six samples are needed to tell how the body moves: fewer are left out.
 struct SmoothTrack {
   data::Table table;
   std::int64_t interpolated = 0;  ///< rows
+  std::int64_t left_out = 0;      ///< samples without a row
 };
 [[nodiscard]] SmoothTrack smooth_track(const data::TrackFile& file);
 
