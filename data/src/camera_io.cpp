@@ -94,6 +94,15 @@ Camera read_camera(const std::filesystem::path& path) {
   return camera;
 }
 
+std::optional<Camera> camera_of(const Scene& scene, int width_px, int height_px) {
+  const CameraSettings& given = scene.camera;
+  if (!given.file.empty()) return read_camera(given.file);
+  if (!given.scale_px_per_m) return std::nullopt;
+  if (given.height_m)
+    return Camera::overhead(width_px, height_px, *given.scale_px_per_m, *given.height_m);
+  return Camera::from_scale(width_px, height_px, *given.scale_px_per_m);
+}
+
 void write_camera(const Camera& camera, const std::filesystem::path& path) {
   nlohmann::ordered_json json;
   json["width"] = camera.width_px;

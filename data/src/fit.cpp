@@ -1,6 +1,7 @@
 #include "trochoid/data/fit.hpp"
 
 #include <algorithm>
+#include <string>
 
 namespace trochoid::data {
 
@@ -8,6 +9,11 @@ const FitParameter* Fit::find(const std::string& name) const {
   const auto found = std::find_if(parameters.begin(), parameters.end(),
                                   [&](const FitParameter& p) { return p.name == name; });
   return found == parameters.end() ? nullptr : &*found;
+}
+
+const FitParameter* Fit::find(const std::string& name, std::size_t arc) const {
+  const FitParameter* own = arc > 0 ? find(name + "@" + std::to_string(arc)) : nullptr;
+  return own != nullptr ? own : find(name);
 }
 
 }  // namespace trochoid::data

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "commands.hpp"
+#include "common/not_good.hpp"
 
 namespace trochoid::tools {
 namespace {

@@ -1,14 +1,10 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
+#include "common/not_good.hpp"
+
 /// One subcommand per file; each adds itself to the program.
 namespace trochoid::tools {
-
-/// Thrown by a command that finished but whose answer is not good (no convergence, broken track):
-/// the files are written, the exit status is 3.
-struct NotGood : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 void add_simulate_command(CLI::App& app);
 void add_manual_command(CLI::App& app);

@@ -31,17 +31,10 @@ namespace fs = std::filesystem;
 std::optional<data::Camera> resolve_camera(const data::Scene& scene,
                                            const std::optional<data::Camera>& given,
                                            const VideoInfo& video, const fs::path& recording) {
-  std::optional<data::Camera> camera = given;
-  if (!camera && !scene.camera.file.empty()) camera = data::read_camera(scene.camera.file);
-  if (camera) {
-    camera->check_size(video.width_px, video.height_px, recording.string());
-    return camera;
-  }
-  if (!scene.camera.scale_px_per_m) return std::nullopt;
-  const double scale = *scene.camera.scale_px_per_m;
-  return scene.camera.height_m ? data::Camera::overhead(video.width_px, video.height_px, scale,
-                                                        *scene.camera.height_m)
-                               : data::Camera::from_scale(video.width_px, video.height_px, scale);
+  std::optional<data::Camera> camera =
+      given ? given : data::camera_of(scene, video.width_px, video.height_px);
+  if (camera) camera->check_size(video.width_px, video.height_px, recording.string());
+  return camera;
 }
 
 bool has_shape(const data::Scene& scene) {

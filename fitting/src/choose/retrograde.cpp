@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/mean_path.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -13,12 +14,6 @@ std::optional<double> retrograde_from_s(const data::Fit& fit, const data::Scene&
   const bool rim = fit.model == "rolling" || fit.model == "sliding";
   if (!rim || !fit.converged || fit.arcs.size() != 1) return std::nullopt;
   const auto predictor = model::make_predictor(scene);
-  const auto& parameters = predictor->parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const data::FitParameter* fitted = fit.find(parameters[i].name);
-    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
-  }
   const double from_s = fit.arcs[0].from_s, duration_s = fit.arcs[0].to_s - from_s;
   constexpr double kRate_Hz = 1000.0;  // tens of rows to a turn
   const int rows = std::clamp(static_cast<int>(kRate_Hz * duration_s), 200, 30000);
@@ -28,7 +23,7 @@ std::optional<double> retrograde_from_s(const data::Fit& fit, const data::Scene&
   request.t_s = t_s;
   request.start_s = from_s;
   request.observables.push_back(model::Observable::phi_rad);
-  const Eigen::VectorXd run = predictor->predict(values, request).values;
+  const Eigen::VectorXd run = predictor->predict(fitted_values(*predictor, fit), request).values;
   Eigen::Index good = 0;
   while (good < rows && run.segment<3>(3 * good).allFinite()) ++good;
   const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>> path(run.data(), 3, good);

@@ -106,24 +106,6 @@ ArcData seen_at(const std::vector<const data::TrackSample*>& samples) {
   return arc;
 }
 
-// Values of all parameters of a predictor for an arc of a fit.
-Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Scene& scene,
-                              const data::Fit& fit, int arc) {
-  const auto& parameters = predictor.parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const std::string& name = parameters[i].name;
-    const data::FitParameter* fitted =
-        arc > 0 ? fit.find(fmt::format("{}@{}", name, arc)) : nullptr;
-    if (fitted == nullptr) fitted = fit.find(name);
-    const auto fixed = scene.fit.fixed.find(name);
-    values[static_cast<Eigen::Index>(i)] = fitted != nullptr                ? fitted->value
-                                           : fixed != scene.fit.fixed.end() ? fixed->second
-                                                                            : parameters[i].value;
-  }
-  return values;
-}
-
 // Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
 Squares squares_of(const data::Track& track, int first, int last, int track_index,
                    const data::Scene& scene, const data::Fit& fit) {
@@ -136,7 +118,7 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   data::Scene measured = scene;
   const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
   const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
-  const Eigen::VectorXd values = fitted_values(*predictor, scene, fit, arc);
+  const Eigen::VectorXd values = fitted_values(*predictor, fit, static_cast<std::size_t>(arc));
   std::vector<double> t_s;
   std::vector<const data::TrackSample*> samples;
   for (int i = first; i < last; ++i) {
@@ -318,7 +300,7 @@ bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung
       rung.scene.model.name != "sliding" || rung.rolls_at_first)
     return false;
   const auto predictor = model::make_predictor(rung.scene);
-  const Eigen::VectorXd values = fitted_values(*predictor, rung.scene, rung.fit, 0);
+  const Eigen::VectorXd values = fitted_values(*predictor, rung.fit);
   const auto value = [&](const char* name) { return values[predictor->index_of(name)]; };
   const Eigen::Vector2d v_m_s(value("vx_m_s"), value("vy_m_s"));
   const double slip_m_s = (v_m_s - rolling_velocity(*predictor, values).m_s).norm();

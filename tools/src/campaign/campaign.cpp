@@ -7,7 +7,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "commands.hpp"
 #include "common/child_process.hpp"
 #include "common/recording_name.hpp"
 #include "report/run_folder.hpp"
@@ -147,7 +146,8 @@ std::vector<std::pair<std::string, std::string>> checksums(const CampaignItem& i
 
 }  // namespace
 
-void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items) {
+void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items,
+                 const std::function<void(const std::vector<std::string>& words)>& check_run) {
   std::string first;
   int wrong = 0;
   for (const CampaignItem* item : items) try {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,8 +29,10 @@ struct Campaign {
 
 /// Before any is run: every one must have its files, a scene that can be read, and options that
 /// `trochoid run` takes. What only the recording itself tells stays with its own run.
+/// @param check_run  given the words after `trochoid run`, throws InputError where that would.
 /// @throws InputError naming the first that cannot be run, and how many more there are.
-void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items);
+void check_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items,
+                 const std::function<void(const std::vector<std::string>& words)>& check_run);
 
 /// What is known of an item after it was run; survives as records/NAME.json.
 struct CampaignRecord {

@@ -141,7 +141,7 @@ void run(const Options& options) {
   const Campaign campaign = read_campaign(options.manifest);
   std::vector<const CampaignItem*> items;
   if (!options.summary_only) items = items_to_run(campaign, options);
-  check_items(campaign, items);
+  check_items(campaign, items, check_run);
   std::error_code code;
   fs::create_directories(campaign.folder / "records", code);
   if (code)

@@ -42,7 +42,10 @@ OverlayInput read_inputs(const Options& options) {
     input.scene = data::read_scene(options.scene);
   else if (input.fit)
     input.scene = scene_of_fit(*input.fit, options.fit);
-  if (!options.camera.empty()) input.camera = data::read_camera(options.camera);
+  if (!options.camera.empty())
+    input.camera = data::read_camera(options.camera);
+  else if (!options.scene.empty() && !input.scene->camera.file.empty())
+    input.camera = data::read_camera(input.scene->camera.file);  // one that is gone is named
   input.fit_track = options.fit_track;
   return input;
 }

@@ -107,13 +107,7 @@ data::Camera camera_over(const Motion& motion, const data::Body& body, int width
 
 data::Camera camera_of(const Options& options, const data::Scene& scene, const Motion& motion) {
   if (!options.camera.empty()) return data::read_camera(options.camera);
-  if (!scene.camera.file.empty()) return data::read_camera(scene.camera.file);
-  if (scene.camera.scale_px_per_m && scene.camera.height_m)
-    return data::Camera::overhead(options.width_px, options.height_px, *scene.camera.scale_px_per_m,
-                                  *scene.camera.height_m);
-  if (scene.camera.scale_px_per_m)
-    return data::Camera::from_scale(options.width_px, options.height_px,
-                                    *scene.camera.scale_px_per_m);
+  if (auto camera = data::camera_of(scene, options.width_px, options.height_px)) return *camera;
   return camera_over(motion, *scene.body, options.width_px, options.height_px);
 }
 

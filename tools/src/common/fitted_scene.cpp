@@ -47,8 +47,7 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
 
 /// The fit's value of a parameter in one arc; initial states of later arcs are marked "@arc".
 std::optional<double> value_of(const data::Fit& fit, const std::string& name, std::size_t arc) {
-  const data::FitParameter* found = arc > 0 ? fit.find(fmt::format("{}@{}", name, arc)) : nullptr;
-  if (found == nullptr) found = fit.find(name);
+  const data::FitParameter* found = fit.find(name, arc);
   return found != nullptr ? std::optional(found->value) : std::nullopt;
 }
 

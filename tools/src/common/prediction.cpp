@@ -10,6 +10,7 @@
 #include "common/fitted_scene.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::tools {
@@ -62,20 +63,6 @@ std::vector<double> grid_of(const data::Track& track, const data::FitArc& arc) {
   return grid;
 }
 
-Eigen::VectorXd values_of(const model::Predictor& predictor, const data::Fit& fit,
-                          std::size_t arc_index) {
-  const auto& infos = predictor.parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(infos.size()));
-  for (std::size_t i = 0; i < infos.size(); ++i) {
-    const bool own = infos[i].role == model::ParameterInfo::Role::initial;
-    const data::FitParameter* found =
-        own && arc_index > 0 ? fit.find(fmt::format("{}@{}", infos[i].name, arc_index)) : nullptr;
-    if (found == nullptr) found = fit.find(infos[i].name);
-    values[static_cast<Eigen::Index>(i)] = found != nullptr ? found->value : infos[i].value;
-  }
-  return values;
-}
-
 bool models_tilt(const std::string& model) {
   return model != "puck" && model != "pivot";
 }
@@ -120,7 +107,8 @@ PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
   request.start_s = arc_start_s(fit, arc_index);
   request.observables = observables_of(predictor.model_name());
   request.lies_where_it_fell = true;
-  const model::Prediction run = predictor.predict(values_of(predictor, fit, arc_index), request);
+  const model::Prediction run =
+      predictor.predict(fitting::fitted_values(predictor, fit, arc_index), request);
   const bool goes_on =
       run.outcome == model::Outcome::reached_end || run.outcome == model::Outcome::flat;
   if (!goes_on) replayed.ended = sentence(run.outcome);
@@ -182,7 +170,8 @@ std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data
     request.t_s = grid;
     request.start_s = arc_start_s(fit, i);
     request.tolerance = tolerance;
-    const model::Prediction run = predictor->predict(values_of(*predictor, fit, i), request);
+    const model::Prediction run =
+        predictor->predict(fitting::fitted_values(*predictor, fit, i), request);
     if (run.outcome != model::Outcome::reached_end) return std::nullopt;
     return run.values;
   }

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <map>
 
-#include "commands.hpp"
+#include "common/not_good.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {

@@ -26,10 +26,10 @@ bool has_shape(const std::optional<data::Scene>& scene) {
 
 }  // namespace
 
-std::optional<data::Camera> camera_of(const data::Scene& scene) {
+// A camera file may have gone since.
+bool has_camera(const data::Scene& scene) {
   std::error_code ignored;
-  if (scene.camera.file.empty() || !fs::exists(scene.camera.file, ignored)) return std::nullopt;
-  return data::read_camera(scene.camera.file);
+  return scene.camera.file.empty() || fs::exists(scene.camera.file, ignored);
 }
 
 std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks, int width_px,
@@ -73,7 +73,8 @@ OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int heig
       scene_(scene_of(input)),
       camera_(input.camera),
       frame_times_(input.tracks) {
-  if (!camera_ && scene_) camera_ = camera_of(*scene_);
+  if (!camera_ && scene_ && has_camera(*scene_))
+    camera_ = data::camera_of(*scene_, width_px, height_px);
   if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
   if (input.fit && !input.fit->parameters.empty())
     prediction_ = replay(*input.fit, tracks_, input.fit_track);

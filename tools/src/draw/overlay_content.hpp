@@ -88,9 +88,6 @@ class OverlayContent {
   double first_s_ = 0.0, last_s_ = 0.0;
 };
 
-/// The camera of a scene: its file, or nothing if there is none or it cannot be found any more.
-[[nodiscard]] std::optional<data::Camera> camera_of(const data::Scene& scene);
-
 /// The straight-down view that carries the track's metres into its pixels (least squares over
 /// scale, turn and shift); nothing if the track lacks either or does not move.
 [[nodiscard]] std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks,

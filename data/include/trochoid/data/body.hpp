@@ -15,6 +15,7 @@ struct SpinMark {
   double angle_rad = 0.0;     ///< direction of the dot in the body, from body x; psi turns it
   bool on_upper_face = true;  ///< the face the symmetry axis k points out of
   bool on_lower_face = false;
+  friend bool operator==(const SpinMark&, const SpinMark&) = default;
 };
 
 /// Shape and mass of the filmed body: no physics. Lengths in metres, unset values are unknown.

@@ -124,6 +124,8 @@ struct Fit {
 
   /// @returns the parameter of that name, or null.
   [[nodiscard]] const FitParameter* find(const std::string& name) const;
+  /// The same of an arc: its own ("x_m@1") if it has one, else the one all arcs share.
+  [[nodiscard]] const FitParameter* find(const std::string& name, std::size_t arc) const;
 };
 
 }  // namespace trochoid::data

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <system_error>
 
@@ -29,6 +30,9 @@ void write_track(const TrackFile& file, const std::filesystem::path& path);
 void write_fit(const Fit& fit, const std::filesystem::path& path);
 
 [[nodiscard]] Camera read_camera(const std::filesystem::path& path);
+/// The camera of a scene's recordings: its file's, else one above the floor of this picture size
+/// with its scale, perspective if its height is given too; nothing without a scale.
+[[nodiscard]] std::optional<Camera> camera_of(const Scene& scene, int width_px, int height_px);
 void write_camera(const Camera& camera, const std::filesystem::path& path);
 
 /// Body and support of a recording's object.json (see docs/formats.md). Never the law, its

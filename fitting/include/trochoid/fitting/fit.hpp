@@ -49,6 +49,11 @@ struct FitOptions {
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
                             const data::Scene& scene, const FitOptions& options = {});
 
+/// The values of all parameters of a predictor, made of the scene that a fit is of, in one of its
+/// arcs; what the fit says nothing of as the predictor has it.
+[[nodiscard]] Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
+                                            std::size_t arc = 0);
+
 /// The minimiser's library logs rejected steps to stderr; a program that does not want that calls
 /// this once before the first fit.
 void silence_solver_log();
