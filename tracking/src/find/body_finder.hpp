@@ -29,6 +29,10 @@ struct Sighting {
   double shadow = 0.0;
   Evidence evidence{};
   std::vector<EdgePoint> edges;
+
+  /// How plainly the body is seen in its pose [px of its outline]; there must be one. A wrong pose
+  /// may have the longer outline and so the more evidence: how much of it has an edge counts too.
+  [[nodiscard]] double plainness() const { return pose->evidence * accepted; }
 };
 
 /// Picture evidence and what is expected, for one attempt.

@@ -183,13 +183,12 @@ std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& 
 Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const {
   const auto earlier = forecast_.one_frame_before(found);
   if (!earlier) return found;
-  const auto speaks = [](const Sighting& s) { return s.accepted * s.pose->evidence; };
   Look look{.frame = frame, .background = plate_};
   look.predicted = &found;
   look.last = &*earlier;
   look.motion_px = found.centre_px - earlier->centre_px;
   auto again = finder_.find(look);
-  return again && speaks(*again) > speaks(found) ? *again : found;
+  return again && again->plainness() > found.plainness() ? *again : found;
 }
 
 std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,

@@ -119,7 +119,7 @@ class Chain {
   /// Measures both readings and compares what speaks for them.
   void weigh(const std::vector<std::size_t>& chosen) {
     constexpr double kPerShare = 9.0, kMost = 1.5, kNothingThere = 0.6;
-    on_both_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
+    on_all_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
       Node& node = nodes_[chosen[k]];
       if (node.weighed || node.tilt_rad < kLeastTilt) return;
       node.weighed = true;
@@ -142,7 +142,7 @@ class Chain {
   /// Which side of the body is raised shows in the shadow that it throws.
   void weigh_shadows() {
     constexpr double kOfShadow = 2.5, kMost = 1.5;
-    on_both_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       const Glimpse& g = glimpses_[node.at];
@@ -424,7 +424,7 @@ class Chain {
   std::vector<AttitudeDoubt> apply() {
     constexpr double kDoubtful = 2.0;
     std::vector<std::optional<AttitudeDoubt>> doubts(nodes_.size());
-    on_both_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
       Node& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       auto& seen = glimpses_[node.at].seen;

@@ -25,7 +25,7 @@ struct Shift {
 Shift seen_with(const Background& background, const BodyFinder& finder,
                 const std::vector<Glimpse>& glimpses, const std::vector<std::size_t>& which) {
   std::vector<std::optional<Sighting>> seen(which.size());
-  on_both_cores(background, finder, which.size(), [&](Measuring& measure, std::size_t k) {
+  on_all_cores(background, finder, which.size(), [&](Measuring& measure, std::size_t k) {
     const std::size_t i = which[k];
     seen[k] = measure(*glimpses[i].frame, *glimpses[i].seen, glimpses[i - 1].pose());
   });

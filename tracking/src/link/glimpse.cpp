@@ -1,8 +1,10 @@
 #include "link/glimpse.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <future>
+#include <thread>
 
 #include "trochoid/data/quantile.hpp"
 
@@ -108,15 +110,18 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
   return seen;
 }
 
-void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
-                   const std::function<void(Measuring&, std::size_t)>& work) {
-  const auto every_other = [&](std::size_t first) {
+void on_all_cores(const Background& background, const BodyFinder& finder, std::size_t count,
+                  const std::function<void(Measuring&, std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  const auto worker = [&] {
     Measuring measuring(background, finder);
-    for (std::size_t i = first; i < count; i += 2) work(measuring, i);
+    for (std::size_t i = next++; i < count; i = next++) work(measuring, i);
   };
-  auto other = std::async(std::launch::async, every_other, 1);
-  every_other(0);
-  other.get();
+  std::vector<std::future<void>> team;
+  const std::size_t used = std::min<std::size_t>(std::thread::hardware_concurrency(), count);
+  for (std::size_t i = 1; i < used; ++i) team.push_back(std::async(std::launch::async, worker));
+  worker();
+  for (auto& member : team) member.get();
 }
 
 }  // namespace trochoid::tracking

@@ -58,8 +58,9 @@ class Measuring {
   Plate plate_;
 };
 
-/// Runs work(measuring, i) for i of 0..count on two cores.
-void on_both_cores(const Background& background, const BodyFinder& finder, std::size_t count,
+/// Runs work(measuring, i) for i of 0..count on all processors, each next one where one is free.
+/// What it gives must not depend on the order.
+void on_all_cores(const Background& background, const BodyFinder& finder, std::size_t count,
                    const std::function<void(Measuring&, std::size_t)>& work);
 
 /// What the frames around frame i show of the picture: the light beside the outline, and how sharp

@@ -70,7 +70,7 @@ void measure_what_lies(const Background& background, const BodyFinder& finder,
   const BodyFinder* lying_finder = finder.lying();
   if (lying_finder == nullptr) return;
   std::vector<std::optional<Sighting>> found(glimpses.size());
-  on_both_cores(background, *lying_finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+  on_all_cores(background, *lying_finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
     if (!glimpses[i].posed() || !axis_stays(glimpses, i)) return;
     Sighting guess = *glimpses[i].seen;
     const Surroundings surroundings = surroundings_of(glimpses, i);

@@ -96,12 +96,6 @@ struct Neighbours {
   }
 };
 
-/// How plainly a body is seen in its pose. A wrong pose may have the longer outline and so the more
-/// evidence: how much of it is plainly seen counts as well.
-double worth(const Sighting& seen) {
-  return seen.pose->evidence * seen.accepted;
-}
-
 /// Frames in which clearly less speaks for the fit than in those around: it may have settled
 /// beside the body.
 std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
@@ -114,11 +108,11 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
     around.clear(), off.clear();
     for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
          ++k)
-      if (const Glimpse& g = glimpses[k]; g.posed()) around.push_back(worth(*g.seen));
+      if (const Glimpse& g = glimpses[k]; g.posed()) around.push_back(g.seen->plainness());
     if (around.size() < kFewest) continue;
     const double usual = data::median(around);
     for (const double value : around) off.push_back(std::abs(value - usual));
-    poor[i] = worth(*glimpses[i].seen) <
+    poor[i] = glimpses[i].seen->plainness() <
               usual - std::max(kOfUsual * usual, kDeviations * data::median(off));
   }
   return poor;
@@ -289,10 +283,10 @@ class Mending {
         poor_(poor_fits(was)),
         none_(was.size(), false),
         usual_(finder, was) {
-    std::vector<double> worths;
+    std::vector<double> plain;
     for (const Glimpse& g : was)
-      if (g.posed()) worths.push_back(worth(*g.seen));
-    usual_worth_ = data::median(worths);
+      if (g.posed()) plain.push_back(g.seen->plainness());
+    usual_plainness_ = data::median(std::move(plain));
   }
 
   [[nodiscard]] std::optional<Sighting> operator()(Measuring& measure, std::size_t i) const {
@@ -361,8 +355,8 @@ class Mending {
     if (expected.contradicts(now_off, Usual::kMost_rad)) return {};
     const double now = likelihood(now_off, expected);
     if (!before) {
-      if (worth(*seen) < kUsualShare * usual_worth_) return {};
-      const double likely = now * worth(*seen);
+      if (seen->plainness() < kUsualShare * usual_plainness_) return {};
+      const double likely = now * seen->plainness();
       return {std::move(seen), likely};
     }
     const double more = speaks_for(*seen, *before);
@@ -377,7 +371,7 @@ class Mending {
   bool closely_;
   std::vector<bool> poor_, none_;
   Usual usual_;
-  double usual_worth_ = 0.0;  ///< of a sighting
+  double usual_plainness_ = 0.0;  ///< of a sighting
 };
 
 /// Value at time 0 of the parabola that fits values at these times best.
@@ -562,7 +556,7 @@ void mend_from_neighbours(const Background& background, const BodyFinder& finder
     const std::vector<Glimpse> was = glimpses;
     const Mending mend(finder, was, closely);
     std::vector<char> mended(was.size(), 0);
-    on_both_cores(background, finder, was.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background, finder, was.size(), [&](Measuring& measure, std::size_t i) {
       if (!open[i] || (round >= kRounds && was[i].seen)) return;
       if (auto seen = mend(measure, i)) glimpses[i].seen = std::move(seen), mended[i] = 1;
     });
@@ -585,7 +579,7 @@ void measure_again(const Background& background, const BodyFinder& finder, std::
   constexpr double kNear = 0.25;
   const bool alike = finder.faces_look_alike();
   const std::vector<Glimpse> was = glimpses;
-  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+  on_all_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
     if (i < settled || !was[i].posed() || was[i].seen->attitude_doubtful) return;
     const std::optional<Pose> before = one_frame_before(was, i, alike);
     if (!before) return;

@@ -212,10 +212,9 @@ void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
   // hidden by it half to two thirds: some of the latter go with the former.
   constexpr std::size_t kGap = 2;
   constexpr double kFaint = 0.55;
-  const auto speaks = [](const Glimpse& g) { return g.seen->accepted * g.seen->pose->evidence; };
   std::vector<double> usual;
   for (const Glimpse& g : glimpses)
-    if (g.posed()) usual.push_back(speaks(g));
+    if (g.posed()) usual.push_back(g.seen->plainness());
   if (usual.empty()) return;
   const double least = kFaint * data::median(std::move(usual));
   // From the gap on, in either direction of time; the ends of the recording are no gaps.
@@ -225,7 +224,7 @@ void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
     for (; from != to; ++from) {
       if (!from->posed()) {
         ++lost;
-      } else if (seen && lost >= kGap && speaks(*from) < least) {
+      } else if (seen && lost >= kGap && from->seen->plainness() < least) {
         from->seen.reset();
       } else {
         lost = 0;

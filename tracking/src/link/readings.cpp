@@ -172,7 +172,7 @@ class Readings {
     constexpr double kAsGood = -0.05;
     std::vector<std::vector<Start>> found(nodes_.size() / kStride);
     as_tracked_.resize(found.size());
-    on_both_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
       const auto others = finder_.other_readings(nodes_[k].pose());
       for (std::size_t which = 0; which < others.size(); ++which) {
@@ -202,7 +202,7 @@ class Readings {
   /// Of every kStride-th frame of the path that was chosen.
   [[nodiscard]] ReadingTallies tallies() const {
     std::vector<Otherwises> frames(nodes_.size() / kStride);
-    on_both_cores(background_, finder_, frames.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background_, finder_, frames.size(), [&](Measuring& measure, std::size_t i) {
       const std::size_t k = i * kStride + kStride / 2;
       if (is_as_tracked(k)) {
         frames[i] = as_tracked_[i];
@@ -247,7 +247,7 @@ class Readings {
   /// Adds what is found on the way from each start.
   void follow(const std::vector<Start>& starts) {
     std::vector<std::vector<std::pair<std::size_t, Sighting>>> found(starts.size());
-    on_both_cores(background_, finder_, starts.size(), [&](Measuring& measure, std::size_t i) {
+    on_all_cores(background_, finder_, starts.size(), [&](Measuring& measure, std::size_t i) {
       found[i] = followed(measure, starts[i]);
     });
     for (auto& way : found)

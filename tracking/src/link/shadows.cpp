@@ -16,7 +16,7 @@ std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& fi
   const std::vector<Eigen::Vector2d>& places = lamp_places();
   using Shadow = FloorDarkening::Shadow;
   std::vector<std::vector<Shadow>> shadows(count, std::vector<Shadow>(places.size()));
-  on_both_cores(background, finder, count, [&](Measuring& measure, std::size_t i) {
+  on_all_cores(background, finder, count, [&](Measuring& measure, std::size_t i) {
     const Glimpse& g = *seen[i * seen.size() / count];
     for (const data::Pose<>& pose : {g.pose(), *finder.mirror_image(g.pose())})
       if (const auto floor = measure.floor_around(*g.frame, *g.seen, pose))
@@ -41,7 +41,7 @@ std::optional<Lamp> find_lamp(const Background& background, const BodyFinder& fi
 void look_at_shadows(const Background& background, const BodyFinder& finder,
                      std::vector<Glimpse>& glimpses) {
   if (!background.lamp()) return;
-  on_both_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+  on_all_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
     Glimpse& g = glimpses[i];
     if (g.posed()) g.seen->shadow = measure.shadow(*g.frame, *g.seen, g.pose());
   });
