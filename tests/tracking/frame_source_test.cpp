@@ -237,6 +237,13 @@ TEST_F(FrameSourceTest, PicturesComeByTheirNumbersThoughTheseHaveNoLeadingZeros)
   }
 }
 
+TEST_F(FrameSourceTest, APatternMeansTheImagesThatItMatches) {
+  std::ofstream(folder_ / "notes.txt") << "of the day";
+  EXPECT_THAT(error_of(folder_ / "n*"), HasSubstr("no images have such names"));
+  cv::imwrite((folder_ / "n1.png").string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10.0)));
+  EXPECT_EQ(open_video(folder_ / "n*", {.frame_rate_hz = 10.0})->info().frames, 1);
+}
+
 TEST_F(FrameSourceTest, AMissingPictureShiftsNoOthersInTime) {
   for (const int number : {98, 99, 100, 103, 104})
     for (const char* name : {"padded_%04d.png", "plain_%d.png"})

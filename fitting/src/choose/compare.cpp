@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "choose/climb.hpp"
@@ -61,15 +62,15 @@ std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {
 }
 
 // Of the others the comparison does not need to know.
-std::vector<Rung*> near_ones(Rungs& rungs, const Rung& chosen) {
+std::vector<Rung*> near_ones(Rungs& rungs, const Rung& chosen, double evidence_against) {
   std::vector<Rung*> near;
   for (Rung& rung : rungs)
-    if (rung.bic < chosen.bic + most_evidence_against(chosen)) near.push_back(&rung);
+    if (rung.bic < chosen.bic + evidence_against) near.push_back(&rung);
   return near;
 }
 
 void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const Rung& chosen) {
-  side_by_side(contest, near_ones(rungs, chosen),
+  side_by_side(contest, near_ones(rungs, chosen, most_evidence_against(chosen)),
                [&](std::size_t, Rung& rung, const FitOptions& options) {
                  predict_held_back(contest.tracks, options, rung);
                });
@@ -79,16 +80,19 @@ void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const 
 // in softly it is looked into only now: on the way it makes many more sets of losses alike.
 void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& chosen) {
   if (chosen.rolls_at_first || softness_is_open(chosen)) return;
-  const std::vector<Rung*> near = near_ones(rungs, chosen);
-  const auto own = std::find(near.begin(), near.end(), &chosen);
-  if (own == near.end()) return;
+  const auto own =
+      std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) { return &rung == &chosen; });
+  if (own == rungs.end()) return;
   const double aicc = chosen.aicc, bic = chosen.bic;
   const int parameters = chosen.parameters;
-  let_roll_at_first(contest.tracks, contest.options, **own);
+  let_roll_at_first(contest.tracks, contest.options, *own);
   if (!chosen.rolls_at_first) return;
-  side_by_side(contest, near, [&](std::size_t, Rung& rung, const FitOptions& options) {
-    if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);
-  });
+  // The others, too, have the velocity to save, and may come into question then.
+  const double saved = (parameters - chosen.parameters) * std::log(chosen.fit.dof + parameters);
+  side_by_side(contest, near_ones(rungs, chosen, kVeryStrong + saved),
+               [&](std::size_t, Rung& rung, const FitOptions& options) {
+                 if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);
+               });
   for (Rung& rung : rungs) {
     if (!rung.as_promised) continue;  // beside the chosen one, whose scores are others now
     rung.aicc += chosen.aicc - aicc;

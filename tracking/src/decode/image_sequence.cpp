@@ -91,6 +91,10 @@ Pictures pictures_like(const fs::path& pattern) {
     pictures.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
   ::globfree(&found);
   if (pictures.empty()) throw InputError(fmt::format("{}: no such file", pattern.string()));
+  std::erase_if(pictures, [](const fs::path& file) { return !is_image(file); });
+  if (pictures.empty())
+    throw InputError(fmt::format("{}: no images have such names; of videos name one at a time",
+                                 pattern.string()));
   return pictures;
 }
 
