@@ -62,20 +62,16 @@ TEST_P(EveryMethod, StopsAtAnEventAndNamesIt) {
 }
 
 // y' = -1 from 1: nothing at 0.5 s, which is asked for.
+template <class S>
 struct Descent {
-  using Scalar = Dual<4>;
+  using Scalar = S;
   static constexpr int kStates = 1;
-  void derivative(double, const State<Scalar, 1>&, State<Scalar, 1>& dy) const { dy[0] = -1.0; }
-  struct Plain {
-    using Scalar = double;
-    static constexpr int kStates = 1;
-    void derivative(double, const State<double, 1>&, State<double, 1>& dy) const { dy[0] = -1.0; }
-  };
-  [[nodiscard]] Plain values() const { return {}; }
+  void derivative(double, const State<S, 1>&, State<S, 1>& dy) const { dy[0] = S(-1.0); }
+  [[nodiscard]] Descent<double> values() const { return {}; }
 };
 
 TEST_P(EveryMethod, StopsAtAnEventRightWhereATimeIsAskedFor) {
-  Ode ode = make_ode(Descent{});
+  Ode ode = make_ode(Descent<Dual<4>>{});
   ode.events = 1;
   ode.event_functions = [](double, const double* y, double* g) { g[0] = y[0] - 0.5; };
   const std::array<double, 5> times{0.0, 0.25, 0.5, 0.75, 1.0};

@@ -39,6 +39,9 @@ const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& 
 data::Scene scene_in(const data::Fit& fit) {
   data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in the fit");
   if (scene.model.name == "auto") scene.model.name = fit.model;
+  // A friction that the scene did not name was found all the same.
+  if (const data::FitParameter* friction = fit.find("friction"))
+    if (!scene.model.friction) scene.model.friction = friction->value;
   return scene;
 }
 

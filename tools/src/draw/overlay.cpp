@@ -217,6 +217,9 @@ std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
   (void)data::parse_window(options.from, options.to);  // what is wrong is told as it was given
   source.from = as_frame(times, options.from, true);
   source.to = as_frame(times, options.to, false);
+  if (data::Window{data::parse_moment(source.from), data::parse_moment(source.to)}.reversed())
+    throw InputError(fmt::format("no frame lies between from = {} and to = {}; make that longer",
+                                 options.from, options.to));
   if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
   source.untimed_rate_hz = rate_of(input.tracks);
   return tracking::open_video(input.video, source);

@@ -4,9 +4,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -30,6 +32,25 @@ bool has_shape(const std::optional<data::Scene>& scene) {
 bool has_camera(const data::Scene& scene) {
   std::error_code ignored;
   return scene.camera.file.empty() || fs::exists(scene.camera.file, ignored);
+}
+
+// Whether a track's metres were seen through this camera: somewhere between the floor and a radius
+// above it each centre lies on its pixel, but for those that are doubtful.
+bool saw(const data::Camera& camera, const data::TrackFile& tracks, double radius_m) {
+  constexpr double kFewPx = 3.0;
+  std::vector<double> off_px;
+  for (const data::Track& track : tracks.tracks)
+    for (const data::TrackSample& sample : track.samples) {
+      if (!sample.has_metres() || !sample.centre_px.allFinite()) continue;
+      const auto seen = [&](double z_m) {
+        return camera.image_from_table<double>({sample.centre_m.x(), sample.centre_m.y(), z_m});
+      };
+      const Eigen::Vector2d low = seen(0.0), along = seen(radius_m) - low;
+      const double length2 = std::max(along.squaredNorm(), 1e-12);
+      const double at = std::clamp((sample.centre_px - low).dot(along) / length2, 0.0, 1.0);
+      off_px.push_back((sample.centre_px - low - at * along).norm());
+    }
+  return off_px.empty() || data::median(std::move(off_px)) < kFewPx;
 }
 
 std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks, int width_px,
@@ -73,8 +94,13 @@ OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int heig
       scene_(scene_of(input)),
       camera_(input.camera),
       frame_times_(input.tracks) {
-  if (!camera_ && scene_ && has_camera(*scene_))
+  if (!camera_ && scene_ && has_camera(*scene_)) {
     camera_ = data::camera_of(*scene_, width_px, height_px);
+    // A scale does not say where metres are counted from.
+    if (camera_ && scene_->camera.file.empty() &&
+        !saw(*camera_, tracks_, scene_->body ? scene_->body->radius_m : 0.0))
+      camera_.reset();
+  }
   if (!camera_) camera_ = camera_from_track(tracks_, width_px, height_px);
   if (input.fit && !input.fit->parameters.empty())
     prediction_ = replay(*input.fit, tracks_, input.fit_track);

@@ -276,7 +276,11 @@ class LibavSource final : public FrameSource {
       if (std::abs(step - whole) < kNear) {
         const std::int64_t told = anchor_place_ + static_cast<std::int64_t>(whole);
         if (told < next) return next;  // one stamp twice
-        place = told;
+        // Where stamps only jitter, those since the first tell of no loss.
+        const double since = static_cast<double>(stamp - first_stamp_) *
+                             av_q2d(stream_->time_base) * steady_rate_hz_;
+        place = std::min(told, std::max<std::int64_t>(
+                                   next, static_cast<std::int64_t>(std::floor(since + kNear))));
       }
     }
     anchor_stamp_ = stamp;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <future>
+#include <system_error>
 #include <thread>
 
 #include "trochoid/data/quantile.hpp"
@@ -119,7 +120,10 @@ void on_all_cores(const Background& background, const BodyFinder& finder, std::s
   };
   std::vector<std::future<void>> team;
   const std::size_t used = std::min<std::size_t>(std::thread::hardware_concurrency(), count);
-  for (std::size_t i = 1; i < used; ++i) team.push_back(std::async(std::launch::async, worker));
+  try {
+    for (std::size_t i = 1; i < used; ++i) team.push_back(std::async(std::launch::async, worker));
+  } catch (const std::system_error&) {  // no more threads to be had: those there are do the work
+  }
   worker();
   for (auto& member : team) member.get();
 }
