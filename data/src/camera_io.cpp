@@ -41,7 +41,8 @@ Eigen::Matrix3d rotation(const JsonReader& json, const char* key) {
   if (!(error < kRoundedByHand) || R.determinant() < 0.0)
     json.fail(
         fmt::format("\"{}\" is no rotation (its rows must be orthonormal, right-handed)", key));
-  // Its transpose is taken for its inverse: of rounded digits that would be off by pixels.
+  // Its transpose is taken for its inverse: of three digits that would be off by a tenth of a
+  // pixel.
   constexpr double kExact = 1e-12;
   if (error < kExact) return R;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);

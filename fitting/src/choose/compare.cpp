@@ -88,7 +88,8 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
   let_roll_at_first(contest.tracks, contest.options, *own);
   if (!chosen.rolls_at_first) return;
   // The others, too, have the velocity to save, and may come into question then.
-  const double saved = (parameters - chosen.parameters) * std::log(chosen.fit.dof + parameters);
+  const double saved =
+      (parameters - chosen.parameters) * std::log(chosen.fit.dof + chosen.parameters);
   side_by_side(contest, near_ones(rungs, chosen, kVeryStrong + saved),
                [&](std::size_t, Rung& rung, const FitOptions& options) {
                  if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);

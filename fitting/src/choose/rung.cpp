@@ -375,9 +375,9 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
         hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
                             parameters_of(rung.scene));
       own.strategy = "auto";
+      // A search may find another law of friction than what it goes on from.
       Rung searched = rung;
-      searched.scene =
-          asked;  // a search may find another law of friction than what it goes on from
+      searched.scene = asked;
       if (softness_is_open(searched)) {
         fit_softly(tracks, own, searched);
         keep_better(std::move(searched), rung);

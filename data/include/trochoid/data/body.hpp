@@ -28,8 +28,7 @@ struct Body {
   double axle_radius_m = 0.0;   ///< thin axle along k (tops), 0 = none
   double axle_above_m = 0.0;    ///< how far the axle sticks out of the upper face
   std::optional<double> mass_kg;
-  std::optional<double>
-      I_kg_m2;  ///< transverse moment; about the pivot for tops, else about the CoM
+  std::optional<double> I_kg_m2;   ///< transverse moment; of tops about the pivot, else the CoM
   std::optional<double> Is_kg_m2;  ///< axial moment
   std::optional<double> l_m;       ///< pivot to CoM along k (tops)
   std::vector<SpinMark> marks;

@@ -32,6 +32,7 @@ void write_fit(const Fit& fit, const std::filesystem::path& path);
 [[nodiscard]] Camera read_camera(const std::filesystem::path& path);
 /// The camera of a scene's recordings: its file's, else one above the floor of this picture size
 /// with its scale, perspective if its height is given too; nothing without a scale.
+/// @throws InputError if the file cannot be read.
 [[nodiscard]] std::optional<Camera> camera_of(const Scene& scene, int width_px, int height_px);
 void write_camera(const Camera& camera, const std::filesystem::path& path);
 
