@@ -87,24 +87,25 @@ bool needs_mass(const data::ModelSettings& model, std::string& term) {
 
 }  // namespace
 
+RimBody rim_body(const data::Body& body, double gravity_m_s2) {
+  if (!(gravity_m_s2 > 0.0))
+    throw InputError(fmt::format("gravity_m_s2 = {} must be greater than 0", gravity_m_s2));
+  const CentralInertia inertia = central_inertia(body);
+  return {.m = inertia.mass_kg,
+          .A = inertia.transverse_kg_m2,
+          .C = inertia.axial_kg_m2,
+          .R = body.radius_m,
+          .h = body.half_thickness_m(),
+          .g = gravity_m_s2};
+}
+
 RimBody rim_body(const data::Scene& scene) {
   if (!scene.body) throw InputError("[body] is missing: this model needs kind and radius_m");
-  const CentralInertia inertia = central_inertia(*scene.body);
   std::string term;
-  if (!inertia.mass_known && needs_mass(scene.model, term))
+  if (!central_inertia(*scene.body).mass_known && needs_mass(scene.model, term))
     throw InputError(fmt::format(
         "body.mass_kg is missing: model.{} acts as coefficient over mass; weigh the body", term));
-  if (!(scene.model.gravity_m_s2 > 0.0))
-    throw InputError(
-        fmt::format("model.gravity_m_s2 = {} must be greater than 0", scene.model.gravity_m_s2));
-  RimBody body;
-  body.m = inertia.mass_kg;
-  body.A = inertia.transverse_kg_m2;
-  body.C = inertia.axial_kg_m2;
-  body.R = scene.body->radius_m;
-  body.h = scene.body->half_thickness_m();
-  body.g = scene.model.gravity_m_s2;
-  return body;
+  return rim_body(*scene.body, scene.model.gravity_m_s2);
 }
 
 RimStart rim_start(const data::Scene& scene, const RimBody& body) {

@@ -10,7 +10,9 @@
 /// From a scene to the bodies, terms and start of the models with rim contact.
 namespace trochoid::model {
 
-/// @throws InputError if the body is no disc or ring, or a term needs a mass that is not given.
+/// @throws InputError if the body is no disc or ring or there is no gravity; of a scene also if a
+/// term needs a mass that is not given.
+[[nodiscard]] RimBody rim_body(const data::Body& body, double gravity_m_s2);
 [[nodiscard]] RimBody rim_body(const data::Scene& scene);
 
 /// Start of a rim model; rates as node components. Velocity of the centre, where it is a state.

@@ -223,12 +223,7 @@ RimRecord run_job(const RimJob& job, double tolerance, double stick) {
   });
 }
 
-struct ContactChoice {
-  Method method = Method::dop853;
-  std::string name = "dop853", reason;
-};
-
-ContactChoice choose(const RimJob& job, const std::string& asked, double tolerance) {
+Choice choose(const RimJob& job, const std::string& asked, double tolerance) {
   const bool exact = job.law == "sliding" && job.input.eps_v == 0.0;
   if (asked == "auto") {
     if (exact) return {Method::dop853, "dop853", "exact Coulomb law: regimes change at events"};
@@ -261,7 +256,7 @@ ContactChoice choose(const RimJob& job, const std::string& asked, double toleran
         "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
         "impacts take auto or dop853",
         asked));
-  return {choice.method, choice.name, choice.reason};
+  return choice;
 }
 
 RimJob rim_job(const data::Scene& scene, const std::string& law) {
@@ -321,7 +316,7 @@ void estimate_error(const RimRecord& a, const RimRecord& b, Trajectory& run) {
 
 Trajectory simulate_rim(const data::Scene& scene, const std::string& law) {
   RimJob job = rim_job(scene, law);
-  const ContactChoice choice = choose(job, scene.run.integrator, scene.run.tolerance);
+  const Choice choice = choose(job, scene.run.integrator, scene.run.tolerance);
   job.method = choice.method;
   const double tolerance = scene.run.tolerance;
   RimRecord record = run_job(job, tolerance, 1.0);

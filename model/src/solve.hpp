@@ -23,11 +23,12 @@ struct Solution {
 
 enum class Method { taylor, dop853, radau, cvode_adams, cvode_bdf, arkode };
 
-/// What a scene's run.integrator means for a smooth polynomial model, with the reason in words.
+/// What a scene's run.integrator means for a model, with the reason in words.
 struct Choice {
   Method method = Method::taylor;
   std::string name, reason;
 };
+/// Of a smooth polynomial model.
 /// @throws InputError for an unknown name.
 [[nodiscard]] Choice choose_integrator(const std::string& asked);
 

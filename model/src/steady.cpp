@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "rim_setup.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/model/inertia.hpp"
 #include "trochoid/model/sliding.hpp"
 
 // Symbols of rim_body.hpp; W = dphi/dt; equation numbers of model/theory/steady.md.
@@ -18,18 +18,6 @@ using Lanes = Dual<4>;
 constexpr double kUpright = 0.5 * std::numbers::pi;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNotDefined = std::numeric_limits<double>::quiet_NaN();
-
-RimBody rim_body(const data::Body& body, double gravity_m_s2) {
-  if (!(gravity_m_s2 > 0.0))
-    throw InputError(fmt::format("gravity_m_s2 = {} must be greater than 0", gravity_m_s2));
-  const CentralInertia inertia = central_inertia(body);
-  return {.m = inertia.mass_kg,
-          .A = inertia.transverse_kg_m2,
-          .C = inertia.axial_kg_m2,
-          .R = body.radius_m,
-          .h = body.half_thickness_m(),
-          .g = gravity_m_s2};
-}
 
 void require_tilt(double theta_rad) {
   if (!(theta_rad > 0.0 && theta_rad < kUpright))

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "choose/rung.hpp"
+#include "observe/angles.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -64,7 +64,7 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
   const bool loss = here.name != "vx_m_s" && here.name != "vy_m_s";
   if (there == nullptr && !loss) return 0.0;
   const double change = (there != nullptr ? there->value : 0.0) - here.value;
-  return here.unit == "rad" ? std::remainder(change, 2.0 * std::numbers::pi) : change;
+  return here.unit == "rad" ? wrapped(change) : change;
 }
 
 // Variance of a parameter in a rung with further terms beyond that in the chosen one, which does

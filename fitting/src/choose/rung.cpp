@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "choose/softness.hpp"
 #include "judge/first_guess.hpp"
+#include "observe/angles.hpp"
 #include "observe/arcs.hpp"
 #include "observe/observed.hpp"
 #include "observe/timing.hpp"
@@ -82,7 +82,7 @@ struct Squares {
 void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
                  Squares& squares) {
   if (angle_only && sample.psi) {
-    const double off = std::remainder(predicted[2] - sample.psi->value_rad, 2.0 * std::numbers::pi);
+    const double off = wrapped(predicted[2] - sample.psi->value_rad);
     squares.add(off / sample.psi->sigma_rad);
   }
   if (angle_only || !sample.has_metres()) return;

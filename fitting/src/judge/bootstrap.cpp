@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <random>
 
+#include "observe/angles.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/parallel.hpp"
 
@@ -35,10 +35,6 @@ std::vector<SeriesOfReadings> series_of(const ArcData& arc, double correlation_t
   return all;
 }
 
-int width(const Reading& reading) {
-  return reading.channel == Channel::position ? 2 : 1;
-}
-
 // The arc with every reading moved so that its residual becomes one drawn from the same series.
 void resample(ArcData& arc, const std::vector<SeriesOfReadings>& all,
               const Eigen::VectorXd& residuals, double stretch, std::mt19937_64& generator) {
@@ -50,7 +46,7 @@ void resample(ArcData& arc, const std::vector<SeriesOfReadings>& all,
                                      : (source + 1) % n;
       Reading& reading = arc.readings[series.readings[i]];
       const Reading& drawn = arc.readings[series.readings[source]];
-      const int rows = width(reading);
+      const int rows = rows_of(reading.channel);
       // r = W^T (prediction - value): the value moves by W^-T (r - r drawn).
       const Eigen::VectorXd move =
           residuals.segment(reading.row, rows) - stretch * residuals.segment(drawn.row, rows);
@@ -80,10 +76,8 @@ std::vector<double> fit_again(Problem problem, const Solution& solution) {
   std::vector<double> values;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     double value = problem.value(i, again.u);
-    if (problem.predictor->parameters()[problem.free[i].index].unit == "rad") {
-      const double centre = problem.value(i, solution.u);
-      value = centre + std::remainder(value - centre, 2.0 * std::numbers::pi);
-    }
+    if (problem.predictor->parameters()[problem.free[i].index].unit == "rad")
+      value = continued(value, problem.value(i, solution.u));
     values.push_back(value);
   }
   return values;

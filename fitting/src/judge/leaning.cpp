@@ -3,7 +3,6 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
-#include <cmath>
 
 #include "problem/linearise.hpp"
 
@@ -14,10 +13,6 @@ struct Sample {
   int arc = 0, index = 0;
   double leverage = 0.0;
 };
-
-int width_of(const Reading& reading) {
-  return reading.channel == Channel::position ? 2 : 1;
-}
 
 // An orthonormal basis of what the parameters can do to the residuals: rows of all arcs, then of
 // the priors.
@@ -41,11 +36,11 @@ double leverage_of(const std::vector<const Reading*>& readings, const Eigen::Mat
                    double least) {
   double all = 0.0;  // shares in all directions together
   for (const Reading* reading : readings)
-    all += rows.middleRows(reading->row, width_of(*reading)).squaredNorm();
+    all += rows.middleRows(reading->row, rows_of(reading->channel)).squaredNorm();
   if (all < least) return 0.0;
   Eigen::MatrixXd own(0, rows.cols());
   for (const Reading* reading : readings) {
-    const int width = width_of(*reading);
+    const int width = rows_of(reading->channel);
     own.conservativeResize(own.rows() + width, Eigen::NoChange);
     own.bottomRows(width) = rows.middleRows(reading->row, width);
   }
@@ -81,7 +76,7 @@ Problem deaf_to(Problem problem, const Sample& sample) {
   Eigen::VectorXd& weights = problem.row_weights[sample.arc];
   if (weights.size() == 0) weights = Eigen::VectorXd::Ones(data.rows);
   for (const Reading& reading : data.readings)
-    if (reading.sample == sample.index) weights.segment(reading.row, width_of(reading)).setZero();
+    if (reading.sample == sample.index) weights.segment(reading.row, rows_of(reading.channel)).setZero();
   return problem;
 }
 

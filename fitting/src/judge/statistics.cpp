@@ -49,7 +49,7 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
     for (const Reading& reading : arc.readings) {
       if (reading.channel != channel || !arc.filmed) continue;
       const Eigen::Vector2d row = reading.whitener.transpose().col(axis);
-      const int width = channel == Channel::position ? 2 : 1;
+      const int width = rows_of(channel);
       rows.segment(first + reading.row, width) = row.head(width);
       sizes.push_back(row.head(width).norm());
     }

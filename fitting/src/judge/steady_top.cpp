@@ -7,7 +7,8 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numbers>
+
+#include "observe/angles.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -28,13 +29,9 @@ Circle circle_through(const ArcData& arc, const Eigen::Vector2d& pivot_m, bool d
   const Eigen::MatrixX2d xy = arc.positions_m().rowwise() - pivot_m.transpose();
   const Eigen::Index n = xy.rows();
   const int highest = drag ? 3 : 1;
-  Eigen::VectorXd azimuth(n);
+  const Eigen::VectorXd azimuth = precessions(xy);
   Eigen::MatrixXd powers(n, highest + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
-    azimuth[i] = std::atan2(xy(i, 0), -xy(i, 1));
-    if (i > 0)
-      azimuth[i] =
-          azimuth[i - 1] + std::remainder(azimuth[i] - azimuth[i - 1], 2.0 * std::numbers::pi);
     const double t = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
     for (int k = 0; k <= highest; ++k) powers(i, k) = std::pow(t, k);
   }

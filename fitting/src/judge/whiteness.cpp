@@ -21,7 +21,7 @@ using Rows = std::vector<int>;
 
 // Rows of one channel of one arc in time order, coordinate by coordinate.
 std::vector<Rows> rows_of(const Linearised& all, Channel channel, int arc) {
-  const int width = channel == Channel::position ? 2 : 1;
+  const int width = rows_of(channel);
   std::vector<Rows> coordinates(static_cast<std::size_t>(width));
   int count = 0;
   for (int row = 0; row < static_cast<int>(all.arc.size()); ++row)

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/consensus.hpp"
 #include "observe/direction.hpp"
 #include "observe/smoothing.hpp"
@@ -17,10 +18,6 @@ namespace trochoid::fitting {
 namespace {
 
 using model::Observable;
-
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2.0 * std::numbers::pi);
-}
 
 Observable observable_of(Channel channel) {
   switch (channel) {
@@ -58,7 +55,7 @@ void number_rows(ArcData& arc) {
   arc.rows = 0;
   for (Reading& reading : arc.readings) {
     reading.row = arc.rows;
-    arc.rows += reading.channel == Channel::position ? 2 : 1;
+    arc.rows += rows_of(reading.channel);
   }
 }
 
@@ -319,7 +316,7 @@ double excess_scatter(const ArcData& arc, Channel channel) {
   for (const Reading& reading : arc.readings) {
     if (reading.channel != channel) continue;
     double value = reading.value.x();
-    if (!planar && !values.empty()) value = values.back() + wrapped(value - values.back());
+    if (!planar && !values.empty()) value = continued(value, values.back());
     t_s.push_back(arc.t_s[reading.sample]);
     values.push_back(value);
     sigmas.push_back((planar ? std::sqrt(2.0) : 1.0) / reading.whitener.norm());

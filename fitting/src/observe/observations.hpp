@@ -11,8 +11,12 @@ namespace trochoid::fitting {
 /// What was measured; each channel has its own noise scale.
 enum class Channel { position, theta, phi, psi };
 inline constexpr int kChannels = 4;
+/// Residual rows of one measurement: x and y of a position, or an angle.
+[[nodiscard]] constexpr int rows_of(Channel channel) {
+  return channel == Channel::position ? 2 : 1;
+}
 
-/// One measurement: two residual rows for a position, one for an angle.
+/// One measurement.
 struct Reading {
   int sample = 0;
   Channel channel = Channel::position;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 
 namespace trochoid::fitting {
@@ -186,7 +186,7 @@ int released_at(const data::Track& track, SampleRange range) {
     const data::TrackSample& one = track.samples[i];
     if (!one.psi) continue;
     const double before = psi.empty() ? one.psi->value_rad : psi.back();
-    psi.push_back(before + std::remainder(one.psi->value_rad - before, 2.0 * std::numbers::pi));
+    psi.push_back(continued(one.psi->value_rad, before));
     t_s.push_back(one.t_s);
     sample.push_back(i);
   }

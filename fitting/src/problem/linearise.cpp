@@ -25,7 +25,7 @@ Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
           j.col(c) / problem.free[columns[c]].transform.slope(u[columns[c]]);
     all.residuals.segment(first, r.size()) = r;
     for (const Reading& reading : problem.arcs[arc].readings)
-      for (int k = 0; k < (reading.channel == Channel::position ? 2 : 1); ++k) {
+      for (int k = 0; k < rows_of(reading.channel); ++k) {
         all.channel[first + reading.row + k] = reading.channel;
         all.arc[first + reading.row + k] = arc;
       }

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "observe/angles.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -27,8 +28,8 @@ Vector4 polar(const Vector4& at, double near_phi) {
   const double theta = std::max(std::hypot(at[0], at[1]), kAtThePole);
   const double direction = std::atan2(at[1], at[0]), c = std::cos(direction),
                s = std::sin(direction);
-  return {theta, near_phi + std::remainder(direction - near_phi, 2.0 * std::numbers::pi),
-          at[2] * c + at[3] * s, (at[3] * c - at[2] * s) / theta};
+  return {theta, continued(direction, near_phi), at[2] * c + at[3] * s,
+          (at[3] * c - at[2] * s) / theta};
 }
 
 // d cartesian / d polar.

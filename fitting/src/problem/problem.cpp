@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/observed.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -375,7 +376,7 @@ void name_attitudes(Problem& problem) {
       for (const char* rate : {"w1_rad_s", "w3_rad_s"})  // along axes that turn round
         if (const int i = predictor.index_of(rate); i >= 0) values[i] = -values[i];
     }
-    values[phi] = std::remainder(values[phi], 2.0 * std::numbers::pi);
+    values[phi] = wrapped(values[phi]);
   }
 }
 
@@ -463,7 +464,7 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
     if (!jacobian->allFinite()) return false;
   }
   for (const Reading& reading : data.readings) {
-    const int width = reading.channel == Channel::position ? 2 : 1;
+    const int width = rows_of(reading.channel);
     const double weight = robust_weight(problem, arc, reading) /
                           problem.noise_scale[static_cast<int>(reading.channel)];
     if (weight == 1.0) continue;

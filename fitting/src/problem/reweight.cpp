@@ -86,8 +86,7 @@ double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
       if (d <= kInlier) continue;
       // Influence falls like 1/d^3: a glitch far away does not pull.
       const double weight = kInlier * kInlier / (d * d);
-      weights.segment(reading.row, reading.channel == Channel::position ? 2 : 1)
-          .setConstant(weight);
+      weights.segment(reading.row, rows_of(reading.channel)).setConstant(weight);
     }
     const Eigen::VectorXd& before = problem.row_weights[arc];
     change = std::max(change, before.size() == weights.size()

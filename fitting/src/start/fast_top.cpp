@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "start/starts.hpp"
 
 // A fast top precesses slowly and trembles: nutation with the frequency nu near b, too small and
@@ -22,15 +23,11 @@ struct Slow {
 Slow slow_part(const ArcData& arc, const Eigen::Vector2d& pivot_m) {
   const Eigen::MatrixX2d xy = arc.positions_m().rowwise() - pivot_m.transpose();
   const Eigen::Index n = xy.rows();
-  Eigen::VectorXd azimuth(n), distance = xy.rowwise().norm();
+  const Eigen::VectorXd azimuth = precessions(xy), distance = xy.rowwise().norm();
   Eigen::MatrixX4d powers(n, 4);
   Slow slow;
   slow.t_s.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    azimuth[i] = std::atan2(xy(i, 0), -xy(i, 1));
-    if (i > 0)
-      azimuth[i] =
-          azimuth[i - 1] + std::remainder(azimuth[i] - azimuth[i - 1], 2.0 * std::numbers::pi);
     const double t = slow.t_s[i] = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
     powers.row(i) << 1.0, t, t * t, t * t * t;
   }

@@ -2,33 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
+#include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
 
 namespace trochoid::fitting {
 namespace {
-
-struct Series {
-  std::vector<double> t_s;
-  std::vector<double> value;
-};
-
-Series spin_series(const ArcData& arc) {
-  Series series;
-  for (const Reading& reading : arc.readings) {
-    if (reading.channel != Channel::psi) continue;
-    double value = reading.value.x();
-    if (!series.value.empty())
-      value =
-          series.value.back() + std::remainder(value - series.value.back(), 2.0 * std::numbers::pi);
-    series.value.push_back(value);
-    series.t_s.push_back(arc.t_s[reading.sample]);
-  }
-  return series;
-}
 
 // Least-squares polynomial coefficients c_k of sum c_k (t - t0)^k; columns of y are independent.
 Eigen::MatrixXd polynomial(const std::vector<double>& t_s, double t0, const Eigen::MatrixXd& y,
@@ -90,11 +71,9 @@ std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2) {
   const double mu = std::max(-a.dot(v) / speed / gravity_m_s2, 1e-4);
   std::map<std::string, double> values{
       {"x_m", c(0, 0)}, {"y_m", c(0, 1)}, {"vx_m_s", v.x()}, {"vy_m_s", v.y()}};
-  const Series spin = spin_series(window);
+  const AngleSeries spin = angle_series(window, Channel::psi);
   if (spin.t_s.size() >= 5) {
-    const Eigen::VectorXd psi =
-        Eigen::Map<const Eigen::VectorXd>(spin.value.data(), static_cast<int>(spin.value.size()));
-    const Eigen::MatrixXd p = polynomial(spin.t_s, window.start_s, psi, 2);
+    const Eigen::MatrixXd p = polynomial(spin.t_s, window.start_s, spin.angles(), 2);
     values["psi_rad"] = p(0, 0);
     values["w3_rad_s"] = p(1, 0);
   }
@@ -109,10 +88,10 @@ std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2) {
 // Integral matching: the angle is linear in the first state and in the couples' double integrals
 // along the measured motion; nothing noisy is differentiated twice.
 std::vector<Start> pivot_starts(const ArcData& window, bool unbalanced) {
-  const Series spin = spin_series(window);
+  const AngleSeries spin = angle_series(window, Channel::psi);
   const int n = static_cast<int>(spin.t_s.size());
   if (n < 12) return {};
-  const Eigen::VectorXd psi = Eigen::Map<const Eigen::VectorXd>(spin.value.data(), n);
+  const Eigen::VectorXd psi = spin.angles();
   // A window turns by a fraction of a radian only, so that it does not level out what swings.
   constexpr double kFraction_rad = 0.3;
   std::vector<double> turns;

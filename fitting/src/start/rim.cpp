@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
 
@@ -12,36 +13,26 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Readings of one angle, continued over its jumps, with the times they belong to.
-struct AngleSeries {
-  std::vector<double> t_s;
-  Eigen::MatrixXd value;
+// An angle, and the same smoothed where there is enough of it.
+struct SmoothAngle : AngleSeries {
   SmoothCurve curve;
 };
 
-AngleSeries series_of(const ArcData& arc, Channel channel) {
-  AngleSeries series;
-  std::vector<double> values;
-  for (const Reading& reading : arc.readings) {
-    if (reading.channel != channel) continue;
-    double value = reading.value.x();
-    if (!values.empty()) value = values.back() + std::remainder(value - values.back(), 2.0 * kPi);
-    values.push_back(value);
-    series.t_s.push_back(arc.t_s[reading.sample]);
-  }
-  series.value = Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
-  if (values.size() >= 8) series.curve = smooth_auto(series.t_s, series.value);
+SmoothAngle series_of(const ArcData& arc, Channel channel) {
+  constexpr std::size_t kFewest = 8;
+  SmoothAngle series{angle_series(arc, channel), {}};
+  if (series.t_s.size() >= kFewest) series.curve = smooth_auto(series.t_s, series.angles());
   return series;
 }
 
-Eigen::Index nearest(const AngleSeries& series, double t_s) {
+Eigen::Index nearest(const SmoothAngle& series, double t_s) {
   const auto found = std::lower_bound(series.t_s.begin(), series.t_s.end(), t_s);
   return std::min<Eigen::Index>(found - series.t_s.begin(),
                                 static_cast<Eigen::Index>(series.t_s.size()) - 1);
 }
 
 // Value and rate at an instant: the smoothed curve's nearest sample, carried there.
-std::pair<double, double> at(const AngleSeries& series, double t_s) {
+std::pair<double, double> at(const SmoothAngle& series, double t_s) {
   const Eigen::Index i = nearest(series, t_s);
   const double rate = series.curve.first(i, 0);
   return {series.curve.value(i, 0) + rate * (t_s - series.t_s[i]), rate};
@@ -130,8 +121,8 @@ double steady_spin(const RimShape& q, double theta, double W) {
 // line balance when (per mass)
 //   A ddtheta = A w2 O3 - C w2 w3 - z' N + z Ft,  O3 = w2 cot theta,  N = g + d2z/dt2,
 // and the force along the line, Fn, is what changes the spin: C dw3 = R Fn. Median over the window.
-double spin_by_couples(const RimShape& q, const ArcData& arc, const AngleSeries& tilts,
-                       const AngleSeries& turns, const Motion& motion) {
+double spin_by_couples(const RimShape& q, const ArcData& arc, const SmoothAngle& tilts,
+                       const SmoothAngle& turns, const Motion& motion) {
   std::vector<double> spins;
   double gained = 0.0, before = 0.0;  // spin since the first sample, and its rate at the last one
   for (std::size_t sample = 0; sample < arc.t_s.size(); ++sample) {
@@ -156,20 +147,21 @@ double spin_by_couples(const RimShape& q, const ArcData& arc, const AngleSeries&
 
 // Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
 // line's value at an instant: a third of the readings may be wrong.
-std::pair<double, double> robust_line(const AngleSeries& series, int count, double t_s) {
+std::pair<double, double> robust_line(const SmoothAngle& series, int count, double t_s) {
   std::vector<double> slopes, values;
   for (int i = 0; i < count; ++i)
     for (int k = i + 1; k < count; ++k)
-      slopes.push_back((series.value(k, 0) - series.value(i, 0)) / (series.t_s[k] - series.t_s[i]));
+      slopes.push_back((series.angle_rad[k] - series.angle_rad[i]) /
+                       (series.t_s[k] - series.t_s[i]));
   const double slope = median(std::move(slopes));
   for (int i = 0; i < count; ++i)
-    values.push_back(series.value(i, 0) - slope * (series.t_s[i] - t_s));
+    values.push_back(series.angle_rad[i] - slope * (series.t_s[i] - t_s));
   return {median(std::move(values)), slope};
 }
 
 // The same for an angle that turns up to a quarter of a turn per sample and may be half a turn off:
 // the rate that aligns twice the angles best, then the side that more of them are on.
-std::pair<double, double> robust_turning(const AngleSeries& series, int count, double t_s) {
+std::pair<double, double> robust_turning(const SmoothAngle& series, int count, double t_s) {
   const double span_s = series.t_s[count - 1] - series.t_s[0];
   const double fastest = 0.5 * kPi * (count - 1) / span_s;
   constexpr int kPerPeak = 8;  // rates looked at over the width of a peak
@@ -177,7 +169,7 @@ std::pair<double, double> robust_turning(const AngleSeries& series, int count, d
   const auto aligned = [&](double rate, double times) {
     std::complex<double> sum = 0.0;
     for (int i = 0; i < count; ++i)
-      sum += std::polar(1.0, times * (series.value(i, 0) - rate * (series.t_s[i] - t_s)));
+      sum += std::polar(1.0, times * (series.angle_rad[i] - rate * (series.t_s[i] - t_s)));
     return sum;
   };
   double best = 0.0, turning = 0.0;
@@ -191,15 +183,15 @@ std::pair<double, double> robust_turning(const AngleSeries& series, int count, d
 }
 
 // Usual number of readings of an angle in one of its turns.
-double readings_a_turn(const AngleSeries& series) {
+double readings_a_turn(const SmoothAngle& series) {
   std::vector<double> steps;
-  for (Eigen::Index i = 1; i < series.value.rows(); ++i)
-    steps.push_back(std::abs(series.value(i, 0) - series.value(i - 1, 0)));
+  for (std::size_t i = 1; i < series.angle_rad.size(); ++i)
+    steps.push_back(std::abs(series.angle_rad[i] - series.angle_rad[i - 1]));
   return 2.0 * kPi / std::max(median(std::move(steps)), 1e-9);
 }
 
 std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const Motion& motion) {
-  const AngleSeries theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
+  const SmoothAngle theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
   const int fewest = static_cast<int>(std::min(theta.t_s.size(), phi.t_s.size()));
   if (fewest < 8) return {};
   std::vector<Start> starts;

@@ -3,6 +3,7 @@
 #include <limits>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
 
@@ -21,7 +22,7 @@ int shortest_window(const ArcData& arc, int otherwise) {
   for (const Reading& reading : arc.readings) {
     if (reading.channel != Channel::phi) continue;
     if (before != nullptr)
-      rates_rad_s.push_back(std::abs(std::remainder(reading.value.x() - before->value.x(), kTurn)) /
+      rates_rad_s.push_back(std::abs(wrapped(reading.value.x() - before->value.x())) /
                             (arc.t_s[reading.sample] - arc.t_s[before->sample]));
     before = &reading;
   }
@@ -142,16 +143,6 @@ Found search_briefly(const Problem& problem, const Starter& starter) {
     if (followed_closely(problem, best)) return best;
   }
   return best;
-}
-
-Start start_at(const Problem& problem, const Eigen::VectorXd& u, const std::string& path) {
-  Problem at = problem;
-  at.set_base(u);
-  Start start{path, {}};
-  for (const FreeParameter& parameter : at.free)
-    start.values[problem.predictor->parameters()[parameter.index].name] =
-        at.base[0][parameter.index];
-  return start;
 }
 
 // Many starts, each taken downhill on the window with the losses held; best first, and of those

@@ -34,17 +34,6 @@ NodeStarter nodes_of(const Problem& problem) {
   };
 }
 
-// Values of the free parameters by name, as a start.
-Start start_at(const Problem& problem, const Eigen::VectorXd& u) {
-  Problem at = problem;
-  at.set_base(u);
-  Start start{"multiple_shooting", {}};
-  for (const FreeParameter& parameter : at.free)
-    start.values[problem.predictor->parameters()[parameter.index].name] =
-        at.base[0][parameter.index];
-  return start;
-}
-
 // From one start over the first so many nutations, as its b counts them.
 Found shoot_over(const Problem& problem, const Problem& started, double over_nutations) {
   constexpr int kFewestSamples = 6;
@@ -66,7 +55,7 @@ Found shoot_over(const Problem& problem, const Problem& started, double over_nut
                                     2, std::max(2, window / kFewestSamples));
     const Found found = multiple_shooting(own, segments, nodes_of(own));
     if (!found.solution.usable) continue;
-    Found whole = grow(problem, start_at(own, found.solution.u), window);
+    Found whole = grow(problem, start_at(own, found.solution.u, "multiple_shooting"), window);
     if (better(whole, best)) best = std::move(whole);
     if (best.passed) break;
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "observe/angles.hpp"
 #include "start/strategy.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -118,8 +119,7 @@ Eigen::VectorXd gap(const model::Predictor& predictor, const std::vector<int>& s
                     const Eigen::VectorXd& to, const Eigen::VectorXd& from) {
   Eigen::VectorXd difference = to - from;
   for (std::size_t i = 0; i < state.size(); ++i)
-    if (predictor.parameters()[state[i]].unit == "rad")
-      difference[i] = std::remainder(difference[i], 2.0 * 3.14159265358979323846);
+    if (predictor.parameters()[state[i]].unit == "rad") difference[i] = wrapped(difference[i]);
   return difference;
 }
 

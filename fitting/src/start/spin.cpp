@@ -4,6 +4,7 @@
 #include <functional>
 #include <numbers>
 
+#include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
 
@@ -60,7 +61,7 @@ std::pair<double, double> line_through(const SpinDifference& raw) {
   for (std::size_t i = 1; i < t.size(); ++i) {
     const double step_s = t[i] - t[i - 1];
     const double expected = angle.back() + median({rates.begin(), rates.end()}) * step_s;
-    angle.push_back(expected + std::remainder(d[i] - expected, 2.0 * std::numbers::pi));
+    angle.push_back(continued(d[i], expected));
     rates.push_back((angle[i] - angle[i - 1]) / step_s);
     rates.pop_front();
   }

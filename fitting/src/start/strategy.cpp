@@ -157,6 +157,16 @@ void apply(const Start& start, Problem& problem) {
         base[parameter.index] = problem.base[0][parameter.index];
 }
 
+Start start_at(const Problem& problem, const Eigen::VectorXd& u, const std::string& path) {
+  Problem at = problem;
+  at.set_base(u);
+  Start start{path, {}};
+  for (const FreeParameter& parameter : at.free)
+    start.values[problem.predictor->parameters()[parameter.index].name] =
+        at.base[0][parameter.index];
+  return start;
+}
+
 namespace {
 
 // Mean over all predicted precessions of what a direction differs by from one with that tilt.
@@ -216,7 +226,7 @@ int stray_sample(const Problem& part, const Eigen::VectorXd& u) {
   std::vector<double> squares(arc.t_s.size(), 0.0);
   for (const Reading& reading : arc.readings)
     squares[reading.sample] +=
-        residuals.segment(reading.row, reading.channel == Channel::position ? 2 : 1).squaredNorm();
+        residuals.segment(reading.row, rows_of(reading.channel)).squaredNorm();
   const auto worst = std::max_element(squares.begin(), squares.end());
   const bool alone = *worst > std::max(kFar2, kAlone * residuals.squaredNorm());
   return alone && squares.end() - worst > kLast ? static_cast<int>(worst - squares.begin()) : -1;

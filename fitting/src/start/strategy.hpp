@@ -31,6 +31,10 @@ struct Found {
 /// Writes a start's values into every arc of a problem (names the model lacks are skipped).
 void apply(const Start& start, Problem& problem);
 
+/// What a solver's variables put the free parameters to, as a start by this path.
+[[nodiscard]] Start start_at(const Problem& problem, const Eigen::VectorXd& u,
+                             const std::string& path);
+
 /// Chi-square per degree of freedom that counts as "explained", for that many rows: 4 standard
 /// deviations of the chi-square distribution above 1 and a tenth for imperfect sigmas.
 [[nodiscard]] double chi2_gate(int rows);

@@ -6,16 +6,10 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "draw/round_lengths.hpp"
+
 namespace trochoid::tools {
 namespace {
-
-// The largest 1, 2 or 5 times a power of ten not above `limit`.
-double nice_length(double limit) {
-  const double power = std::pow(10.0, std::floor(std::log10(limit)));
-  for (const double factor : {5.0, 2.0})
-    if (factor * power <= limit) return factor * power;
-  return power;
-}
 
 std::string length_words(double length_m) {
   if (length_m >= 1.0) return fmt::format("{:g} m", length_m);
@@ -68,7 +62,7 @@ void draw_scale_bar(cv::Mat picture, std::optional<double> scale_px_per_m, doubl
                     double text_px) {
   constexpr double kLargestShare = 0.22;  // of the picture's width
   const double unit_px = enlargement * scale_px_per_m.value_or(1.0);
-  const double length = nice_length(kLargestShare * picture.cols / unit_px);
+  const double length = round_length(kLargestShare * picture.cols / unit_px);
   const double length_px = length * unit_px;
   const double left = 1.6 * text_px, base = picture.rows - 1.6 * text_px;
   const Stroke stroke{.colour = palette::white, .width_px = 2, .halo_px = 1, .halo_alpha = 0.8};

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "draw/canvas.hpp"
+#include "draw/round_lengths.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
@@ -42,14 +43,6 @@ double usual_step_s(const std::vector<ObservedPoint>& points) {
 }
 
 }  // namespace
-
-double nice_step(double span, int parts) {
-  const double rough = span / std::max(1, parts);
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= rough) return factor * power;
-  return 10.0 * power;
-}
 
 ResidualStrip::ResidualStrip(const OverlayContent& content, double from_s, double to_s,
                              int width_px, double text_px)
@@ -122,7 +115,7 @@ void ResidualStrip::draw_bands(const ObjectPaths& paths, const Row& row) {
 void ResidualStrip::draw_row(const ObjectPaths& paths, const Row& row, const std::string& name) {
   draw_bands(paths, row);
   const auto pixel = [](double value) { return static_cast<int>(std::lround(value)); };
-  const double step_mm = nice_step(2.0 * row.limit_mm, 4);
+  const double step_mm = round_step(2.0 * row.limit_mm, 4);
   for (int k = -static_cast<int>(row.limit_mm / step_mm); k * step_mm <= row.limit_mm; ++k) {
     const double y = y_of(row, k * step_mm);
     cv::line(picture_, {pixel(left_px_) - 3, pixel(y)},
@@ -180,7 +173,7 @@ void ResidualStrip::draw_gaps(const ObjectPaths& paths, double top_px, double bo
 void ResidualStrip::draw_time_axis(double top_px) {
   const auto pixel = [](double value) { return static_cast<int>(std::lround(value)); };
   cv::line(picture_, {pixel(left_px_), pixel(top_px)}, {pixel(right_px_), pixel(top_px)}, kAxis);
-  const double step_s = nice_step(to_s_ - from_s_, 8);
+  const double step_s = round_step(to_s_ - from_s_, 8);
   for (double k = std::ceil(from_s_ / step_s - 1e-9) + 0.0; k * step_s <= to_s_ + 1e-9 * step_s;
        ++k) {
     const double x = x_of(k * step_s);

@@ -36,7 +36,4 @@ class ResidualStrip {
   double plot_top_px_, plot_bottom_px_;
 };
 
-/// A step of 1, 2 or 5 times a power of ten that divides `span` into about `parts` parts.
-[[nodiscard]] double nice_step(double span, int parts);
-
 }  // namespace trochoid::tools

@@ -7,16 +7,10 @@
 #include <limits>
 #include <regex>
 
+#include "draw/round_lengths.hpp"
+
 namespace trochoid::tools {
 namespace {
-
-double step_of(double span, int parts) {
-  const double rough = span / parts;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= rough) return factor * power;
-  return 10.0 * power;
-}
 
 std::vector<double> ticks_of(const Range& range, bool logarithmic) {
   std::vector<double> ticks;
@@ -27,7 +21,7 @@ std::vector<double> ticks_of(const Range& range, bool logarithmic) {
     for (int decade = first; decade <= last; decade += stride) ticks.push_back(decade);
     return ticks;
   }
-  const double step = step_of(range.span(), 6);
+  const double step = round_step(range.span(), 6);
   for (double k = std::ceil(range.low / step); k * step <= range.high; ++k)
     ticks.push_back(k == 0.0 ? 0.0 : k * step);
   return ticks;

@@ -1,0 +1,28 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "observe/observations.hpp"
+
+namespace trochoid::fitting {
+
+/// Of all angles whole turns apart from this one, that within -pi .. pi [rad].
+[[nodiscard]] double wrapped(double angle_rad);
+/// Of the same angles, that nearest to another one.
+[[nodiscard]] double continued(double angle_rad, double from_rad);
+
+/// Readings of one angle and the times they belong to, continued over its jumps.
+struct AngleSeries {
+  std::vector<double> t_s, angle_rad;
+
+  [[nodiscard]] Eigen::Map<const Eigen::VectorXd> angles() const {
+    return {angle_rad.data(), static_cast<Eigen::Index>(angle_rad.size())};
+  }
+};
+[[nodiscard]] AngleSeries angle_series(const ArcData& arc, Channel channel);
+
+/// Precession of an axis that leans towards these places (n x 2, from its pivot), from one to the
+/// next by less than half a turn [rad].
+[[nodiscard]] Eigen::VectorXd precessions(const Eigen::MatrixX2d& places);
+
+}  // namespace trochoid::fitting
