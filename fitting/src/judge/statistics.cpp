@@ -93,6 +93,30 @@ void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
   }
 }
 
+// What is held at a value known from elsewhere shifts the others by what they would do for it; what
+// the data would rather have of it counts for nothing. So it is seen through the others alone.
+void see_held_through_others(const Problem& problem, Eigen::MatrixXd& scaled) {
+  std::vector<Eigen::Index> held, others;
+  std::vector<Eigen::Index> own_row;  // with the prior
+  Eigen::Index row = problem.rows();
+  for (Eigen::Index i = 0; i < scaled.cols(); ++i) {
+    const FreeParameter& parameter = problem.free[i];
+    const bool kept = parameter.held && parameter.prior;
+    (kept ? held : others).push_back(i);
+    if (kept) own_row.push_back(row);
+    if (parameter.prior) ++row;
+  }
+  if (held.empty()) return;
+  const Eigen::MatrixXd rest = scaled(Eigen::all, others);
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> span(rest);
+  for (std::size_t k = 0; k < held.size(); ++k) {
+    const double known = scaled(own_row[k], held[k]);
+    scaled(own_row[k], held[k]) = 0.0;
+    scaled.col(held[k]) = rest * span.solve(scaled.col(held[k])).eval();
+    scaled(own_row[k], held[k]) = known;
+  }
+}
+
 // The directions of parameter space in natural sizes, and how sharply the data see each.
 struct Directions {
   Eigen::MatrixXd axes;     // one per column
@@ -236,7 +260,8 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   Uncertainty result;
   Eigen::VectorXd size(count);
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
-  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  see_held_through_others(problem, scaled);
   const Directions seen = directions_of(problem, scaled, result);
   const Noise noise = noise_of(problem, all, scaled, seen, result);
   Eigen::MatrixXd covariance = sandwich(problem, all, noise, scaled, seen.bread);
