@@ -79,6 +79,7 @@ bool CsvReader::next_content_line(std::string_view& line) {
 }
 
 void CsvReader::keep_header(std::string_view line) {
+  while (line.ends_with(',')) line.remove_suffix(1);  // spreadsheets fill up all rows alike
   const auto colon = line.find(": ");
   const bool has_value = colon != std::string_view::npos;
   header_.emplace_back(one_line(trimmed(line.substr(0, colon))),

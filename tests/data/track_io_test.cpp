@@ -149,6 +149,14 @@ TEST(TrackFile, FromASpreadsheetMayHaveCarriageReturnsBlanksAByteOrderMarkAndFur
   EXPECT_EQ(read.notes, std::vector<std::string>{"exported by hand"});
 }
 
+TEST(TrackFile, SavedByASpreadsheetMayHaveCommasBehindItsRemarks) {
+  const TestFolder folder;
+  const TrackFile read = read_track(folder.write(
+      "filled.csv", "# trochoid track 1,,\n# source: clip.mp4,,\nt_s,x_m,y_m\n0,1,2\n1,3,4\n"));
+  EXPECT_EQ(read.source, "clip.mp4");
+  EXPECT_EQ(read.tracks.at(0).samples.size(), 2u);
+}
+
 TEST(TrackFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
   const TestFolder folder;
   const TrackFile read =
@@ -230,7 +238,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"ShortRow", "t_s,x_m,y_m\n0,1,2\n1,2\n", ":3:", "2 cells where the header names 3"},
         Refusal{"NoTime", "t_s,x_m,y_m\n,1,2\n", ":2:", "t_s is empty"},
         Refusal{"NoPlaceInRow", "t_s,x_m,y_m\n0,,\n", ":2:", "neither x_m,y_m nor x_px,y_px"},
-        Refusal{"HalfPlace", "t_s,x_m,y_m,x_px,y_px\n0,1,,5,6\n", ":2:", "not finite"},
+        Refusal{"HalfPlace", "t_s,x_m,y_m,x_px,y_px\n0,1,,5,6\n", ":2:", "y of a place is empty"},
+        Refusal{"HalfPlaceAlone", "t_s,x_m,y_m\n0,,2\n", ":2:", "x of a place is empty"},
         Refusal{"HalfCovariance", "t_s,x_m,y_m,sxx_m2,sxy_m2,syy_m2\n0,1,2,1e-9,,1e-9\n",
                 ":2:", "sxx_m2,sxy_m2,syy_m2"},
         Refusal{"NegativeVariance", "t_s,x_m,y_m,sxx_m2,sxy_m2,syy_m2\n0,1,2,-1,0,1\n",

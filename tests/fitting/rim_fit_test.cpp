@@ -206,6 +206,25 @@ TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   EXPECT_THAT(with.warnings, testing::Contains(testing::HasSubstr("error bars allow for mass_kg")));
 }
 
+// Gravity would tell the scale, which is kept at its prior: an error of that bends all the rest,
+// and the error bars must hold it.
+TEST_F(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
+  constexpr double kDoubt = 0.01;
+  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  data::Scene doubtful = c.scene;
+  const double radius_m = c.scene.body->radius_m;
+  doubtful.fit.prior["radius_m"] = {radius_m, kDoubt * radius_m};
+  for (const double off : {-kDoubt, kDoubt}) {
+    data::Track scaled = c.track;
+    for (data::TrackSample& sample : scaled.samples) sample.centre_m *= 1.0 + off;
+    const data::Fit fit = fitting::fit(std::span(&scaled, 1), doubtful);
+    EXPECT_NEAR(fit.find("scale")->sigma, kDoubt, 0.01 * kDoubt);
+    EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), 2.5);
+    EXPECT_LT(pull(fit, "w2_rad_s", 22.5526228988618), 2.5);
+    EXPECT_LT(pull(fit, "w3_rad_s", 3.0), 2.5);
+  }
+}
+
 // A disc cannot have more of one moment than twice the other, which no prior knows.
 TEST_F(RimFit, WhatNoBodyCanBeIsNoDoubt) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);

@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
@@ -124,6 +125,32 @@ TEST(SeveralRecordings, ShareTheBodyAndKeepTheirStarts) {
   EXPECT_NEAR(l.sigma / alone.find("l_m")->sigma, 0.58, 0.08);
   options.threads = 3;
   EXPECT_EQ(fit(tracks, scene, options).find("l_m")->value, l.value);
+}
+
+TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  data::Scene scene;
+  scene.model.name = "top";
+  const auto refusal = [&] {
+    try {
+      (void)fit(tracks, scene);
+    } catch (const trochoid::InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  tracks[1].samples.resize(1);
+  EXPECT_THAT(refusal(), testing::HasSubstr("track 2: its 2 measurements cannot determine"));
+  tracks[1] = tracks[0];
+  EXPECT_THAT(refusal(), testing::HasSubstr("track 2: is track 1 once more"));
+}
+
+TEST(GivenUp, MeasurementsAreTold) {
+  data::Track track = thesis_track(25.0, 1e-3, 11);
+  for (const std::size_t i : {40U, 120U, 121U}) track.samples[i].centre_m.y() += 0.05;
+  const data::Fit result = fit_top(track, {});
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("3 of 250 measurements lie")));
 }
 
 // A coin that rolls from the first of 40 pictures on. The first two are blurred: they show no node

@@ -55,6 +55,19 @@ TEST(Background, AHandThatReachesAcrossThePictureIsLeftOut) {
   EXPECT_FALSE(background.camera_moves());
 }
 
+// A clip that begins black, fades in or is cut from several; a third of the samples would pass for
+// noise of as many levels as the floor has.
+TEST(Background, PicturesWithoutLightAreLeftOut) {
+  const cv::Mat floor = drawn_floor(200, 120, 150.0);
+  std::vector<cv::Point2d> places;
+  for (int i = 0; i < 10; ++i) places.emplace_back(20.0 + 16.0 * i, 60.0);
+  std::vector<cv::Mat> frames = frames_of(floor, places);
+  for (int i = 0; i < 6; ++i) frames.insert(frames.begin(), cv::Mat::zeros(floor.size(), CV_8U));
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(background.plate().noise_levels, 2.0, 0.7);
+  EXPECT_NEAR(level_at(background.plate().luma, 100, 60), level_at(floor, 100, 60), 3.0);
+}
+
 TEST(Background, NoiseIsMeasuredAndFlickerIsTakenOut) {
   std::mt19937 random(4);
   const cv::Mat floor = drawn_floor(160, 120, 120.0);

@@ -193,6 +193,20 @@ std::vector<BoardView> drawn_views() {
 }
 
 // Squares 3 % longer than wide: another board, or a sheet that the printer stretched.
+// A camera's optics do not depend on how large the board is said to be.
+TEST(Calibration, KnowsTheOpticsWhateverTheSizeOfTheBoard) {
+  std::vector<BoardView> views = drawn_views();
+  const Calibration usual = calibrate(views, {640, 480});
+  for (BoardView& view : views)
+    for (Eigen::Vector2d& p : view.board_m) p *= 1e-3;
+  const Calibration small = calibrate(views, {640, 480});
+  constexpr double kSame_px = 0.01;
+  EXPECT_NEAR(small.camera.fx, usual.camera.fx, kSame_px);
+  EXPECT_NEAR(small.camera.cy, usual.camera.cy, kSame_px);
+  EXPECT_NEAR(small.sigma_focal_px, usual.sigma_focal_px, kSame_px);
+  EXPECT_TRUE(small.left_out.empty());
+}
+
 TEST(Calibration, LeavesOutTheViewOfAnotherBoard) {
   std::vector<BoardView> views = drawn_views();
   for (Eigen::Vector2d& p : views[3].board_m) p.x() *= 1.03;

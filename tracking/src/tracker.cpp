@@ -98,7 +98,8 @@ class Tracking {
     return paths_.size() < static_cast<std::size_t>(objects_);
   }
 
-  [[noreturn]] void nothing_found() const {
+  [[noreturn]] void nothing_found() {
+    refuse_a_body_of_another_size();
     if (camera_moved_)
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
@@ -109,6 +110,23 @@ class Tracking {
         fmt::format("{}: no moving body found; point at it: at x,y, or at_px under "
                     "[tracking] in the scene",
                     video_.string()));
+  }
+
+  /// A wrong scale or radius hides a body that is plain to see.
+  void refuse_a_body_of_another_size() {
+    constexpr double kClearly = 1.25;
+    if (camera_moved_) return;
+    const auto seed = find_seed(recording_.window(), background_, *make_rim_finder(), explained_);
+    if (!seed) return;
+    const double seen_px = seed->seen.rim.semi_major_px();
+    const double expected_px = finder_->expected_major_px(seed->seen.centre_px);
+    if (!(expected_px > 0.0) || std::max(seen_px / expected_px, expected_px / seen_px) < kClearly)
+      return;
+    throw InputError(
+        fmt::format("{}: no body of the given size moves: by radius_m and the camera or scale its "
+                    "rim has a radius of about {:.0f} px, and what moves one of about {:.0f} px; "
+                    "check radius_m and the camera's scale",
+                    video_.string(), expected_px, seen_px));
   }
 
   /// Reads on, the bodies known so far followed as the frames come. False at the end.
@@ -473,6 +491,18 @@ class Tracking {
       result.file.notes.push_back(fmt::format(
           "by their time stamps {} of {} pictures are missing; the others keep their times",
           missing_, frames_ + missing_));
+    if (recording_.info().evened)
+      result.file.notes.push_back(
+          "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "
+          "without it they keep their own times");
+    if (exposure_fraction() > 1.0)
+      result.file.notes.push_back(fmt::format(
+          "exposure_s is {:.3g} times the time from picture to picture; is it in seconds?",
+          exposure_fraction()));
+    if (recording_.info().interlaced)
+      result.file.notes.push_back(
+          "the video is interlaced: every picture is two half ones of different times; "
+          "deinterlace it first");
     result.file.camera = words;
     result.summary.camera_words = words;
     if (options_.edges) write_edges(*options_.edges);

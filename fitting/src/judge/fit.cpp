@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 
 #include "judge/adequacy.hpp"
@@ -317,6 +318,61 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
 }
 
+// A recording's own rate and one that is given for its camera may differ: then only what the latter
+// says of its own error is taken.
+void tell_other_rate(const data::Scene& scene, double frame_s, data::Fit& fit) {
+  const auto prior = scene.fit.prior.find("frame_rate_hz");
+  if (prior == scene.fit.prior.end() || scene.camera.frame_rate_hz || !(frame_s > 0.0)) return;
+  constexpr double kClearly = 0.1;
+  const double rate_hz = 1.0 / frame_s;
+  if (std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
+  fit.warnings.push_back(fmt::format(
+      "[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} samples a second, and its times "
+      "are kept; if they are wrong, track again with [camera] frame_rate_hz = {:g}",
+      prior->second.value, rate_hz, prior->second.value));
+}
+
+// Slips of units that a fit would follow without a word.
+void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
+  if (!scene.body || scene.body->kind == data::BodyKind::top || !(scene.body->radius_m > 0.0))
+    return;
+  constexpr double kLightest_kg_m3 = 5.0, kHeaviest_kg_m3 = 25e3, kThickest_radii = 20.0;
+  const data::Body& body = *scene.body;
+  const double volume_m3 =
+      std::numbers::pi * body.thickness_m *
+      (body.radius_m * body.radius_m - body.inner_radius_m * body.inner_radius_m);
+  if (body.mass_kg && volume_m3 > 0.0)
+    if (const double density = *body.mass_kg / volume_m3;
+        density < kLightest_kg_m3 || density > kHeaviest_kg_m3)
+      fit.warnings.push_back(
+          fmt::format("[body] mass_kg = {:g} makes a density of {:.2g} kg/m^3; is it in kg, and "
+                      "are the lengths "
+                      "in m?",
+                      *body.mass_kg, density));
+  if (body.thickness_m > kThickest_radii * body.radius_m)
+    fit.warnings.push_back(
+        fmt::format("[body] thickness_m = {:g} is {:.3g} times radius_m; are both in m?",
+                    body.thickness_m, body.thickness_m / body.radius_m));
+}
+
+// Measurements that were all but given up (reweight) are told: their number is no longer what the
+// fit stands on.
+void tell_given_up(const Problem& problem, data::Fit& fit) {
+  constexpr double kLittle = 0.1;
+  int given_up = 0, all = 0;
+  double first_s = 0.0;
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings) {
+      ++all;
+      if (robust_weight(problem, static_cast<int>(arc), reading) > kLittle) continue;
+      if (given_up++ == 0) first_s = problem.arcs[arc].t_s[reading.sample];
+    }
+  if (given_up > 0)
+    fit.warnings.push_back(
+        fmt::format("{} of {} measurements lie far off and hardly count, the first at t = {:.4g} s",
+                    given_up, all, first_s));
+}
+
 // A pivot is freed in vain where there is none.
 void heed_pivot(const Problem& problem, const data::Scene& scene, data::Fit& fit) {
   const auto& infos = problem.predictor->parameters();
@@ -441,6 +497,9 @@ data::Fit OneFit::described(Bars bars) {
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
   heed_pivot(problem_, scene_, fit);
+  tell_unlikely_body(scene_, fit);
+  tell_other_rate(scene_, frame_time_s(tracks_), fit);
+  tell_given_up(problem_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);
   if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "observe/arcs.hpp"
 #include "observe/segments.hpp"
@@ -31,6 +34,24 @@ std::vector<SampleRange> ranges_of(const data::Track& track, const std::string& 
   return {kept};
 }
 
+// The same measurements twice would count twice.
+void check_new(std::span<const data::Track> tracks, std::size_t i) {
+  const auto alike = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a == b || (!a.allFinite() && !b.allFinite());
+  };
+  const auto angle = [](const std::optional<data::MeasuredAngle>& a) {
+    return a ? a->value_rad : 0.0;
+  };
+  const auto same = [&](const data::TrackSample& a, const data::TrackSample& b) {
+    return a.t_s == b.t_s && alike(a.centre_m, b.centre_m) && alike(a.centre_px, b.centre_px) &&
+           angle(a.psi) == angle(b.psi);
+  };
+  for (std::size_t k = 0; k < i; ++k)
+    if (std::equal(tracks[k].samples.begin(), tracks[k].samples.end(), tracks[i].samples.begin(),
+                   tracks[i].samples.end(), same))
+      throw TrackError(fmt::format("track {}: is track {} once more", i + 1, k + 1));
+}
+
 std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
                              const data::Scene& scene, const FitOptions& options) {
   const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
@@ -38,6 +59,7 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
   std::vector<ArcData> arcs;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     data::check(tracks[i], fmt::format("track {}", i + 1));
+    check_new(tracks, i);
     for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
       ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
       arc.track = static_cast<int>(i);
@@ -174,6 +196,21 @@ void tie_to_spin(const data::Scene& scene, Problem& problem) {
   std::erase_if(problem.free, [&](const FreeParameter& p) { return is_velocity(p.index); });
 }
 
+// Of several recordings each brings what is its own: where and how fast it starts.
+void check_each_determined(const Problem& problem) {
+  std::map<int, std::pair<int, int>> rows_and_own;
+  for (const ArcData& arc : problem.arcs) rows_and_own[arc.track].first += arc.rows;
+  for (const FreeParameter& parameter : problem.free)
+    if (parameter.arc >= 0) ++rows_and_own[problem.arcs[parameter.arc].track].second;
+  if (rows_and_own.size() < 2) return;
+  for (const auto& [track, counts] : rows_and_own)
+    if (const auto [rows, own] = counts; rows <= own)
+      throw TrackError(
+          fmt::format("track {}: its {} measurements cannot determine the {} parameters of its own "
+                      "start",
+                      track + 1, rows, own));
+}
+
 }  // namespace
 
 double frame_time_s(std::span<const data::Track> tracks) {
@@ -197,6 +234,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   }
   suit_to_data(problem, scene);
   if (options.rolls_at_first) tie_to_spin(scene, problem);
+  check_each_determined(problem);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)
     throw TrackError(

@@ -335,9 +335,10 @@ void add_calibrate_command(CLI::App& app) {
       ->required();
   command->add_option("--pattern", options->pattern,
                       "Inner corners of a chessboard, squares of a ChArUco board [9x6]");
+  constexpr double kLeast_mm = 0.5, kMost_mm = 1000.0;  // no slip between millimetres and metres
   command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
       ->required()
-      ->check(positive_number());
+      ->check(number_within(kLeast_mm, kMost_mm));
   command
       ->add_option("--marker-mm", options->marker_mm,
                    "Side of a marker [mm]: the board is a ChArUco board")

@@ -298,7 +298,7 @@ Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
 
 void run(const Options& options) {
   Run run = prepared(options);
-  PendingFolder pending(folder_of(options));
+  PendingFolder pending(folder_of(options), {options.video, options.scene, options.camera});
   run.timed("track", [&] { track(run, options); });
   run.timed("fit", [&] { in_scene(options.scene, [&] { fit(run, options); }); });
   const Verdict verdict =

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -61,9 +63,40 @@ void read_facts(const json& run, ReportInput& input) {
   input.video_t_s = value_or<std::vector<double>>(overlay, "t_s", {});
 }
 
+// A file of somebody else's would go with the folder that a run replaces.
+void check_holds_results_only(const fs::path& folder) {
+  constexpr std::array kNames{kRunFile,      "scene.toml", "camera.json", "overlay.mp4",
+                              "report.html", "path.png",   "path.svg",    "residuals.png"};
+  constexpr std::array kEndings{".track.csv", ".fit.json", ".timing.json"};
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    const bool result = name.starts_with('.') ||
+                        std::find(kNames.begin(), kNames.end(), name) != kNames.end() ||
+                        std::any_of(kEndings.begin(), kEndings.end(),
+                                    [&](const char* ending) { return name.ends_with(ending); });
+    if (!result)
+      throw InputError(
+          fmt::format("{}: holds {}, which no run has written and a new one would remove; move it, "
+                      "or name another folder with -o",
+                      folder.string(), name));
+  }
+}
+
+// What a run reads stays as it is.
+void check_holds_none_of(const std::vector<fs::path>& inputs, const fs::path& folder) {
+  const fs::path own = fs::weakly_canonical(folder);
+  for (const fs::path& input : inputs)
+    if (!input.empty() && fs::weakly_canonical(input).parent_path() == own)
+      throw InputError(
+          fmt::format("{}: is read by this run, which would replace the folder it lies in; copy it "
+                      "elsewhere, or name another folder with -o",
+                      input.string()));
+}
+
 }  // namespace
 
-PendingFolder::PendingFolder(fs::path target) : target_(std::move(target)) {
+PendingFolder::PendingFolder(fs::path target, const std::vector<fs::path>& inputs)
+    : target_(std::move(target)) {
   std::error_code code;
   if (!target_.has_filename()) target_ = target_.parent_path();
   const fs::path parent = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
@@ -78,6 +111,10 @@ PendingFolder::PendingFolder(fs::path target) : target_(std::move(target)) {
     throw InputError(
         fmt::format("{}: exists and is not the folder of an earlier run; name another with -o",
                     target_.string()));
+  if (fs::is_directory(target_, code)) {
+    check_holds_none_of(inputs, target_);
+    check_holds_results_only(target_);
+  }
   temporary_ = data::pending_neighbour(target_);
   if (!fs::create_directory(temporary_, code)) {
     data::discard_pending(temporary_);

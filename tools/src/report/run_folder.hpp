@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "report/report.hpp"
 #include "trochoid/data/error.hpp"
@@ -11,8 +12,10 @@ namespace trochoid::tools {
 /// leaves all its files or none. An existing folder is replaced only if a run made it.
 class PendingFolder {
  public:
-  /// @throws InputError if the target cannot be written, or is something a run did not make.
-  explicit PendingFolder(std::filesystem::path target);
+  /// @throws InputError if the target cannot be written, is something a run did not make, or holds
+  /// something else or one of the files that are read.
+  explicit PendingFolder(std::filesystem::path target,
+                         const std::vector<std::filesystem::path>& inputs = {});
   ~PendingFolder();
   PendingFolder(const PendingFolder&) = delete;
   PendingFolder& operator=(const PendingFolder&) = delete;

@@ -34,7 +34,17 @@ std::size_t different_tilts(const std::vector<cv::Mat>& rotations) {
   return normals.size();
 }
 
-// The camera of all these views, one as good as the other.
+// The farthest coordinate of a corner on the board.
+double extent_m(const std::vector<BoardView>& views) {
+  double most = 0.0;
+  for (const BoardView& view : views)
+    for (const Eigen::Vector2d& corner : view.board_m)
+      most = std::max(most, corner.cwiseAbs().maxCoeff());
+  return most > 0.0 ? most : 1.0;
+}
+
+// The camera of all these views, one as good as the other. Its optics do not depend on the size of
+// the board; what OpenCV finds does, unless that is near one.
 Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_px) {
   if (views.size() < kFewest)
     throw InputError(
@@ -43,12 +53,13 @@ Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_
                     views.size(), kFewest));
   std::vector<std::vector<cv::Point3f>> board;
   std::vector<std::vector<cv::Point2f>> image;
+  const double unit_m = extent_m(views);
   for (const BoardView& view : views) {
     board.emplace_back();
     image.emplace_back();
     for (std::size_t i = 0; i < view.board_m.size(); ++i) {
-      board.back().emplace_back(static_cast<float>(view.board_m[i].x()),
-                                static_cast<float>(view.board_m[i].y()), 0.0F);
+      board.back().emplace_back(static_cast<float>(view.board_m[i].x() / unit_m),
+                                static_cast<float>(view.board_m[i].y() / unit_m), 0.0F);
       image.back().emplace_back(static_cast<float>(view.image_px[i].x()),
                                 static_cast<float>(view.image_px[i].y()));
     }

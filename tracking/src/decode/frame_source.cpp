@@ -186,8 +186,10 @@ class LibavSource final : public FrameSource {
     if (options_.frame_rate_hz) {
       if (!(*options_.frame_rate_hz > 0.0)) fail("the frame rate must be positive");
       info_.frame_rate_hz = *options_.frame_rate_hz;
-      info_.variable_rate = false;
+      info_.evened = std::exchange(info_.variable_rate, false);
     }
+    const AVFieldOrder order = stream_->codecpar->field_order;
+    info_.interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
     info_.capture_rate_hz = capture_rate_hz(*container_);
     info_.frames =
         series_ ? static_cast<std::int64_t>(series_->pictures.size()) : stream_->nb_frames;
@@ -228,6 +230,7 @@ class LibavSource final : public FrameSource {
       }
       const bool ours = packet_->stream_index == stream_->index;
       const bool wanted = ours && (!options_.key_frames_only || (packet_->flags & AV_PKT_FLAG_KEY));
+      if (wanted && (packet_->flags & AV_PKT_FLAG_DISCARD) != 0) ++hidden_;
       if (wanted) avcodec_send_packet(decoder_.get(), packet_.get());
       av_packet_unref(packet_.get());
       if (wanted) return true;
@@ -339,18 +342,19 @@ class LibavSource final : public FrameSource {
     for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) turn_.apply(*image);
   }
 
-  /// A file cut short ends like a whole one; only the promised number of frames tells. Edit lists
-  /// and open groups of pictures may honestly hide a few frames, so a handful is forgiven.
+  /// A file cut short ends like a whole one; only the promised number of frames tells. Open groups
+  /// of pictures may honestly hide a few frames, so a handful is forgiven.
   void check_whole() const {
     if (frames_read_ == 0) fail(series_ ? undecodable(0) : "holds no decodable picture");
     if (options_.key_frames_only) return;
-    const std::int64_t missing = info_.frames - frames_read_;
+    const std::int64_t missing = info_.frames - hidden_ - frames_read_;
     if (series_ && missing > 0) fail(undecodable(static_cast<std::size_t>(frames_read_)));
     const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
     if (cut || (!read_error_.empty() && missing > 0))
       fail(fmt::format(
           "breaks off after frame {} of {}{}; copy the whole file, or stop earlier (to)",
-          frames_read_ - 1, info_.frames, read_error_.empty() ? "" : " (" + read_error_ + ")"));
+          frames_read_ - 1, info_.frames - hidden_,
+          read_error_.empty() ? "" : " (" + read_error_ + ")"));
     check_length();
   }
 
@@ -388,6 +392,7 @@ class LibavSource final : public FrameSource {
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
+  std::int64_t hidden_ = 0;  ///< by an edit list: decoded for what follows, not shown
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   double steady_rate_hz_ = 0.0;  ///< 0 = stamps do not tell of a lost picture
   std::int64_t place_ = -1;      ///< in time, of the picture that was decoded last

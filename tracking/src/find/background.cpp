@@ -7,11 +7,14 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
 constexpr int kGrid_px = 12;  // of the brightness comparison
 constexpr int kSamples = Background::kSamples;
+constexpr double kMostGain = 3.0;  // to either side: what differs more shows another scene, or none
 constexpr double kMostStirred = 0.7;  // of the picture; beyond, nothing in it is known to be static
 using Row = std::vector<std::uint8_t>;
 
@@ -27,7 +30,7 @@ double median_ratio(const cv::Mat& image, const cv::Mat& reference) {
   if (ratios.size() < 20) return 1.0;  // too dark or too small to tell
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
-  return std::clamp<double>(*middle, 0.3, 3.0);
+  return std::clamp<double>(*middle, 1.0 / kMostGain, kMostGain);
 }
 
 /// Comparators of Batcher's odd-even merge sort for 16 inputs: 63 min/max pairs on whole rows beat
@@ -278,9 +281,29 @@ BackgroundSamples without_passers_by(const BackgroundSamples& samples, const Pla
   return chosen;
 }
 
+/// Without those too dark or too bright to be brought to the brightness of the others: a clip may
+/// begin black, or fade in.
+BackgroundSamples of_usual_brightness(const BackgroundSamples& samples) {
+  constexpr double kBlack = 20.0;  // with nothing to be seen, unless all are as dark
+  std::vector<double> means, seen;
+  for (const cv::Mat& image : samples.luma) {
+    means.push_back(std::max(1.0, cv::mean(image)[0]));
+    if (means.back() > kBlack) seen.push_back(means.back());
+  }
+  const double usual = data::median(seen.empty() ? means : seen);
+  BackgroundSamples chosen;
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    if (std::max(means[k] / usual, usual / means[k]) > kMostGain) continue;
+    chosen.luma.push_back(samples.luma[k]);
+    if (!samples.chroma.empty()) chosen.chroma.push_back(samples.chroma[k]);
+  }
+  return chosen.luma.empty() ? samples : chosen;
+}
+
 }  // namespace
 
-Background Background::from_samples(const BackgroundSamples& samples) {
+Background Background::from_samples(const BackgroundSamples& all) {
+  const BackgroundSamples samples = of_usual_brightness(all);
   Background background = estimated(samples);
   const auto total = static_cast<double>(background.active_.total());
   if (cv::countNonZero(background.active_) <= kMostStirred * total) return background;

@@ -35,7 +35,7 @@ class Background {
   /// there most of the time - samples that do take its place; where none does and the picture never
   /// settles, the surroundings themselves do.
   /// Samples in which something else, a hand, covers much of the picture are left out, as long as
-  /// most of the others agree.
+  /// most of the others agree; so are those far darker or brighter than most.
   /// Where the chroma of pixels changed - a body as dark as the floor - they changed as well.
   /// @param samples CV_8UC1 (and CV_8UC2) of one size, at least one.
   static Background from_samples(const BackgroundSamples& samples);

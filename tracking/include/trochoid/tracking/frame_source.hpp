@@ -30,6 +30,8 @@ struct VideoInfo {
   std::int64_t missing = 0;         ///< beside those, by the numbers of a series' pictures
   std::string codec;
   bool variable_rate = false;
+  bool evened = false;      ///< it was variable, and a rate given instead takes it for even
+  bool interlaced = false;  ///< by the stream's own word: two half pictures of different times
   std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
   int orientation = 1;  ///< how the stored pictures were turned to be upright, by Exif's numbers
 };
