@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "report/parts.hpp"
 
 namespace trochoid::tools {
@@ -28,6 +30,37 @@ TEST(Report, OneSampleWithoutMetresDoesNotTurnTheOthersIntoPixels) {
   const std::string figure = path_figure(facts);
   EXPECT_THAT(figure, testing::HasSubstr("x [mm]"));
   EXPECT_THAT(figure, testing::Not(testing::HasSubstr("nan")));
+}
+
+// A puck that slides at 1 m/s with next to no friction, seen a micrometre off by turns, and once 1 m off.
+TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
+  ReportInput input;
+  input.tracks.tracks.emplace_back();
+  for (int i = 0; i < 20; ++i) {
+    data::TrackSample sample;
+    sample.frame = i;
+    sample.t_s = 0.01 * i;
+    sample.centre_m = {sample.t_s, i % 2 == 0 ? 1e-6 : -1e-6};
+    sample.covariance_m2 = 1e-12 * Eigen::Matrix2d::Identity();
+    input.tracks.tracks.front().samples.push_back(sample);
+  }
+  input.tracks.tracks.front().samples[7].centre_m.x() += 1.0;
+  data::Fit fit;
+  fit.model = "puck";
+  fit.converged = true;
+  fit.scene_toml =
+      "[body]\nkind = \"disc\"\nradius_m = 0.03\nthickness_m = 0.006\nmass_kg = 0.05\n"
+      "[support]\nkind = \"flat\"\n[model]\nname = \"puck\"\nfriction = 1e-9\n";
+  fit.parameters.emplace_back();
+  fit.parameters.front().name = "vx_m_s";
+  fit.parameters.front().value = 1.0;
+  fit.arcs = {{.track = 0, .object = 0, .from_s = 0.0, .to_s = 0.2, .samples = 20}};
+  input.fit = fit;
+  const ReportFacts facts = gather(input);
+  EXPECT_EQ(facts.far_off, 1);
+  // The other 19 are off across the path only.
+  EXPECT_NEAR(facts.rms_axis_m, 1e-6 / std::sqrt(2.0), 1e-11);
+  EXPECT_THAT(judge(facts).sentence, testing::HasSubstr("but for 1 far off"));
 }
 
 }  // namespace

@@ -19,11 +19,22 @@ void count_gaps(const data::Track& track, ReportFacts& facts) {
   }
 }
 
+// So far from an accepted fit that it was given up.
+bool lies_far_off(const Residual& residual, const ReportFacts& facts) {
+  constexpr double kGivenUp = 11.0;  // sigmas: a fit gives it a tenth of its weight
+  const Eigen::Vector2d off = residual.value_m.cwiseQuotient(residual.sigma_m);
+  return facts.input.fit->converged && off.norm() > kGivenUp;
+}
+
 void measure_residuals(ReportFacts& facts) {
   double sum_m2 = 0.0, sum_sigma2 = 0.0;
   int count = 0, with_sigma = 0;
   for (const auto& list : facts.residuals)
-    for (const Residual& residual : list)
+    for (const Residual& residual : list) {
+      if (lies_far_off(residual, facts)) {
+        ++facts.far_off;
+        continue;
+      }
       for (int axis = 0; axis < 2; ++axis) {
         sum_m2 += std::pow(residual.value_m[axis], 2);
         ++count;
@@ -32,6 +43,7 @@ void measure_residuals(ReportFacts& facts) {
         sum_sigma2 += std::pow(residual.value_m[axis] / sigma_m, 2);
         ++with_sigma;
       }
+    }
   facts.rms_axis_m = count > 0 ? std::sqrt(sum_m2 / count) : kNaN;
   facts.rms_axis_sigma = with_sigma > 0 ? std::sqrt(sum_sigma2 / with_sigma) : kNaN;
 }

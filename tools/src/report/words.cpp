@@ -49,11 +49,13 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                      : weak                             ? "explained, not all determined"
                      : fit.verdict == "good_correlated" ? "explained, residuals correlated"
                                                         : "explained";
-  verdict = {weak || followed || wide ? "fair" : "good",
-             word,
-             fmt::format("{}: the model “{}” follows them with {}: {}.", tracked_words(facts),
-                         fit.model, scatter, fit.verdict_words),
-             {}};
+  verdict = {
+      weak || followed || wide ? "fair" : "good",
+      word,
+      fmt::format("{}: the model “{}” follows them{} with {}: {}.", tracked_words(facts), fit.model,
+                  facts.far_off > 0 ? fmt::format(", but for {} far off,", facts.far_off) : "",
+                  scatter, fit.verdict_words),
+      {}};
   return verdict;
 }
 
