@@ -78,12 +78,15 @@ fs::path resolved(const fs::path& target) {
 void check_writable(const fs::path& given) {
   const fs::path target = is_special(given) ? given : resolved(given);
   std::error_code code;
+  if (given.empty()) throw InputError("the name of a file to write is empty");
   if (target.filename().empty() || fs::is_directory(target, code))
     throw InputError(fmt::format("{}: is a folder, name a file to write", target.string()));
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, code))
-    throw InputError(fmt::format("{}: cannot be written, the folder {} does not exist",
-                                 target.string(), folder.string()));
+    throw InputError(fmt::format(
+        "{}: cannot be written, {}", target.string(),
+        fs::exists(folder, code) ? folder.string() + " is no folder"
+                                 : fmt::format("the folder {} does not exist", folder.string())));
   // A rename would replace it all the same; whoever protected it did not want that.
   if (fs::exists(target, code) && ::access(target.c_str(), W_OK) != 0)
     throw InputError(

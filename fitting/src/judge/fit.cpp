@@ -1,8 +1,10 @@
 #include "trochoid/fitting/fit.hpp"
 
+#include <ceres/version.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -412,6 +414,9 @@ class OneFit {
     if (stages_.wanted()) problem_.log = [this](const std::string& words) { stages_.line(words); };
     fit_.model = problem_.predictor->model_name();
     fit_.seed = options.seed;
+    fit_.versions = {{"ceres", CERES_VERSION_STRING},
+                     {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+                                           EIGEN_MINOR_VERSION)}};
   }
   OneFit(const OneFit&) = delete;
   OneFit& operator=(const OneFit&) = delete;

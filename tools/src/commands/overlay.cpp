@@ -92,7 +92,8 @@ void add_overlay_command(CLI::App& app) {
       ->transform(without_slash());
   command->add_option("--track", options->track, "Track CSV")->required();
   command->add_option("--fit", options->fit, "Fit JSON; without it only the observation is drawn");
-  command->add_option("--scene", options->scene, "Scene TOML (default: the one stored in the fit)");
+  command->add_option("--scene,-s", options->scene,
+                      "Scene TOML (default: the one stored in the fit)");
   command->add_option("--camera", options->camera, "Camera JSON, instead of the scene's");
   command->add_option("-o,--output", options->output, "Overlay video, .mp4 (H.264)");
   command->add_option("--still", options->still, "One picture of the whole path, .png or .jpg");

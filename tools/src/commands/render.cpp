@@ -340,7 +340,8 @@ void add_render_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("render", "Make a recording of a simulated scene, with its truth");
   command
-      ->add_option("--scene", options->scene, "Scene file (TOML), or the name of a bundled scene")
+      ->add_option("--scene,-s", options->scene,
+                   "Scene file (TOML), or the name of a bundled scene")
       ->required();
   command
       ->add_option("-o,--output", options->output,

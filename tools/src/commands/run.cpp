@@ -313,7 +313,7 @@ void run(const Options& options) {
 std::shared_ptr<Options> add_options(CLI::App& command) {
   auto options = std::make_shared<Options>();
   command.add_option("video", options->video, "Recording")->required()->transform(without_slash());
-  command.add_option("--scene", options->scene,
+  command.add_option("--scene,-s", options->scene,
                      "Scene TOML: body, camera, model (docs/formats.md)");
   command.add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
   command.add_option("-o,--output", options->output,

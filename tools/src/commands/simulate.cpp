@@ -192,7 +192,7 @@ void add_simulate_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("simulate", "Run a scene's model and write its trajectory");
-  command->add_option("--scene", options->scene,
+  command->add_option("--scene,-s", options->scene,
                       "Scene file (TOML), or the name of a bundled scene");
   command->add_option(
       "--fit", options->fit,

@@ -147,7 +147,7 @@ void add_track_command(CLI::App& app) {
   track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
       ->transform(without_slash())
       ->required();
-  track->add_option("--scene", options->scene,
+  track->add_option("--scene,-s", options->scene,
                     "Scene file (docs/formats.md); without body and camera a track in pixels");
   track->add_option("--camera", options->camera, "Camera file; replaces the scene's");
   track
