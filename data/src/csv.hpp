@@ -8,8 +8,8 @@
 namespace trochoid::data {
 
 /// Line-wise reader of comma-separated numbers below '#' header lines and one line of column names.
-/// Tolerates CRLF, a byte order mark, blanks around cells, empty lines and '#' lines anywhere;
-/// everything else is refused with file and line.
+/// Tolerates CRLF, a byte order mark, blanks around cells, empty lines and '#' lines anywhere,
+/// these with commas at their ends; everything else is refused with file and line.
 class CsvReader {
  public:
   /// Reads up to the column names. `text` must outlive the reader; `where` names the file.

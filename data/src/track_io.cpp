@@ -101,11 +101,14 @@ TrackSample read_sample(const CsvReader& csv, const TrackColumns& columns) {
   for (std::size_t i = 0; i < kAngles.size(); ++i)
     sample.*kAngles[i].member = read_angle(csv, columns.angles[i], kAngles[i]);
   sample.quality = csv.number(columns.quality);
-  for (const auto& [a, b] :
-       {std::pair(columns.x, columns.y), std::pair(columns.x_px, columns.y_px)})
-    if (std::isnan(csv.number(a)) != std::isnan(csv.number(b)))
-      throw InputError(fmt::format("{}: {} of a place is empty; give both coordinates or neither",
-                                   csv.place(), std::isnan(csv.number(a)) ? "x" : "y"));
+  constexpr std::array kPlaces{std::pair("x_m", "y_m"), std::pair("x_px", "y_px")};
+  const std::array places{sample.centre_m, sample.centre_px};
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (std::isnan(places[i].x()) != std::isnan(places[i].y()))
+      throw InputError(
+          fmt::format("{}: {} is given without {}; give both or neither", csv.place(),
+                      std::isnan(places[i].x()) ? kPlaces[i].second : kPlaces[i].first,
+                      std::isnan(places[i].x()) ? kPlaces[i].first : kPlaces[i].second));
   if (!sample.centre_m.allFinite() && !sample.centre_px.allFinite())
     throw InputError(fmt::format(
         "{}: the row gives neither x_m,y_m nor x_px,y_px; leave the row out", csv.place()));

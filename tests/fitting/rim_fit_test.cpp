@@ -225,6 +225,40 @@ TEST_F(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
   }
 }
 
+// What is not known of the scale and of gravity are two things: their variances add up, and the
+// scale, which is kept, is known as well as before.
+TEST_F(RimFit, TheErrorsOfTwoPriorsAddUp) {
+  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const double radius_m = c.scene.body->radius_m;
+  const auto fitted = [&](bool scale, bool gravity) {
+    data::Scene scene = c.scene;
+    if (scale) scene.fit.prior["radius_m"] = {radius_m, 0.01 * radius_m};
+    if (gravity) scene.fit.prior["gravity_m_s2"] = {9.81, 0.1};
+    return fitting::fit(std::span(&c.track, 1), scene);
+  };
+  const data::Fit none = fitted(false, false), scale = fitted(true, false),
+                  gravity = fitted(false, true), both = fitted(true, true);
+  EXPECT_NEAR(both.find("scale")->sigma, 0.01, 1e-4);
+  for (const char* name : {"theta_rad", "w2_rad_s", "w3_rad_s"}) {
+    const auto variance = [name](const data::Fit& fit) {
+      return fit.find(name)->sigma * fit.find(name)->sigma;
+    };
+    const double sum = variance(scale) + variance(gravity) - variance(none);
+    EXPECT_NEAR(std::sqrt(variance(both)), std::sqrt(sum), 0.03 * std::sqrt(sum)) << name;
+  }
+}
+
+TEST_F(RimFit, NothingButAKeptScaleCanBeFree) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
+  for (const data::FitParameter& p : free.parameters)
+    if (p.status == data::ParameterStatus::free) c.scene.fit.fixed[p.name] = p.value;
+  c.scene.fit.free = {"scale"};
+  c.scene.fit.prior["scale"] = {1.0, 0.002};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_NEAR(fit.find("scale")->sigma, 0.002, 1e-6);
+}
+
 // A disc cannot have more of one moment than twice the other, which no prior knows.
 TEST_F(RimFit, WhatNoBodyCanBeIsNoDoubt) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);

@@ -140,9 +140,10 @@ TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
     return std::string();
   };
   tracks[1].samples.resize(1);
-  EXPECT_THAT(refusal(), testing::HasSubstr("track 2: its 2 measurements cannot determine"));
+  EXPECT_THAT(refusal(), testing::HasSubstr("track 2: its 2 numbers cannot determine"));
   tracks[1] = tracks[0];
-  EXPECT_THAT(refusal(), testing::HasSubstr("track 2: is track 1 once more"));
+  EXPECT_THAT(refusal(),
+              testing::HasSubstr("track 2 is the same as track 1; a recording counts once"));
 }
 
 TEST(GivenUp, MeasurementsAreTold) {
@@ -150,7 +151,8 @@ TEST(GivenUp, MeasurementsAreTold) {
   for (const std::size_t i : {40U, 120U, 121U}) track.samples[i].centre_m.y() += 0.05;
   const data::Fit result = fit_top(track, {});
   ASSERT_TRUE(result.converged) << result.reason;
-  EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("3 of 250 measurements lie")));
+  EXPECT_THAT(result.warnings,
+              testing::Contains(testing::HasSubstr("3 of 250 positions and angles lie")));
 }
 
 // A coin that rolls from the first of 40 pictures on. The first two are blurred: they show no node

@@ -68,6 +68,20 @@ TEST(Background, PicturesWithoutLightAreLeftOut) {
   EXPECT_NEAR(level_at(background.plate().luma, 100, 60), level_at(floor, 100, 60), 3.0);
 }
 
+TEST(Background, ADarkFloorIsTheFloorThoughAFewPicturesAreWhite) {
+  const cv::Mat floor = drawn_floor(200, 120, 9.0);
+  std::mt19937 random(7);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 14; ++i) {
+    cv::Mat picture = floor.clone();
+    draw_disc(picture, 20.0 + 12.0 * i, 60.0, 15.0, 15.0, 0.0, 180.0);
+    frames.push_back(developed(picture, 2.0, random));
+  }
+  for (int i = 0; i < 2; ++i) frames.emplace_back(floor.size(), CV_8U, cv::Scalar(250));
+  const Background background = Background::from_samples({frames, {}});
+  EXPECT_NEAR(level_at(background.plate().luma, 100, 20), level_at(floor, 100, 20), 3.0);
+}
+
 TEST(Background, NoiseIsMeasuredAndFlickerIsTakenOut) {
   std::mt19937 random(4);
   const cv::Mat floor = drawn_floor(160, 120, 120.0);

@@ -192,7 +192,6 @@ std::vector<BoardView> drawn_views() {
   return views;
 }
 
-// Squares 3 % longer than wide: another board, or a sheet that the printer stretched.
 // A camera's optics do not depend on how large the board is said to be.
 TEST(Calibration, KnowsTheOpticsWhateverTheSizeOfTheBoard) {
   std::vector<BoardView> views = drawn_views();
@@ -207,6 +206,7 @@ TEST(Calibration, KnowsTheOpticsWhateverTheSizeOfTheBoard) {
   EXPECT_TRUE(small.left_out.empty());
 }
 
+// Squares 3 % longer than wide: another board, or a sheet that the printer stretched.
 TEST(Calibration, LeavesOutTheViewOfAnotherBoard) {
   std::vector<BoardView> views = drawn_views();
   for (Eigen::Vector2d& p : views[3].board_m) p.x() *= 1.03;

@@ -99,7 +99,7 @@ class Tracking {
   }
 
   [[noreturn]] void nothing_found() {
-    refuse_a_body_of_another_size();
+    tell_other_size();
     if (camera_moved_)
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
@@ -113,9 +113,9 @@ class Tracking {
   }
 
   /// A wrong scale or radius hides a body that is plain to see.
-  void refuse_a_body_of_another_size() {
-    constexpr double kClearly = 1.25;
-    if (camera_moved_) return;
+  void tell_other_size() {
+    constexpr double kClearly = 1.5;  // more than an oblique view makes of a right size
+    if (camera_moved_ || !camera_ || !has_shape(scene_)) return;
     const auto seed = find_seed(recording_.window(), background_, *make_rim_finder(), explained_);
     if (!seed) return;
     const double seen_px = seed->seen.rim.semi_major_px();
@@ -125,7 +125,7 @@ class Tracking {
     throw InputError(
         fmt::format("{}: no body of the given size moves: by radius_m and the camera or scale its "
                     "rim has a radius of about {:.0f} px, and what moves one of about {:.0f} px; "
-                    "check radius_m and the camera's scale",
+                    "check radius_m and the camera's scale, or point at the body: at x,y",
                     video_.string(), expected_px, seen_px));
   }
 

@@ -23,10 +23,7 @@ Eigen::VectorXd sigma_of_one_camera(const Problem& problem, const Eigen::MatrixX
     if (const std::string name = problem.name(i); name == kScale || name == kTimeFactor)
       shared.push_back(i);
   if (shared.empty()) return {};
-  const Eigen::MatrixXd across = covariance(Eigen::all, shared);
-  const Eigen::MatrixXd reduced =
-      covariance - across * covariance(shared, shared).ldlt().solve(across.transpose());
-  return reduced.diagonal().cwiseMax(0.0).cwiseSqrt();
+  return variances_given(covariance, shared).cwiseSqrt();
 }
 
 void report_parameters(const Problem& problem, const Uncertainty& error,

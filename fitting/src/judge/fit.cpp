@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -21,10 +22,12 @@
 #include "judge/profile.hpp"
 #include "judge/statistics.hpp"
 #include "observe/observed.hpp"
+#include "problem/linearise.hpp"
 #include "problem/prepare.hpp"
 #include "start/find.hpp"
 #include "start/starter.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/quantile.hpp"
 #include "trochoid/model/idle_keys.hpp"
 
 namespace trochoid::fitting {
@@ -216,6 +219,10 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
   if (options.bootstrap > 0)
     fit.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
                               options.bootstrap, options.seed, options.threads);
+  if ((options.profile || options.bootstrap > 0) && !kept_parameters(problem).empty())
+    fit.warnings.push_back(
+        "profiles and bootstrap keep the scale and the frame rate as they are, for comparing clips "
+        "of one camera; the error bars hold what is not known of these");
   constexpr double kNarrower = 0.5;
   const auto narrow = [&](const data::BootstrapSpread& spread) {
     const data::FitParameter* parameter = fit.find(spread.parameter);
@@ -320,18 +327,31 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
 }
 
+// Pictures a second by a track's times and frame numbers; 0 where it has none.
+double picture_rate_hz(std::span<const data::Track> tracks) {
+  std::vector<double> steps_s;
+  for (const data::Track& track : tracks)
+    for (std::size_t i = 1; i < track.samples.size(); ++i)
+      if (const data::TrackSample& a = track.samples[i - 1], &b = track.samples[i]; a.frame >= 0)
+        steps_s.push_back((b.t_s - a.t_s) / static_cast<double>(b.frame - a.frame));
+  const double step_s = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
+  return step_s > 0.0 ? 1.0 / step_s : 0.0;
+}
+
 // A recording's own rate and one that is given for its camera may differ: then only what the latter
 // says of its own error is taken.
-void tell_other_rate(const data::Scene& scene, double frame_s, data::Fit& fit) {
+void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks,
+                     data::Fit& fit) {
   const auto prior = scene.fit.prior.find("frame_rate_hz");
-  if (prior == scene.fit.prior.end() || scene.camera.frame_rate_hz || !(frame_s > 0.0)) return;
+  if (prior == scene.fit.prior.end() || scene.camera.frame_rate_hz) return;
   constexpr double kClearly = 0.1;
-  const double rate_hz = 1.0 / frame_s;
-  if (std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
-  fit.warnings.push_back(fmt::format(
-      "[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} samples a second, and its times "
-      "are kept; if they are wrong, track again with [camera] frame_rate_hz = {:g}",
-      prior->second.value, rate_hz, prior->second.value));
+  const double rate_hz = picture_rate_hz(tracks);
+  if (rate_hz == 0.0 || std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
+  fit.warnings.push_back(
+      fmt::format("[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} pictures a second, "
+                  "and its times "
+                  "are kept; if they are wrong, track again with [camera] frame_rate_hz = {:g}",
+                  prior->second.value, rate_hz, prior->second.value));
 }
 
 // Slips of units that a fit would follow without a word.
@@ -347,9 +367,8 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
     if (const double density = *body.mass_kg / volume_m3;
         density < kLightest_kg_m3 || density > kHeaviest_kg_m3)
       fit.warnings.push_back(
-          fmt::format("[body] mass_kg = {:g} makes a density of {:.2g} kg/m^3; is it in kg, and "
-                      "are the lengths "
-                      "in m?",
+          fmt::format("[body] mass_kg = {:g} makes a density of {:.2g} kg/m^3; is it in kg, "
+                      "and are the lengths in m?",
                       *body.mass_kg, density));
   if (body.thickness_m > kThickest_radii * body.radius_m)
     fit.warnings.push_back(
@@ -357,22 +376,23 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
                     body.thickness_m, body.thickness_m / body.radius_m));
 }
 
-// Measurements that were all but given up (reweight) are told: their number is no longer what the
-// fit stands on.
+// Positions and angles that were all but given up (reweight) are told: their number is no longer
+// what the fit stands on.
 void tell_given_up(const Problem& problem, data::Fit& fit) {
   constexpr double kLittle = 0.1;
   int given_up = 0, all = 0;
-  double first_s = 0.0;
+  double first_s = std::numeric_limits<double>::infinity();
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
     for (const Reading& reading : problem.arcs[arc].readings) {
       ++all;
       if (robust_weight(problem, static_cast<int>(arc), reading) > kLittle) continue;
-      if (given_up++ == 0) first_s = problem.arcs[arc].t_s[reading.sample];
+      ++given_up;
+      first_s = std::min(first_s, problem.arcs[arc].t_s[reading.sample]);
     }
   if (given_up > 0)
-    fit.warnings.push_back(
-        fmt::format("{} of {} measurements lie far off and hardly count, the first at t = {:.4g} s",
-                    given_up, all, first_s));
+    fit.warnings.push_back(fmt::format(
+        "{} of {} positions and angles lie far off and hardly count, the first at t = {:.4g} s",
+        given_up, all, first_s));
 }
 
 // A pivot is freed in vain where there is none.
@@ -503,7 +523,7 @@ data::Fit OneFit::described(Bars bars) {
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
   heed_pivot(problem_, scene_, fit);
   tell_unlikely_body(scene_, fit);
-  tell_other_rate(scene_, frame_time_s(tracks_), fit);
+  tell_other_rate(scene_, tracks_, fit);
   tell_given_up(problem_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);

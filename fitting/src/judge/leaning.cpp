@@ -76,7 +76,8 @@ Problem deaf_to(Problem problem, const Sample& sample) {
   Eigen::VectorXd& weights = problem.row_weights[sample.arc];
   if (weights.size() == 0) weights = Eigen::VectorXd::Ones(data.rows);
   for (const Reading& reading : data.readings)
-    if (reading.sample == sample.index) weights.segment(reading.row, rows_of(reading.channel)).setZero();
+    if (reading.sample == sample.index)
+      weights.segment(reading.row, rows_of(reading.channel)).setZero();
   return problem;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "problem/linearise.hpp"
 #include "trochoid/fitting/parallel.hpp"
 
 namespace trochoid::fitting {
@@ -168,9 +169,11 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
 
 std::vector<data::Profile> profiles(const Problem& problem, const Solution& solution,
                                     const Uncertainty& error, int threads) {
+  const std::vector<int> kept = kept_parameters(problem);
   std::vector<int> chosen;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
-    if (tells_of_the_body(problem, i)) chosen.push_back(i);
+    if (tells_of_the_body(problem, i) && std::find(kept.begin(), kept.end(), i) == kept.end())
+      chosen.push_back(i);
   constexpr double kFourDecades = 9.210340371976184;
   std::vector<Side> sides(2 * chosen.size());
   in_parallel(static_cast<int>(sides.size()), threads, [&](int i) {

@@ -93,30 +93,6 @@ void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
   }
 }
 
-// What is held at a value known from elsewhere shifts the others by what they would do for it; what
-// the data would rather have of it counts for nothing. So it is seen through the others alone.
-void see_held_through_others(const Problem& problem, Eigen::MatrixXd& scaled) {
-  std::vector<Eigen::Index> held, others;
-  std::vector<Eigen::Index> own_row;  // with the prior
-  Eigen::Index row = problem.rows();
-  for (Eigen::Index i = 0; i < scaled.cols(); ++i) {
-    const FreeParameter& parameter = problem.free[i];
-    const bool kept = parameter.held && parameter.prior;
-    (kept ? held : others).push_back(i);
-    if (kept) own_row.push_back(row);
-    if (parameter.prior) ++row;
-  }
-  if (held.empty()) return;
-  const Eigen::MatrixXd rest = scaled(Eigen::all, others);
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> span(rest);
-  for (std::size_t k = 0; k < held.size(); ++k) {
-    const double known = scaled(own_row[k], held[k]);
-    scaled(own_row[k], held[k]) = 0.0;
-    scaled.col(held[k]) = rest * span.solve(scaled.col(held[k])).eval();
-    scaled(own_row[k], held[k]) = known;
-  }
-}
-
 // The directions of parameter space in natural sizes, and how sharply the data see each.
 struct Directions {
   Eigen::MatrixXd axes;     // one per column
@@ -254,14 +230,24 @@ double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& 
 
 }  // namespace
 
+Eigen::VectorXd variances_given(const Eigen::MatrixXd& covariance, const std::vector<int>& known) {
+  if (known.empty()) return covariance.diagonal();
+  const Eigen::MatrixXd across = covariance(Eigen::all, known);
+  Eigen::VectorXd rest =
+      (covariance - across * covariance(known, known).ldlt().solve(across.transpose()))
+          .diagonal()
+          .cwiseMax(0.0);
+  for (const int i : known) rest[i] = 0.0;
+  return rest;
+}
+
 Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const Linearised all = linearise(problem, u);
   const int count = static_cast<int>(problem.free.size());
   Uncertainty result;
   Eigen::VectorXd size(count);
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
-  Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
-  see_held_through_others(problem, scaled);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
   const Directions seen = directions_of(problem, scaled, result);
   const Noise noise = noise_of(problem, all, scaled, seen, result);
   Eigen::MatrixXd covariance = sandwich(problem, all, noise, scaled, seen.bread);
@@ -283,8 +269,10 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   covariance += seen.blind;  // after the sandwich, whose filling knows nothing of these directions
   result.covariance = size.asDiagonal() * covariance * size.asDiagonal();
   heed_priors(problem, result.covariance);
-  const Eigen::VectorXd plain = (seen.bread + seen.blind).diagonal().cwiseProduct(size.cwiseAbs2());
-  result.widened = typical_widening(result.covariance.diagonal(), plain);
+  const Eigen::MatrixXd plain = size.asDiagonal() * (seen.bread + seen.blind) * size.asDiagonal();
+  const std::vector<int> kept = kept_parameters(problem);
+  result.widened =
+      typical_widening(variances_given(result.covariance, kept), variances_given(plain, kept));
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   return result;

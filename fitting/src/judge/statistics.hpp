@@ -30,6 +30,10 @@ struct Uncertainty {
 /// The size at which a parameter of a free index counts as "known to 100 %" [its unit].
 [[nodiscard]] double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u);
 
+/// Variances of parameters if those at some places were exact.
+[[nodiscard]] Eigen::VectorXd variances_given(const Eigen::MatrixXd& covariance,
+                                              const std::vector<int>& known);
+
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank. The
 /// covariance is the sandwich of least squares in noise that hangs together: each parameter is
 /// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the

@@ -20,7 +20,7 @@ namespace {
 using Rows = std::vector<int>;
 
 // Rows of one channel of one arc in time order, coordinate by coordinate.
-std::vector<Rows> rows_of(const Linearised& all, Channel channel, int arc) {
+std::vector<Rows> rows_by_coordinate(const Linearised& all, Channel channel, int arc) {
   const int width = rows_of(channel);
   std::vector<Rows> coordinates(static_cast<std::size_t>(width));
   int count = 0;
@@ -49,7 +49,7 @@ Eigen::MatrixXd taken_from(const Eigen::MatrixXd& scaled, const Eigen::MatrixXd&
 
 NoiseGroup group_of(const Problem& problem, const Linearised& all, Channel channel, int arc,
                     const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& unit_steps) {
-  const std::vector<Rows> coordinates = rows_of(all, channel, arc);
+  const std::vector<Rows> coordinates = rows_by_coordinate(all, channel, arc);
   Rows together;
   for (const Rows& rows : coordinates) together.insert(together.end(), rows.begin(), rows.end());
   if (together.empty()) return {};
@@ -255,7 +255,7 @@ Eigen::MatrixXd seen_through(const Problem& problem, const Linearised& all,
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(scaled.cols(), scaled.cols());
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     const std::vector<int> columns = problem.columns_of(arc);
-    for (const Rows& rows : rows_of(all, noise.channel, arc)) {
+    for (const Rows& rows : rows_by_coordinate(all, noise.channel, arc)) {
       const Eigen::MatrixXd part = scaled(rows, columns);
       for (const NoiseKind& kind : noise.kinds)
         sum(columns, columns) +=

@@ -1,8 +1,42 @@
 #include "problem/linearise.hpp"
 
+#include <Eigen/QR>
+#include <algorithm>
+
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
+namespace {
+
+// What is kept shifts the others by what they would do for it; what the data would rather have of
+// it counts for nothing. So it is seen through the others alone, and by its prior.
+void see_through_others(const std::vector<int>& kept, Linearised& all) {
+  std::vector<int> others;
+  for (int i = 0; i < static_cast<int>(all.jacobian.cols()); ++i)
+    if (std::find(kept.begin(), kept.end(), i) == kept.end()) others.push_back(i);
+  if (others.empty()) {
+    for (const int i : kept) all.jacobian.col(i).setZero();
+    return;
+  }
+  Eigen::MatrixXd rest = all.jacobian(Eigen::all, others);
+  rest.array().rowwise() /= rest.colwise().norm().array().max(1e-300);
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> span(rest);
+  for (const int i : kept)
+    all.jacobian.col(i) = rest * span.solve(Eigen::VectorXd(all.jacobian.col(i)));
+}
+
+}  // namespace
+
+std::vector<int> kept_parameters(const Problem& problem) {
+  const auto& infos = problem.predictor->parameters();
+  std::vector<int> kept;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (const FreeParameter& parameter = problem.free[i];
+        parameter.held && parameter.prior &&
+        infos[parameter.index].role == model::ParameterInfo::Role::observation)
+      kept.push_back(i);
+  return kept;
+}
 
 Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
   const int count = static_cast<int>(problem.free.size());
@@ -31,8 +65,18 @@ Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
       }
     first += static_cast<int>(r.size());
   }
-  for (int i = 0; i < count; ++i)
-    if (problem.free[i].prior) all.jacobian(first++, i) = 1.0 / problem.free[i].prior->sigma;
+  const std::vector<int> kept = kept_parameters(problem);
+  const auto put_priors = [&](bool of_kept) {
+    int row = first;
+    for (int i = 0; i < count; ++i) {
+      if (!problem.free[i].prior) continue;
+      const bool is_kept = std::find(kept.begin(), kept.end(), i) != kept.end();
+      if (is_kept == of_kept) all.jacobian(row, i) = 1.0 / problem.free[i].prior->sigma;
+      ++row;
+    }
+  };
+  put_priors(false);
+  if (!kept.empty()) see_through_others(kept, all), put_priors(true);
   return all;
 }
 

@@ -39,17 +39,19 @@ void check_new(std::span<const data::Track> tracks, std::size_t i) {
   const auto alike = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a == b || (!a.allFinite() && !b.allFinite());
   };
-  const auto angle = [](const std::optional<data::MeasuredAngle>& a) {
-    return a ? a->value_rad : 0.0;
+  const auto equal = [](const std::optional<data::MeasuredAngle>& a,
+                        const std::optional<data::MeasuredAngle>& b) {
+    return a.has_value() == b.has_value() && (!a || a->value_rad == b->value_rad);
   };
   const auto same = [&](const data::TrackSample& a, const data::TrackSample& b) {
     return a.t_s == b.t_s && alike(a.centre_m, b.centre_m) && alike(a.centre_px, b.centre_px) &&
-           angle(a.psi) == angle(b.psi);
+           equal(a.theta, b.theta) && equal(a.phi, b.phi) && equal(a.psi, b.psi);
   };
   for (std::size_t k = 0; k < i; ++k)
     if (std::equal(tracks[k].samples.begin(), tracks[k].samples.end(), tracks[i].samples.begin(),
                    tracks[i].samples.end(), same))
-      throw TrackError(fmt::format("track {}: is track {} once more", i + 1, k + 1));
+      throw TrackError(
+          fmt::format("track {} is the same as track {}; a recording counts once", i + 1, k + 1));
 }
 
 std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
@@ -201,14 +203,14 @@ void check_each_determined(const Problem& problem) {
   std::map<int, std::pair<int, int>> rows_and_own;
   for (const ArcData& arc : problem.arcs) rows_and_own[arc.track].first += arc.rows;
   for (const FreeParameter& parameter : problem.free)
-    if (parameter.arc >= 0) ++rows_and_own[problem.arcs[parameter.arc].track].second;
+    if (parameter.arc >= 0 && !parameter.prior)
+      ++rows_and_own[problem.arcs[parameter.arc].track].second;
   if (rows_and_own.size() < 2) return;
   for (const auto& [track, counts] : rows_and_own)
     if (const auto [rows, own] = counts; rows <= own)
-      throw TrackError(
-          fmt::format("track {}: its {} measurements cannot determine the {} parameters of its own "
-                      "start",
-                      track + 1, rows, own));
+      throw TrackError(fmt::format(
+          "track {}: its {} numbers cannot determine the {} parameters of its own start", track + 1,
+          rows, own));
 }
 
 }  // namespace

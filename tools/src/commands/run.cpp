@@ -227,6 +227,7 @@ void write_run_file(const Run& run, const Options& options, const fs::path& fold
   file["trochoid"] = TROCHOID_VERSION;
   const fs::path video = fs::absolute(options.video).lexically_normal();
   file["video"] = (video.parent_path().filename() / video.filename()).string();
+  file["stem"] = stem_of(options);  // of the names of track, fit and timing
   file["command"] = command_line(options);
   file["frames"] = run.tracked.summary.frames;
   file["found"] = run.tracked.summary.found;

@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/recording_name.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -65,16 +65,17 @@ void read_facts(const json& run, ReportInput& input) {
 
 // A file of somebody else's would go with the folder that a run replaces.
 void check_holds_results_only(const fs::path& folder) {
-  constexpr std::array kNames{kRunFile,      "scene.toml", "camera.json", "overlay.mp4",
-                              "report.html", "path.png",   "path.svg",    "residuals.png"};
-  constexpr std::array kEndings{".track.csv", ".fit.json", ".timing.json"};
+  std::vector<std::string> results{kRunFile,      "scene.toml",    "camera.json",
+                                   "overlay.mp4", "report.html",   "path.png",
+                                   "path.svg",    "residuals.png", ".DS_Store"};
+  const json run = read_json(folder / kRunFile);
+  const auto stem = value_or(run, "stem", recording_name(value_or<std::string>(run, "video", "")));
+  for (const char* ending : {".track.csv", ".fit.json", ".timing.json"})
+    results.push_back(stem + ending);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    const bool result = name.starts_with('.') ||
-                        std::find(kNames.begin(), kNames.end(), name) != kNames.end() ||
-                        std::any_of(kEndings.begin(), kEndings.end(),
-                                    [&](const char* ending) { return name.ends_with(ending); });
-    if (!result)
+    if (std::find(results.begin(), results.end(), name) == results.end() ||
+        !entry.is_regular_file())
       throw InputError(
           fmt::format("{}: holds {}, which no run has written and a new one would remove; move it, "
                       "or name another folder with -o",

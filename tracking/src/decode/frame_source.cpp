@@ -191,10 +191,17 @@ class LibavSource final : public FrameSource {
     const AVFieldOrder order = stream_->codecpar->field_order;
     info_.interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
     info_.capture_rate_hz = capture_rate_hz(*container_);
-    info_.frames =
-        series_ ? static_cast<std::int64_t>(series_->pictures.size()) : stream_->nb_frames;
+    info_.frames = series_ ? static_cast<std::int64_t>(series_->pictures.size()) : pictures_shown();
     info_.missing = series_ ? series_->missing() : 0;
     info_.codec = avcodec_get_name(decoder_->codec_id);
+  }
+
+  /// As many as the container says, without those that its edit list hides.
+  [[nodiscard]] std::int64_t pictures_shown() const {
+    std::int64_t hidden = 0;
+    for (int i = 0; i < avformat_index_get_entries_count(stream_); ++i)
+      hidden += (avformat_index_get_entry(stream_, i)->flags & AVINDEX_DISCARD_FRAME) != 0 ? 1 : 0;
+    return std::max<std::int64_t>(0, stream_->nb_frames - hidden);
   }
 
   /// Rate by which the stamps of a video count its pictures; 0 where they do not: stamps coarser
@@ -230,7 +237,6 @@ class LibavSource final : public FrameSource {
       }
       const bool ours = packet_->stream_index == stream_->index;
       const bool wanted = ours && (!options_.key_frames_only || (packet_->flags & AV_PKT_FLAG_KEY));
-      if (wanted && (packet_->flags & AV_PKT_FLAG_DISCARD) != 0) ++hidden_;
       if (wanted) avcodec_send_packet(decoder_.get(), packet_.get());
       av_packet_unref(packet_.get());
       if (wanted) return true;
@@ -347,14 +353,13 @@ class LibavSource final : public FrameSource {
   void check_whole() const {
     if (frames_read_ == 0) fail(series_ ? undecodable(0) : "holds no decodable picture");
     if (options_.key_frames_only) return;
-    const std::int64_t missing = info_.frames - hidden_ - frames_read_;
+    const std::int64_t missing = info_.frames - frames_read_;
     if (series_ && missing > 0) fail(undecodable(static_cast<std::size_t>(frames_read_)));
     const bool cut = missing > std::max<std::int64_t>(2, info_.frames / 50);
     if (cut || (!read_error_.empty() && missing > 0))
       fail(fmt::format(
           "breaks off after frame {} of {}{}; copy the whole file, or stop earlier (to)",
-          frames_read_ - 1, info_.frames - hidden_,
-          read_error_.empty() ? "" : " (" + read_error_ + ")"));
+          frames_read_ - 1, info_.frames, read_error_.empty() ? "" : " (" + read_error_ + ")"));
     check_length();
   }
 
@@ -392,7 +397,6 @@ class LibavSource final : public FrameSource {
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
-  std::int64_t hidden_ = 0;  ///< by an edit list: decoded for what follows, not shown
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   double steady_rate_hz_ = 0.0;  ///< 0 = stamps do not tell of a lost picture
   std::int64_t place_ = -1;      ///< in time, of the picture that was decoded last

@@ -284,16 +284,18 @@ BackgroundSamples without_passers_by(const BackgroundSamples& samples, const Pla
 /// Without those too dark or too bright to be brought to the brightness of the others: a clip may
 /// begin black, or fade in.
 BackgroundSamples of_usual_brightness(const BackgroundSamples& samples) {
-  constexpr double kBlack = 20.0;  // with nothing to be seen, unless all are as dark
-  std::vector<double> means, seen;
+  constexpr double kNothing = 3.0;  // levels that a picture of nothing, black or white, varies by
+  std::vector<double> levels, shown;
   for (const cv::Mat& image : samples.luma) {
-    means.push_back(std::max(1.0, cv::mean(image)[0]));
-    if (means.back() > kBlack) seen.push_back(means.back());
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(image, mean, deviation);
+    levels.push_back(std::max(1.0, mean[0]));
+    if (deviation[0] > kNothing) shown.push_back(levels.back());
   }
-  const double usual = data::median(seen.empty() ? means : seen);
+  const double usual = data::median(shown.empty() ? levels : shown);
   BackgroundSamples chosen;
-  for (std::size_t k = 0; k < means.size(); ++k) {
-    if (std::max(means[k] / usual, usual / means[k]) > kMostGain) continue;
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    if (std::max(levels[k] / usual, usual / levels[k]) > kMostGain) continue;
     chosen.luma.push_back(samples.luma[k]);
     if (!samples.chroma.empty()) chosen.chroma.push_back(samples.chroma[k]);
   }
