@@ -8,14 +8,19 @@
 namespace trochoid::tools {
 namespace {
 
+data::TrackSample sample_of_frame(int frame) {
+  data::TrackSample sample;
+  sample.frame = frame;
+  sample.t_s = 0.01 * frame;
+  return sample;
+}
+
 /// A path along x of ten samples, in pixels and, but for one of them, in metres.
 ReportInput seen_in_metres_but_once() {
   ReportInput input;
   input.tracks.tracks.emplace_back();
   for (int i = 0; i < 10; ++i) {
-    data::TrackSample sample;
-    sample.frame = i;
-    sample.t_s = 0.01 * i;
+    data::TrackSample sample = sample_of_frame(i);
     sample.centre_px = {700.0 + i, 500.0};
     if (i != 4) sample.centre_m = {0.001 * i, 0.0};
     input.tracks.tracks.front().samples.push_back(sample);
@@ -37,9 +42,7 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   ReportInput input;
   input.tracks.tracks.emplace_back();
   for (int i = 0; i < 20; ++i) {
-    data::TrackSample sample;
-    sample.frame = i;
-    sample.t_s = 0.01 * i;
+    data::TrackSample sample = sample_of_frame(i);
     sample.centre_m = {sample.t_s, i % 2 == 0 ? 1e-6 : -1e-6};
     sample.covariance_m2 = 1e-12 * Eigen::Matrix2d::Identity();
     input.tracks.tracks.front().samples.push_back(sample);

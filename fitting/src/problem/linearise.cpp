@@ -8,12 +8,16 @@
 namespace trochoid::fitting {
 namespace {
 
+bool is_among(const std::vector<int>& places, int i) {
+  return std::find(places.begin(), places.end(), i) != places.end();
+}
+
 // What is kept shifts the others by what they would do for it; what the data would rather have of
 // it counts for nothing. So it is seen through the others alone, and by its prior.
 void see_through_others(const std::vector<int>& kept, Linearised& all) {
   std::vector<int> others;
   for (int i = 0; i < static_cast<int>(all.jacobian.cols()); ++i)
-    if (std::find(kept.begin(), kept.end(), i) == kept.end()) others.push_back(i);
+    if (!is_among(kept, i)) others.push_back(i);
   if (others.empty()) {
     for (const int i : kept) all.jacobian.col(i).setZero();
     return;
@@ -70,13 +74,14 @@ Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
     int row = first;
     for (int i = 0; i < count; ++i) {
       if (!problem.free[i].prior) continue;
-      const bool is_kept = std::find(kept.begin(), kept.end(), i) != kept.end();
-      if (is_kept == of_kept) all.jacobian(row, i) = 1.0 / problem.free[i].prior->sigma;
+      if (is_among(kept, i) == of_kept) all.jacobian(row, i) = 1.0 / problem.free[i].prior->sigma;
       ++row;
     }
   };
   put_priors(false);
-  if (!kept.empty()) see_through_others(kept, all), put_priors(true);
+  if (kept.empty()) return all;
+  see_through_others(kept, all);
+  put_priors(true);
   return all;
 }
 

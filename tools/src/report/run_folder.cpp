@@ -63,13 +63,23 @@ void read_facts(const json& run, ReportInput& input) {
   input.video_t_s = value_or<std::vector<double>>(overlay, "t_s", {});
 }
 
+// Beginning of the names of the track, the fit and the times that a run left.
+std::string stem_of_run(const fs::path& folder) try {
+  const json run = read_json(folder / kRunFile);
+  return value_or(run, "stem", recording_name(value_or<std::string>(run, "video", "")));
+} catch (const InputError&) {
+  throw InputError(
+      fmt::format("{}: exists, and its {} cannot be read; remove the folder, or name "
+                  "another with -o",
+                  folder.string(), kRunFile));
+}
+
 // A file of somebody else's would go with the folder that a run replaces.
 void check_holds_results_only(const fs::path& folder) {
   std::vector<std::string> results{kRunFile,      "scene.toml",    "camera.json",
                                    "overlay.mp4", "report.html",   "path.png",
                                    "path.svg",    "residuals.png", ".DS_Store"};
-  const json run = read_json(folder / kRunFile);
-  const auto stem = value_or(run, "stem", recording_name(value_or<std::string>(run, "video", "")));
+  const std::string stem = stem_of_run(folder);
   for (const char* ending : {".track.csv", ".fit.json", ".timing.json"})
     results.push_back(stem + ending);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
