@@ -141,6 +141,9 @@ TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
   };
   tracks[1].samples.resize(1);
   EXPECT_THAT(refusal(), testing::HasSubstr("track 2: its 2 numbers cannot determine"));
+  tracks[1] = thesis_track(25.0, 1e-3, 12);
+  tracks[1].samples.resize(4);
+  EXPECT_THAT(fit(tracks, scene).reason, testing::HasSubstr("track 2: no start"));
   tracks[1] = tracks[0];
   EXPECT_THAT(refusal(),
               testing::HasSubstr("track 2 is the same as track 1; a recording counts once"));

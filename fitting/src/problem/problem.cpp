@@ -162,21 +162,22 @@ std::string Shortfalls::words() const {
     all += by_outcome[i];
     if (by_outcome[i] > by_outcome[commonest]) commonest = i;
   }
+  const std::string where = track >= 0 ? fmt::format("track {}: ", track + 1) : "";
   if (departed > all)
     return fmt::format(
-        "the model does not move as the track does: of {} starts none explains more than a part of "
-        "it",
-        departed.load());
+        "{}the model does not move as the track does: of {} starts none explains more than a part "
+        "of it",
+        where, departed.load());
   if (all == 0)
-    return "no start could be made from the track: is it too short, or does nothing in it move as "
+    return where +
+           "no start could be made from the track: is it too short, or does nothing in it move as "
            "the model does?";
   std::string_view ending = model::sentence(static_cast<model::Outcome>(commonest));
   ending.remove_suffix(ending.ends_with('.') ? 1 : 0);
   return fmt::format(
-      "no start led to a prediction of the whole track: {} attempts ended before it, {} of them "
-      "so: "
-      "{}; are the body's dimensions, the scale and the frame rate right?",
-      all, by_outcome[commonest].load(), ending);
+      "{}no start led to a prediction of the whole track: {} attempts ended before it, {} of them "
+      "so: {}; are the body's dimensions, the scale and the frame rate right?",
+      where, all, by_outcome[commonest].load(), ending);
 }
 
 Problem single_arc(const Problem& problem, int arc) {

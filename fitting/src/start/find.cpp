@@ -363,7 +363,10 @@ Found find(Problem& problem, const Quest& quest) {
   in_parallel(arcs, threads, [&](int arc) { found[arc] = find_arc(alone[arc], quest); });
   Found best;
   for (int arc = 0; arc < arcs; ++arc) {
-    if (!found[arc].solution.usable) return found[arc];
+    if (!found[arc].solution.usable) {
+      if (problem.shortfalls) problem.shortfalls->track = problem.arcs[arc].track;
+      return found[arc];
+    }
     alone[arc].set_base(found[arc].solution.u);
     problem.base[arc] = alone[arc].base[0];
     best.path = arc == 0 || best.path == found[arc].path ? found[arc].path : "mixed";
