@@ -37,7 +37,8 @@ TEST(Report, OneSampleWithoutMetresDoesNotTurnTheOthersIntoPixels) {
   EXPECT_THAT(figure, testing::Not(testing::HasSubstr("nan")));
 }
 
-// A puck that slides at 1 m/s with next to no friction, seen a micrometre off by turns, and once 1 m off.
+// A puck that slides at 1 m/s with next to no friction, seen a micrometre off by turns, and once
+// by 1 m.
 TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   ReportInput input;
   input.tracks.tracks.emplace_back();

@@ -332,7 +332,8 @@ double picture_rate_hz(std::span<const data::Track> tracks) {
   std::vector<double> steps_s;
   for (const data::Track& track : tracks)
     for (std::size_t i = 1; i < track.samples.size(); ++i)
-      if (const data::TrackSample& a = track.samples[i - 1], &b = track.samples[i]; a.frame >= 0)
+      if (const data::TrackSample& a = track.samples[i - 1], &b = track.samples[i];
+          a.frame >= 0 && b.frame > a.frame)
         steps_s.push_back((b.t_s - a.t_s) / static_cast<double>(b.frame - a.frame));
   const double step_s = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
   return step_s > 0.0 ? 1.0 / step_s : 0.0;
@@ -349,8 +350,8 @@ void tell_other_rate(const data::Scene& scene, std::span<const data::Track> trac
   if (rate_hz == 0.0 || std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
   fit.warnings.push_back(
       fmt::format("[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} pictures a second, "
-                  "and its times "
-                  "are kept; if they are wrong, track again with [camera] frame_rate_hz = {:g}",
+                  "and its times are kept; if they are wrong, track again with [camera] "
+                  "frame_rate_hz = {:g}",
                   prior->second.value, rate_hz, prior->second.value));
 }
 

@@ -25,7 +25,7 @@ SmoothAngle series_of(const ArcData& arc, Channel channel) {
   return series;
 }
 
-Eigen::Index nearest(const SmoothAngle& series, double t_s) {
+Eigen::Index nearest(const AngleSeries& series, double t_s) {
   const auto found = std::lower_bound(series.t_s.begin(), series.t_s.end(), t_s);
   return std::min<Eigen::Index>(found - series.t_s.begin(),
                                 static_cast<Eigen::Index>(series.t_s.size()) - 1);
@@ -147,7 +147,7 @@ double spin_by_couples(const RimShape& q, const ArcData& arc, const SmoothAngle&
 
 // Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
 // line's value at an instant: a third of the readings may be wrong.
-std::pair<double, double> robust_line(const SmoothAngle& series, int count, double t_s) {
+std::pair<double, double> robust_line(const AngleSeries& series, int count, double t_s) {
   std::vector<double> slopes, values;
   for (int i = 0; i < count; ++i)
     for (int k = i + 1; k < count; ++k)
@@ -161,7 +161,7 @@ std::pair<double, double> robust_line(const SmoothAngle& series, int count, doub
 
 // The same for an angle that turns up to a quarter of a turn per sample and may be half a turn off:
 // the rate that aligns twice the angles best, then the side that more of them are on.
-std::pair<double, double> robust_turning(const SmoothAngle& series, int count, double t_s) {
+std::pair<double, double> robust_turning(const AngleSeries& series, int count, double t_s) {
   const double span_s = series.t_s[count - 1] - series.t_s[0];
   const double fastest = 0.5 * kPi * (count - 1) / span_s;
   constexpr int kPerPeak = 8;  // rates looked at over the width of a peak
@@ -183,7 +183,7 @@ std::pair<double, double> robust_turning(const SmoothAngle& series, int count, d
 }
 
 // Usual number of readings of an angle in one of its turns.
-double readings_a_turn(const SmoothAngle& series) {
+double readings_a_turn(const AngleSeries& series) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < series.angle_rad.size(); ++i)
     steps.push_back(std::abs(series.angle_rad[i] - series.angle_rad[i - 1]));
