@@ -17,7 +17,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr int kVersion = 1;
-constexpr std::array<std::string_view, 4> kStatuses{"free", "fixed", "derived", "prior"};
 
 template <class Visit>
 void parameter_keys(Visit&& visit) {
@@ -179,7 +178,7 @@ Json to_json(const std::string& value) {
   return value;
 }
 Json to_json(ParameterStatus value) {
-  return kStatuses[static_cast<std::size_t>(value)];
+  return kParameterStatuses[static_cast<std::size_t>(value)];
 }
 Json to_json(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
@@ -252,10 +251,10 @@ void from_json(const nlohmann::json& json, std::string& value, const std::string
   value = json.get<std::string>();
 }
 void from_json(const nlohmann::json& json, ParameterStatus& value, const std::string& place) {
-  const auto found = std::find(kStatuses.begin(), kStatuses.end(),
+  const auto found = std::find(kParameterStatuses.begin(), kParameterStatuses.end(),
                                json.is_string() ? json.get<std::string>() : std::string());
-  if (found == kStatuses.end()) refuse(place, "free, fixed, derived or prior");
-  value = static_cast<ParameterStatus>(found - kStatuses.begin());
+  if (found == kParameterStatuses.end()) refuse(place, "free, fixed, derived or prior");
+  value = static_cast<ParameterStatus>(found - kParameterStatuses.begin());
 }
 void from_json(const nlohmann::json& json, Eigen::MatrixXd& matrix, const std::string& place) {
   if (!json.is_array()) refuse(place, "a list of rows");
@@ -307,9 +306,8 @@ void check_fit(const Fit& fit, const std::string& where) {
 
 }  // namespace
 
-Fit read_fit(const std::filesystem::path& path) {
-  const nlohmann::json json = read_json_object(path);
-  const std::string where = path.string();
+Fit parse_fit(const std::string& text, const std::string& where) {
+  const nlohmann::json json = parse_json_object(text, where);
   const JsonReader reader(json, where);
   const double version = reader.number("trochoid_fit");
   if (version != kVersion)
@@ -321,6 +319,10 @@ Fit read_fit(const std::filesystem::path& path) {
   from_json(json, fit, where);
   check_fit(fit, where);
   return fit;
+}
+
+Fit read_fit(const std::filesystem::path& path) {
+  return parse_fit(read_text(path), path.string());
 }
 
 std::string fit_text(const Fit& fit, const std::string& where) {

@@ -10,23 +10,26 @@
 
 namespace trochoid::data {
 
-nlohmann::json read_json_object(const std::filesystem::path& path) {
-  const std::string text = read_text(path);
+nlohmann::json parse_json_object(const std::string& text, const std::string& where) {
   try {
     nlohmann::json json = nlohmann::json::parse(text);
     if (!json.is_object())
-      throw InputError(fmt::format("{}: expected a JSON object {{...}}", path.string()));
+      throw InputError(fmt::format("{}: expected a JSON object {{...}}", where));
     return json;
   } catch (const nlohmann::json::parse_error& error) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
-    throw InputError(fmt::format("{}:{}: not JSON{}", path.string(),
+    throw InputError(fmt::format("{}:{}: not JSON{}", where,
                                  1 + std::count(text.begin(), end, '\n'),
                                  text.empty()                ? ", the file is empty"
                                  : text.starts_with("# tro") ? ", but a table (CSV)"
                                                              : ""));
   } catch (const nlohmann::json::exception&) {  // a number out of range
-    throw InputError(fmt::format("{}: not JSON: a number is out of range", path.string()));
+    throw InputError(fmt::format("{}: not JSON: a number is out of range", where));
   }
+}
+
+nlohmann::json read_json_object(const std::filesystem::path& path) {
+  return parse_json_object(read_text(path), path.string());
 }
 
 bool JsonReader::has(const char* key) const {

@@ -9,7 +9,9 @@
 /// Reading JSON with messages that name file and key; private to this module.
 namespace trochoid::data {
 
-/// Parses a whole file holding one object. @throws InputError naming file and line.
+/// Parses a text holding one object; `where` stands for its file in messages.
+/// @throws InputError naming `where` and the line.
+[[nodiscard]] nlohmann::json parse_json_object(const std::string& text, const std::string& where);
 [[nodiscard]] nlohmann::json read_json_object(const std::filesystem::path& path);
 
 /// One JSON object with its name for messages.

@@ -126,6 +126,19 @@ void check_tracking(const TableReader& reader, const TrackingSettings& tracking)
                                     tracking.from, tracking.to));
 }
 
+// A group may be free but for some of its components, which have names of their own.
+void check_fit(const TableReader& reader, const FitSettings& fit) {
+  const auto refuse = [&](const char* key, const std::string& name) {
+    reader.fail(key, fmt::format("{} names {}, which fixed gives a value; keep one", key, name));
+  };
+  for (const std::string& name : fit.free)
+    if (fit.fixed.contains(name)) refuse("free", name);
+  for (const auto& [name, prior] : fit.prior)
+    if (fit.fixed.contains(name)) refuse("prior", name);
+  for (const auto& [name, bounds] : fit.bounds)
+    if (fit.fixed.contains(name)) refuse("bounds", name);
+}
+
 Scene scene_of(const toml::table& root, const std::string& where) {
   TableReader top(&root, "a scene's tables", where);
   const auto section = [&](const char* name) {
@@ -161,7 +174,8 @@ Scene scene_of(const toml::table& root, const std::string& where) {
       "run", scene.run, [](auto&& v) { run_keys(v); },
       [&](const TableReader& r) { check_run(r, scene.run); });
   read(
-      "fit", scene.fit, [](auto&& v) { fit_keys(v); }, unchecked);
+      "fit", scene.fit, [](auto&& v) { fit_keys(v); },
+      [&](const TableReader& r) { check_fit(r, scene.fit); });
   for (const auto& [key, node] : root)
     if (!node.is_table() && !node.is_array_of_tables())
       throw SceneError(where, key.source().begin.line,

@@ -119,9 +119,9 @@ Puck<S> puck_system(const PuckScene& scene, const S (&p)[kAll]) {
 /// Runs from parameter values, in the order of `Parameter`.
 template <class S>
 PuckPath<S> puck_path(const PuckScene& scene, const S (&p)[kAll], std::span<const double> t_s,
-                      double tolerance) {
+                      double tolerance, int max_steps = 0) {
   const State<S, 7> start{p[kVx], p[kVy], p[kW3] * p[kContact], p[kX], p[kY], p[kPsi], S(0.0)};
-  return run_puck(puck_system<S>(scene, p), start, t_s, tolerance);
+  return run_puck(puck_system<S>(scene, p), start, t_s, tolerance, max_steps);
 }
 
 /// The six initial parameters that describe a state.
@@ -228,7 +228,8 @@ Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& value
   if (request.derivatives.empty()) {
     double p[kAll] = {};
     given(p);
-    fill(puck_path(scene_, p, t_s, request.tolerance), p[kContact], request, out);
+    fill(puck_path(scene_, p, t_s, request.tolerance, request.max_steps), p[kContact], request,
+         out);
     return out;
   }
   Dual8 p[kAll];  // at most six parameters are not cyclic
@@ -236,7 +237,7 @@ Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& value
   int lane = 0;
   for (const int parameter : request.derivatives)
     if (!cyclic(parameter)) p[kinds_[static_cast<std::size_t>(parameter)]].derivative[lane++] = 1.0;
-  fill(puck_path(scene_, p, t_s, request.tolerance), p[kContact], request, out);
+  fill(puck_path(scene_, p, t_s, request.tolerance, request.max_steps), p[kContact], request, out);
   return out;
 }
 

@@ -43,9 +43,11 @@ template <class S>
 }
 
 /// Runs the puck over ascending times from 0.
+/// @param max_steps  0: the usual limit.
 template <class S>
 [[nodiscard]] PuckPath<S> run_puck(const Puck<S>& puck, const State<S, 7>& start,
-                                   std::span<const double> t_s, double tolerance) {
+                                   std::span<const double> t_s, double tolerance,
+                                   int max_steps = 0) {
   using P = Puck<S>;
   PuckPath<S> path;
   path.rows.reserve(t_s.size());
@@ -64,6 +66,7 @@ template <class S>
   }
   StepControl<7> control = uniform_control<7>(tolerance);
   for (const int c : {P::vx, P::vy, P::q}) control.atol[c] = tolerance * 10.0 * rest_speed;
+  if (max_steps > 0) control.max_steps = max_steps;
   const double pace = value_of(puck.stretch(start));
   control.atol[P::t] = tolerance * pace;
   control.atol[P::x] = control.atol[P::y] = tolerance * pace * speed(start);

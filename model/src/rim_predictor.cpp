@@ -290,7 +290,9 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
   check_request(*this, values, request);
   Call call{values, request, since_start_s(request), {}, {}};
   call.options.tolerance = request.tolerance;
-  call.options.end_s = call.t_s.empty() ? 0.0 : call.t_s.back();
+  // Rows are read off steps: where none but the start is asked for, one is made all the same.
+  constexpr double kInstant_s = 1e-9;
+  call.options.end_s = call.t_s.empty() ? 0.0 : std::max(call.t_s.back(), kInstant_s);
   call.options.impact_at_rim = impact_;
   call.options.max_steps =
       request.max_steps > 0 ? std::min(request.max_steps, kMostSteps) : kMostSteps;

@@ -107,6 +107,18 @@ void require(int flag, const char* call) {
   if (flag < 0) throw NumericalError(fmt::format("SUNDIALS: {} failed with flag {}", call, flag));
 }
 
+void* made(void* memory, const char* call) {
+  if (memory == nullptr) throw NumericalError(fmt::format("SUNDIALS: {} made nothing", call));
+  return memory;
+}
+
+template <void (*free)(void**)>
+struct FreedBy {
+  void operator()(void* memory) const { free(&memory); }
+};
+template <void (*free)(void**)>
+using Memory = std::unique_ptr<void, FreedBy<free>>;
+
 std::string named(char* name) {
   std::string words(name);
   std::free(name);  // SUNDIALS hands out malloc'ed text
@@ -119,40 +131,40 @@ class Cvode : public Stepper {
         const SundialsOptions& options, SUNContext context)
       : interpolate_(options.interpolate) {
     const bool stiff = options.method == SundialsMethod::cvode_bdf;
-    memory_ = CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context);
-    CVodeSetErrHandlerFn(memory_, keep_quiet, nullptr);
-    require(CVodeInit(memory_, call_derivative, start_s, y.get()), "CVodeInit");
-    require(CVodeSVtolerances(memory_, options.rtol, atol.get()), "CVodeSVtolerances");
-    CVodeSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: C interface, never written
-    CVodeSetMaxNumSteps(memory_, options.max_steps);
+    memory_.reset(made(CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context), "CVodeCreate"));
+    CVodeSetErrHandlerFn(memory_.get(), keep_quiet, nullptr);
+    require(CVodeInit(memory_.get(), call_derivative, start_s, y.get()), "CVodeInit");
+    require(CVodeSVtolerances(memory_.get(), options.rtol, atol.get()), "CVodeSVtolerances");
+    CVodeSetUserData(memory_.get(), const_cast<Ode*>(&ode));  // NOLINT: C interface, never written
+    CVodeSetMaxNumSteps(memory_.get(), options.max_steps);
     if (stiff)
       use_newton(ode, y, context);
     else
       use_fixed_point(y, context);
-    if (ode.events > 0) require(CVodeRootInit(memory_, ode.events, call_events), "CVodeRootInit");
+    if (ode.events > 0)
+      require(CVodeRootInit(memory_.get(), ode.events, call_events), "CVodeRootInit");
     if (ode.sensitivities.start.cols() > 0) carry_sensitivities(ode, atol, options, context);
   }
-  ~Cvode() override { CVodeFree(&memory_); }
 
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    if (!interpolate_) CVodeSetStopTime(memory_, t_limit_s);
-    return CVode(memory_, t_limit_s, y, &t_s, CV_NORMAL);
+    if (!interpolate_) CVodeSetStopTime(memory_.get(), t_limit_s);
+    return CVode(memory_.get(), t_limit_s, y, &t_s, CV_NORMAL);
   }
-  void root_signs(int* signs) override { CVodeGetRootInfo(memory_, signs); }
+  void root_signs(int* signs) override { CVodeGetRootInfo(memory_.get(), signs); }
   void sensitivities(Eigen::Ref<Eigen::RowVectorXd> row) override {
     if (carried_.empty()) return;
     double t_s = 0.0;
     std::vector<N_Vector> raw = pointers(carried_);
-    require(CVodeGetSens(memory_, &t_s, raw.data()), "CVodeGetSens");
+    require(CVodeGetSens(memory_.get(), &t_s, raw.data()), "CVodeGetSens");
     const Eigen::Index states = row.size() / static_cast<Eigen::Index>(raw.size());
     for (std::size_t p = 0; p < raw.size(); ++p)
       row.segment(static_cast<Eigen::Index>(p) * states, states) =
           Eigen::Map<const Eigen::RowVectorXd>(N_VGetArrayPointer(raw[p]), states);
   }
   void count(SundialsRun& run) override {
-    CVodeGetNumSteps(memory_, &run.steps);
-    CVodeGetNumRhsEvals(memory_, &run.evaluations);
-    CVodeGetNumErrTestFails(memory_, &run.failed);
+    CVodeGetNumSteps(memory_.get(), &run.steps);
+    CVodeGetNumRhsEvals(memory_.get(), &run.evaluations);
+    CVodeGetNumErrTestFails(memory_.get(), &run.failed);
   }
   std::string flag_name(int flag) const override { return named(CVodeGetReturnFlagName(flag)); }
 
@@ -160,12 +172,13 @@ class Cvode : public Stepper {
   void use_newton(const Ode& ode, const Vector& y, SUNContext context) {
     matrix_.reset(SUNDenseMatrix(ode.states, ode.states, context));
     linear_.reset(SUNLinSol_Dense(y.get(), matrix_.get(), context));
-    require(CVodeSetLinearSolver(memory_, linear_.get(), matrix_.get()), "CVodeSetLinearSolver");
-    if (ode.jacobian) require(CVodeSetJacFn(memory_, call_jacobian), "CVodeSetJacFn");
+    require(CVodeSetLinearSolver(memory_.get(), linear_.get(), matrix_.get()),
+            "CVodeSetLinearSolver");
+    if (ode.jacobian) require(CVodeSetJacFn(memory_.get(), call_jacobian), "CVodeSetJacFn");
   }
   void use_fixed_point(const Vector& y, SUNContext context) {
     nonlinear_.reset(SUNNonlinSol_FixedPoint(y.get(), 0, context));
-    require(CVodeSetNonlinearSolver(memory_, nonlinear_.get()), "CVodeSetNonlinearSolver");
+    require(CVodeSetNonlinearSolver(memory_.get(), nonlinear_.get()), "CVodeSetNonlinearSolver");
   }
 
   /// Staggered: the states' step is accepted first, then all sensitivities with its Jacobian.
@@ -178,12 +191,12 @@ class Cvode : public Stepper {
       tolerances.emplace_back(N_VClone(atol.get()));
       N_VScale(1.0, atol.get(), tolerances.back().get());
     }
-    require(
-        CVodeSensInit(memory_, count, CV_STAGGERED, call_sensitivities, pointers(carried_).data()),
-        "CVodeSensInit");
-    require(CVodeSensSVtolerances(memory_, options.rtol, pointers(tolerances).data()),
+    require(CVodeSensInit(memory_.get(), count, CV_STAGGERED, call_sensitivities,
+                          pointers(carried_).data()),
+            "CVodeSensInit");
+    require(CVodeSensSVtolerances(memory_.get(), options.rtol, pointers(tolerances).data()),
             "CVodeSensSVtolerances");
-    require(CVodeSetSensErrCon(memory_, SUNTRUE), "CVodeSetSensErrCon");
+    require(CVodeSetSensErrCon(memory_.get(), SUNTRUE), "CVodeSetSensErrCon");
   }
   static std::vector<N_Vector> pointers(const std::vector<Vector>& vectors) {
     std::vector<N_Vector> raw;
@@ -192,11 +205,11 @@ class Cvode : public Stepper {
   }
 
   bool interpolate_;
-  void* memory_ = nullptr;
   Matrix matrix_;
   LinearSolver linear_;
   NonlinearSolver nonlinear_;
   std::vector<Vector> carried_;
+  Memory<CVodeFree> memory_;  ///< last: it goes before what it uses
 };
 
 class Erk : public Stepper {
@@ -204,33 +217,32 @@ class Erk : public Stepper {
   Erk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
       const SundialsOptions& options, SUNContext context)
       : interpolate_(options.interpolate) {
-    memory_ = ERKStepCreate(call_derivative, start_s, y.get(), context);
-    ERKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
-    require(ERKStepSVtolerances(memory_, options.rtol, atol.get()), "ERKStepSVtolerances");
-    require(ERKStepSetTableNum(memory_, ARKODE_FEHLBERG_13_7_8), "ERKStepSetTableNum");
-    ERKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
-    ERKStepSetMaxNumSteps(memory_, options.max_steps);
+    memory_.reset(made(ERKStepCreate(call_derivative, start_s, y.get(), context), "ERKStepCreate"));
+    ERKStepSetErrHandlerFn(memory_.get(), keep_quiet, nullptr);
+    require(ERKStepSVtolerances(memory_.get(), options.rtol, atol.get()), "ERKStepSVtolerances");
+    require(ERKStepSetTableNum(memory_.get(), ARKODE_FEHLBERG_13_7_8), "ERKStepSetTableNum");
+    ERKStepSetUserData(memory_.get(), const_cast<Ode*>(&ode));  // NOLINT: as above
+    ERKStepSetMaxNumSteps(memory_.get(), options.max_steps);
     if (ode.events > 0)
-      require(ERKStepRootInit(memory_, ode.events, call_events), "ERKStepRootInit");
+      require(ERKStepRootInit(memory_.get(), ode.events, call_events), "ERKStepRootInit");
   }
-  ~Erk() override { ERKStepFree(&memory_); }
 
   // Stepping exactly to each output keeps order 8; interpolating would be of order 5 at most.
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    if (!interpolate_) ERKStepSetStopTime(memory_, t_limit_s);
-    return ERKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
+    if (!interpolate_) ERKStepSetStopTime(memory_.get(), t_limit_s);
+    return ERKStepEvolve(memory_.get(), t_limit_s, y, &t_s, ARK_NORMAL);
   }
-  void root_signs(int* signs) override { ERKStepGetRootInfo(memory_, signs); }
+  void root_signs(int* signs) override { ERKStepGetRootInfo(memory_.get(), signs); }
   void count(SundialsRun& run) override {
-    ERKStepGetNumSteps(memory_, &run.steps);
-    ERKStepGetNumRhsEvals(memory_, &run.evaluations);
-    ERKStepGetNumErrTestFails(memory_, &run.failed);
+    ERKStepGetNumSteps(memory_.get(), &run.steps);
+    ERKStepGetNumRhsEvals(memory_.get(), &run.evaluations);
+    ERKStepGetNumErrTestFails(memory_.get(), &run.failed);
   }
   std::string flag_name(int flag) const override { return named(ERKStepGetReturnFlagName(flag)); }
 
  private:
   bool interpolate_;
-  void* memory_ = nullptr;
+  Memory<ERKStepFree> memory_;  ///< last: it goes before what it uses
 };
 
 class Dirk : public Stepper {
@@ -238,41 +250,41 @@ class Dirk : public Stepper {
   Dirk(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
        const SundialsOptions& options, SUNContext context)
       : interpolate_(options.interpolate) {
-    memory_ = ARKStepCreate(nullptr, call_derivative, start_s, y.get(), context);
-    ARKStepSetErrHandlerFn(memory_, keep_quiet, nullptr);
-    require(ARKStepSVtolerances(memory_, options.rtol, atol.get()), "ARKStepSVtolerances");
-    require(ARKStepSetTableNum(memory_, ARKODE_ESDIRK547L2SA_7_4_5, ARKODE_ERK_NONE),
+    memory_.reset(
+        made(ARKStepCreate(nullptr, call_derivative, start_s, y.get(), context), "ARKStepCreate"));
+    ARKStepSetErrHandlerFn(memory_.get(), keep_quiet, nullptr);
+    require(ARKStepSVtolerances(memory_.get(), options.rtol, atol.get()), "ARKStepSVtolerances");
+    require(ARKStepSetTableNum(memory_.get(), ARKODE_ESDIRK547L2SA_7_4_5, ARKODE_ERK_NONE),
             "ARKStepSetTableNum");
-    ARKStepSetUserData(memory_, const_cast<Ode*>(&ode));  // NOLINT: as above
-    ARKStepSetMaxNumSteps(memory_, options.max_steps);
+    ARKStepSetUserData(memory_.get(), const_cast<Ode*>(&ode));  // NOLINT: as above
+    ARKStepSetMaxNumSteps(memory_.get(), options.max_steps);
     matrix_.reset(SUNDenseMatrix(ode.states, ode.states, context));
     linear_.reset(SUNLinSol_Dense(y.get(), matrix_.get(), context));
-    require(ARKStepSetLinearSolver(memory_, linear_.get(), matrix_.get()),
+    require(ARKStepSetLinearSolver(memory_.get(), linear_.get(), matrix_.get()),
             "ARKStepSetLinearSolver");
-    if (ode.jacobian) require(ARKStepSetJacFn(memory_, call_jacobian), "ARKStepSetJacFn");
+    if (ode.jacobian) require(ARKStepSetJacFn(memory_.get(), call_jacobian), "ARKStepSetJacFn");
     if (ode.events > 0)
-      require(ARKStepRootInit(memory_, ode.events, call_events), "ARKStepRootInit");
+      require(ARKStepRootInit(memory_.get(), ode.events, call_events), "ARKStepRootInit");
   }
-  ~Dirk() override { ARKStepFree(&memory_); }
 
   int advance(double t_limit_s, N_Vector y, double& t_s) override {
-    if (!interpolate_) ARKStepSetStopTime(memory_, t_limit_s);
-    return ARKStepEvolve(memory_, t_limit_s, y, &t_s, ARK_NORMAL);
+    if (!interpolate_) ARKStepSetStopTime(memory_.get(), t_limit_s);
+    return ARKStepEvolve(memory_.get(), t_limit_s, y, &t_s, ARK_NORMAL);
   }
-  void root_signs(int* signs) override { ARKStepGetRootInfo(memory_, signs); }
+  void root_signs(int* signs) override { ARKStepGetRootInfo(memory_.get(), signs); }
   void count(SundialsRun& run) override {
     long explicit_evaluations = 0;
-    ARKStepGetNumSteps(memory_, &run.steps);
-    ARKStepGetNumRhsEvals(memory_, &explicit_evaluations, &run.evaluations);
-    ARKStepGetNumErrTestFails(memory_, &run.failed);
+    ARKStepGetNumSteps(memory_.get(), &run.steps);
+    ARKStepGetNumRhsEvals(memory_.get(), &explicit_evaluations, &run.evaluations);
+    ARKStepGetNumErrTestFails(memory_.get(), &run.failed);
   }
   std::string flag_name(int flag) const override { return named(ARKStepGetReturnFlagName(flag)); }
 
  private:
   bool interpolate_;
-  void* memory_ = nullptr;
   Matrix matrix_;
   LinearSolver linear_;
+  Memory<ARKStepFree> memory_;  ///< last: it goes before what it uses
 };
 
 std::unique_ptr<Stepper> make_stepper(const Ode& ode, double start_s, const Vector& y,

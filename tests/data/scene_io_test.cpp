@@ -187,7 +187,7 @@ rim_switch = "impact"
 [fit]
 free = ["l_m", "I_kg_m2"]
 prior = { "mass_kg" = [2.0, 0.5] }
-fixed = { "l_m" = 0.25 }
+fixed = { "Is_kg_m2" = 0.25 }
 bounds = { "I_kg_m2" = [0.5, inf] }
 free_pivot = true
 free_scale = true
@@ -319,6 +319,12 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"PriorSigmaZero", "[fit]\nprior = { mass_kg = [0.03, 0] }", ":2:", "fixed"},
         Refusal{"BoundsReversed", "[fit]\nbounds = { l_m = [2, 1] }", ":2:", "lower < upper"},
         Refusal{"FreeTwice", "[fit]\nfree = ['l_m', 'l_m']", ":2:", "twice"},
+        Refusal{"FreeAndFixed", "[fit]\nfree = ['l_m']\nfixed = { l_m = 1 }",
+                ":2:", "free names l_m, which fixed gives a value"},
+        Refusal{"PriorAndFixed", "[fit]\nfixed = { l_m = 1 }\nprior = { l_m = [1, 0.1] }",
+                ":3:", "keep one"},
+        Refusal{"BoundedAndFixed", "[fit]\nfixed = { l_m = 1 }\nbounds = { l_m = [0, 2] }",
+                ":3:", "keep one"},
         Refusal{"FreeNoList", "[fit]\nfree = 'l_m'", ":2:", "list of names"},
         Refusal{"DoubledKey", "[body]\nradius_m = 1\nradius_m = 2", ":3:", "not TOML"},
         Refusal{"NotToml", "[body\nradius_m = 1", ":1:", "not TOML"},

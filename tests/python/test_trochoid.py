@@ -5,6 +5,7 @@ import inspect
 import json
 import os
 import pathlib
+import pickle
 import signal
 import tempfile
 import threading
@@ -205,6 +206,24 @@ class Fit(unittest.TestCase):
         self.assertEqual(texts[0], texts[1])
         self.assertEqual(texts[0], texts[2])
 
+    def test_a_fit_and_a_scene_go_to_another_process_and_back_unchanged(self):
+        fit = trochoid.fit(noisy_track(), model="top")
+        again = pickle.loads(pickle.dumps(fit))
+        self.assertEqual(again, fit)
+        self.assertEqual(again["l_m"].value, fit["l_m"].value)
+        self.assertNotEqual(again, trochoid.fit(noisy_track(seed=2), model="top"))
+        self.assertEqual(pickle.loads(pickle.dumps(trochoid.Scene(TOP))), trochoid.Scene(TOP))
+
+    def test_a_fit_is_not_replayed_over_the_file_of_another_track(self):
+        with tempfile.TemporaryDirectory() as folder:
+            own, other = os.path.join(folder, "own.csv"), os.path.join(folder, "other.csv")
+            trochoid.TrackFile([noisy_track()]).write(own)
+            trochoid.TrackFile([noisy_track(seed=2)]).write(other)
+            fit = trochoid.fit(own, model="top")
+            self.assertEqual(len(trochoid.predict(fit, own)), 1)
+            with self.assertRaisesRegex(trochoid.InputError, "was not fitted to .*other.csv"):
+                trochoid.predict(fit, other)
+
     def test_a_fit_is_replayed_close_to_its_track(self):
         track = noisy_track()
         arc, = trochoid.predict(trochoid.fit(track, model="top"), track)
@@ -212,6 +231,16 @@ class Fit(unittest.TestCase):
         residuals = arc.centre_m[at, :2] - track.centre_m
         # The noise is 1e-4; the mean over 602 numbers scatters by 3 %.
         self.assertLess(np.sqrt(np.mean(residuals**2)), 1.1e-4)
+
+    def test_tracks_are_equal_where_all_they_hold_is_the_unknown_included(self):
+        track, same = noisy_track(), noisy_track()
+        track.theta_rad, same.theta_rad = (np.full(len(track), np.nan) for _ in range(2))
+        self.assertEqual(track, same)
+        self.assertEqual(trochoid.TrackFile([track]), trochoid.TrackFile([same]))
+        same.centre_m[7, 1] += 1e-9
+        self.assertNotEqual(track, same)
+        self.assertNotEqual(trochoid.TrackFile([track]), trochoid.TrackFile([same]))
+        self.assertNotEqual(track, trochoid.Track(track.t_s))
 
     def test_a_track_survives_its_file(self):
         track = noisy_track()

@@ -22,7 +22,9 @@ namespace trochoid::tracking {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 constexpr int kFrames = 12, kWidth = 64, kHeight = 48;
 
@@ -282,9 +284,18 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
   EXPECT_EQ(frames_of({"t101502033.png", "t101502066.png", "t101502101.png", "t101502133.png"}),
             one_by_one);
   EXPECT_EQ(frames_of({"1015_1.png", "1015_2.png", "1016_1.png", "1016_9.png"}), one_by_one);
-  EXPECT_EQ(frames_of({"1_9.png", "1_10.png", "cover.png", "._1_9.png"}),
-            (std::vector<std::int64_t>{0, 1, 2}));
+  EXPECT_EQ(frames_of({"1_9.png", "cover.png", "._1_9.png"}), (std::vector<std::int64_t>{0, 1}));
   EXPECT_EQ(frames_of({"only.png"}), (std::vector<std::int64_t>{0}));
+}
+
+TEST_F(FrameSourceTest, APictureNamedUnlikeTheNumberedOnesOfItsFolderIsNoFrame) {
+  for (const char* name : {"p1.png", "p2.PNG", "p4.png", "empty floor.png", "z.png"})
+    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+  const auto source = open_video(folder_, {.frame_rate_hz = 10.0});
+  EXPECT_EQ(source->info().frames, 3);
+  EXPECT_EQ(source->info().missing, 1);
+  EXPECT_THAT(source->info().left_out, ElementsAre(folder_ / "empty floor.png", folder_ / "z.png"));
+  EXPECT_THAT(open_video(folder_ / "*.png", {.frame_rate_hz = 10.0})->info().left_out, IsEmpty());
 }
 
 TEST_F(FrameSourceTest, ASeriesCountsByItsOwnNumberAndFoldersFollowEachOther) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <utility>
 
 #include "find/body_search.hpp"
@@ -21,6 +20,7 @@
 #include "link/track_assembly.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/parallel.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -313,13 +313,14 @@ class Tracking {
       }
     };
     BodyPath::Frames before;
-    auto backward = std::async(std::launch::async, [&] {
-      Follower back(*finder_, background_, path.marks);
-      follow(back, -1, before);
-    });
+    Follower back(*finder_, background_, path.marks);
     auto ahead = std::make_unique<Follower>(*finder_, background_, path.marks);
-    follow(*ahead, 1, path.frames);
-    backward.get();
+    data::in_parallel(2, 2, [&](std::size_t side) {
+      if (side == 0)
+        follow(*ahead, 1, path.frames);
+      else
+        follow(back, -1, before);
+    });
     path.frames.merge(before);
     if (seed.seen.pose) decide(path, window, 0, *ahead);
     return {std::move(path), std::move(ahead)};
@@ -491,6 +492,11 @@ class Tracking {
       result.file.notes.push_back(fmt::format(
           "by their time stamps {} of {} pictures are missing; the others keep their times",
           missing_, frames_ + missing_));
+    if (const auto& others = recording_.info().left_out; !others.empty())
+      result.file.notes.push_back(fmt::format(
+          "{} picture{} of the folder, named unlike the others, {} left out: {}{}", others.size(),
+          others.size() == 1 ? "" : "s", others.size() == 1 ? "is" : "are",
+          others.front().filename().string(), others.size() == 1 ? "" : ", ..."));
     if (recording_.info().evened)
       result.file.notes.push_back(
           "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "choose/terms.hpp"
-#include "trochoid/fitting/parallel.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::fitting {
 
@@ -45,10 +45,8 @@ void side_by_side(const Contest& contest, const std::vector<Rung*>& rungs,
                   const std::function<void(std::size_t, Rung&, const FitOptions&)>& fit) {
   FitOptions one = contest.options;
   one.threads = 1;
-  in_parallel(static_cast<int>(rungs.size()), contest.options.threads, [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
-    fit(i, *rungs[i], options_for(*rungs[i], one));
-  });
+  data::in_parallel(rungs.size(), contest.options.threads,
+                    [&](std::size_t i) { fit(i, *rungs[i], options_for(*rungs[i], one)); });
 }
 
 Rung& add_searched(const Contest& contest, const Terms& terms, Rungs& rungs,

@@ -13,7 +13,6 @@ namespace trochoid::fitting {
 std::optional<double> retrograde_from_s(const data::Fit& fit, const data::Scene& scene) {
   const bool rim = fit.model == "rolling" || fit.model == "sliding";
   if (!rim || !fit.converged || fit.arcs.size() != 1) return std::nullopt;
-  const auto predictor = model::make_predictor(scene);
   const double from_s = fit.arcs[0].from_s, duration_s = fit.arcs[0].to_s - from_s;
   constexpr double kRate_Hz = 1000.0;  // tens of rows to a turn
   const int rows = std::clamp(static_cast<int>(kRate_Hz * duration_s), 200, 30000);
@@ -23,7 +22,7 @@ std::optional<double> retrograde_from_s(const data::Fit& fit, const data::Scene&
   request.t_s = t_s;
   request.start_s = from_s;
   request.observables.push_back(model::Observable::phi_rad);
-  const Eigen::VectorXd run = predictor->predict(fitted_values(*predictor, fit), request).values;
+  const Eigen::VectorXd run = fitted_prediction(fit, scene, 0, request).values;
   Eigen::Index good = 0;
   while (good < rows && run.segment<3>(3 * good).allFinite()) ++good;
   const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>> path(run.data(), 3, good);
@@ -32,7 +31,7 @@ std::optional<double> retrograde_from_s(const data::Fit& fit, const data::Scene&
     const auto mean = model::mean_path(times, path.row(2).transpose(), path.row(0).transpose(),
                                        path.row(1).transpose());
     return mean.inflection_s();
-  } catch (const InputError&) {  // too few turns
+  } catch (const InputError&) {  // too few turns, or precession to and fro: no mean path
     return std::nullopt;
   }
 }

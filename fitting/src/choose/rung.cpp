@@ -69,7 +69,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kHeldBack = 1.0 / 3.0;
 
-// Wrong by at most what a camera would see: squares of (prediction - measurement)/sigma.
+// Squares of (prediction - measurement) / sigma.
 struct Squares {
   double sum = 0.0;
   int rows = 0;
@@ -96,16 +96,6 @@ void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predict
   squares.add(whitened.y());
 }
 
-// When and where in the image samples were seen.
-ArcData seen_at(const std::vector<const data::TrackSample*>& samples) {
-  ArcData arc;
-  for (const data::TrackSample* sample : samples) {
-    arc.t_s.push_back(sample->t_s);
-    arc.row_px.push_back(sample->centre_px.y());
-  }
-  return arc;
-}
-
 // Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
 Squares squares_of(const data::Track& track, int first, int last, int track_index,
                    const data::Scene& scene, const data::Fit& fit) {
@@ -114,17 +104,13 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
     if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
   if (arc < 0) return squares;
-  const auto plain = model::make_predictor(scene);
-  data::Scene measured = scene;
-  const auto wrapped = observed(*plain, measured, 0.0);  // scale and frame rate as fitted
-  const model::Predictor* predictor = wrapped ? wrapped.get() : plain.get();
-  const Eigen::VectorXd values = fitted_values(*predictor, fit, static_cast<std::size_t>(arc));
-  std::vector<double> t_s;
+  std::vector<double> t_s, row_px;
   std::vector<const data::TrackSample*> samples;
   for (int i = first; i < last; ++i) {
     const data::TrackSample& sample = track.samples[static_cast<std::size_t>(i)];
     if (sample.t_s < fit.arcs[static_cast<std::size_t>(arc)].from_s) continue;
     t_s.push_back(sample.t_s);
+    row_px.push_back(sample.centre_px.y());
     samples.push_back(&sample);
   }
   model::PredictRequest request;
@@ -133,10 +119,8 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
   request.observables.push_back(model::Observable::psi_rad);
   request.lies_where_it_fell = true;
   const bool angle_only = fit.model == "pivot";
-  const model::Prediction run = has_timing(*predictor)
-                                    ? predict_timed(*predictor, values, request, seen_at(samples),
-                                                    timing_of(*predictor, measured))
-                                    : predictor->predict(values, request);
+  const model::Prediction run =
+      fitted_prediction(fit, scene, static_cast<std::size_t>(arc), request, row_px);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const Eigen::Vector3d at = run.values.segment<3>(3 * static_cast<Eigen::Index>(i));
     if (at.allFinite())
@@ -170,8 +154,10 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
     const Squares after = squares_of(tracks[i], split, last, index, rung.scene, early);
     seen.sum += before.sum, seen.rows += before.rows;
     unseen.sum += after.sum, unseen.rows += after.rows;
-    for (const data::TrackSample& sample : tracks[i].samples)
-      sigma_known = sigma_known && (early.model == "pivot" || sample.has_covariance());
+    for (int k = first; k < last; ++k)
+      sigma_known =
+          sigma_known && (early.model == "pivot" ||
+                          tracks[i].samples[static_cast<std::size_t>(k)].has_covariance());
   }
   if (unseen.rows == 0 || seen.rows == 0) return std::numeric_limits<double>::quiet_NaN();
   const double rms = std::sqrt(unseen.sum / unseen.rows);

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "observe/angles.hpp"
+#include "trochoid/data/parallel.hpp"
 #include "trochoid/data/quantile.hpp"
-#include "trochoid/fitting/parallel.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -108,14 +108,14 @@ data::Bootstrap bootstrap(const Problem& problem, const Solution& solution,
   const double stretch =
       std::sqrt(rows / std::max(1.0, rows - static_cast<double>(problem.free.size())));
   std::vector<std::vector<double>> values(static_cast<std::size_t>(draws));
-  in_parallel(draws, threads, [&](int draw) {
+  data::in_parallel(values.size(), threads, [&](std::size_t draw) {
     std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(draw)};
     std::mt19937_64 generator(sequence);
     Problem drawn = plain;
     drawn.noise_scale = problem.noise_scale;
     for (int arc = 0; arc < arcs; ++arc)
       resample(drawn.arcs[arc], series[arc], residuals[arc], stretch, generator);
-    values[static_cast<std::size_t>(draw)] = fit_again(std::move(drawn), solution);
+    values[draw] = fit_again(std::move(drawn), solution);
   });
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     std::vector<double> of_parameter;

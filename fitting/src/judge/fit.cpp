@@ -622,15 +622,4 @@ Draft draft_one_of_several(std::span<const data::Track> tracks, const data::Scen
           one->settled()};
 }
 
-Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
-                              std::size_t arc) {
-  const auto& parameters = predictor.parameters();
-  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const data::FitParameter* fitted = fit.find(parameters[i].name, arc);
-    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
-  }
-  return values;
-}
-
 }  // namespace trochoid::fitting

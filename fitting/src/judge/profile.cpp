@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "problem/linearise.hpp"
-#include "trochoid/fitting/parallel.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -176,8 +176,8 @@ std::vector<data::Profile> profiles(const Problem& problem, const Solution& solu
       chosen.push_back(i);
   constexpr double kFourDecades = 9.210340371976184;
   std::vector<Side> sides(2 * chosen.size());
-  in_parallel(static_cast<int>(sides.size()), threads, [&](int i) {
-    const int index = chosen[static_cast<std::size_t>(i / 2)];
+  data::in_parallel(sides.size(), threads, [&](std::size_t i) {
+    const int index = chosen[i / 2];
     const Transform& transform = problem.free[index].transform;
     const double slope = std::abs(transform.slope(solution.u[index]));
     const bool logarithmic = transform.kind == Transform::Kind::log;
@@ -187,7 +187,7 @@ std::vector<data::Profile> profiles(const Problem& problem, const Solution& solu
     if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
     const double farthest = logarithmic ? kFourDecades : 100.0 * sd;
     const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd;
-    sides[static_cast<std::size_t>(i)] =
+    sides[i] =
         walk(problem, solution, index, step, farthest, kQuantile95 * error.chi2_inflation[index]);
   });
   std::vector<data::Profile> result;
@@ -211,9 +211,9 @@ std::optional<FarSide> far_side_of_friction(const Problem& problem, const Soluti
   const double quantile = std::sqrt(kQuantile95), sigma = std::sqrt(error.covariance(index, index));
   const double step = quantile * sigma / std::abs(free->transform.slope(solution.u[index]));
   std::array<double, 2> bounds{};
-  in_parallel(2, threads, [&](int side) {
-    bounds[static_cast<std::size_t>(side)] = bound_to_side(
-        problem, solution, index, side == 0 ? -step : step, error.chi2_inflation[index]);
+  data::in_parallel(2, threads, [&](std::size_t side) {
+    bounds[side] = bound_to_side(problem, solution, index, side == 0 ? -step : step,
+                                 error.chi2_inflation[index]);
   });
   const FarSide far{index, std::max(bounds[0], bounds[1]) / quantile};
   return far.sigma > sigma ? std::optional(far) : std::nullopt;

@@ -40,6 +40,9 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
 }
 
 int kept_samples(int first, int last, double hold_back) {
+  if (!(hold_back >= 0.0 && hold_back < 1.0))
+    throw InputError(
+        fmt::format("hold_back = {} must be a share, at least 0 and below 1", hold_back));
   const double kept = (1.0 - hold_back) * static_cast<double>(last - first);
   return std::max(first + 1, first + static_cast<int>(std::lround(kept)));
 }

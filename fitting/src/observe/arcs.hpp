@@ -16,6 +16,7 @@ using SampleRange = std::pair<int, int>;
                                        const std::string& to);
 
 /// End of the samples that are fitted when a share at the end is held back: at least one stays.
+/// @throws InputError unless the share is in 0..1 and not 1.
 [[nodiscard]] int kept_samples(int first, int last, double hold_back);
 
 }  // namespace trochoid::fitting

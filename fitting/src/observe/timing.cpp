@@ -79,7 +79,7 @@ WithRates with_rates(const model::Predictor& predictor, const Eigen::VectorXd& v
   // A fiftieth of the mean distance of samples: the motion is resolved by those.
   const double step_s = 0.02 * (t_s.back() - t_s.front()) /
                         std::max<double>(1.0, static_cast<double>(t_s.size()) - 1.0);
-  if (!(step_s > 0.0)) throw InputError("samples are out of order");
+  if (!(step_s > 0.0)) throw NumericalError("samples are out of order");
   PredictRequest plain = request;
   plain.derivatives.clear();
   // The later one runs beyond the last sample, where the body may have come to its end: backward.
@@ -130,7 +130,7 @@ Prediction predict_timed(const model::Predictor& predictor, const Eigen::VectorX
     position_s[i] += later_s * share[i];
   }
   if (!std::is_sorted(position_s.begin(), position_s.end()))
-    throw InputError("readout_s puts samples out of order");
+    throw NumericalError("readout_s puts samples out of order");
   angle_s = position_s;
   for (double& t : angle_s) t += behind_s;
 

@@ -11,9 +11,8 @@ inline constexpr const char* kReadout = "readout_s";         ///< first to last 
 inline constexpr const char* kAngleDelay = "angle_delay_s";  ///< of the angles' clock
 
 /// When samples were really taken, as parameters of a fit (role observation):
-///   readout_s      rolling shutter: a sample whose time stamp was corrected with the scene's
-///   readout
-///                  r0 and that lies at row y was taken (readout - r0) y/(rows - 1) later;
+///   readout_s      rolling shutter: a sample at row y, whose time stamp was corrected with the
+///                  scene's readout r0, was taken (readout - r0) y / (rows - 1) later;
 ///   angle_delay_s  angles belong to an instant that much later than the positions of their row of
 ///                  the track (two instruments, or a tracker that filters one of them).
 struct Timing {
@@ -32,7 +31,7 @@ struct Timing {
 /// them included. Before the start of the arc the path is continued by reflection through its first
 /// point, which is right to second order in the delay.
 /// @param request  as for predict(); its t_s are the arc's own.
-/// @throws InputError if the parameters put samples out of order.
+/// @throws NumericalError if the parameters put samples out of order.
 [[nodiscard]] model::Prediction predict_timed(const model::Predictor& predictor,
                                               const Eigen::VectorXd& values,
                                               const model::PredictRequest& request,

@@ -41,7 +41,7 @@ struct Transform {
 /// Why predictions ended before the track did, and starts were not followed to its end, counted
 /// while searching.
 struct Shortfalls {
-  std::array<std::atomic<int>, 9> by_outcome{};  ///< in the order of model::Outcome
+  std::array<std::atomic<int>, model::kOutcomes> by_outcome{};  ///< in the order of model::Outcome
   std::atomic<int> departed{0};  ///< starts whose path left the track's within a part of it
   std::atomic<int> track{-1};    ///< of several, the one that no start explains
   void count(model::Outcome outcome) { ++by_outcome[static_cast<std::size_t>(outcome)]; }

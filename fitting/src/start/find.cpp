@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "trochoid/data/error.hpp"
-#include "trochoid/fitting/parallel.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -360,7 +360,8 @@ Found find(Problem& problem, const Quest& quest) {
   std::vector<Problem> alone;
   for (int arc = 0; arc < arcs; ++arc) alone.push_back(single_arc(problem, arc));
   std::vector<Found> found(alone.size());
-  in_parallel(arcs, threads, [&](int arc) { found[arc] = find_arc(alone[arc], quest); });
+  data::in_parallel(arcs, threads,
+                    [&](std::size_t arc) { found[arc] = find_arc(alone[arc], quest); });
   Found best;
   for (int arc = 0; arc < arcs; ++arc) {
     if (!found[arc].solution.usable) {
@@ -374,7 +375,7 @@ Found find(Problem& problem, const Quest& quest) {
   }
   std::vector<Problem> trials(alone.size(), problem);
   std::vector<Solution> solutions(alone.size());
-  in_parallel(arcs, threads, [&](int leader) {
+  data::in_parallel(arcs, threads, [&](std::size_t leader) {
     Problem& trial = trials[leader];
     for (const FreeParameter& parameter : problem.free)
       if (parameter.arc < 0)

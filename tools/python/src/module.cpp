@@ -123,7 +123,7 @@ py::list predict(const data::Fit& fit, const py::dict& file, int fit_track) {
       constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
       centre_m.row(i) = pose.centre_m;
       angles_rad.row(i) << (arc.has_tilt ? pose.theta_rad : kNone),
-          (arc.has_tilt ? pose.phi_rad : kNone), (arc.has_spin ? pose.psi_rad : kNone);
+          (arc.has_tilt ? pose.phi_rad : kNone), pose.psi_rad;
     }
     py::dict dict;
     dict["object"] = arc.object;
@@ -197,7 +197,6 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
   input.fit_track = options["fit_track"].cast<int>();
   const auto track_file = options["track_file"].cast<fs::path>();
   tools::check_recording(input, track_file.empty() ? "track" : track_file.string());
-  if (!fit_file.empty() && !track_file.empty()) tools::check_made_from(*fit, fit_file, track_file);
   tools::OverlayOptions how{.from = options["from"].cast<std::string>(),
                             .to = options["to"].cast<std::string>(),
                             .slow = options["slow"].cast<double>(),
@@ -231,8 +230,7 @@ void add_fit_parts(py::module_& module) {
       .def_property_readonly(
           "status",
           [](const FitParameter& p) {
-            constexpr const char* kWords[] = {"free", "fixed", "derived", "prior"};
-            return kWords[static_cast<std::size_t>(p.status)];
+            return data::kParameterStatuses[static_cast<std::size_t>(p.status)];
           },
           "free, fixed, derived or prior")
       .def("__repr__", [](const FitParameter& p) {
@@ -317,8 +315,10 @@ void add_fit_values(py::module_& module) {
       .def_readonly("inputs", &Fit::inputs)
       .def_readonly("versions", &Fit::versions)
       .def_readonly("seed", &Fit::seed)
-      .def_readonly("scene_toml", &Fit::scene_toml);
+      .def_readonly("scene_toml", &Fit::scene_toml)
+      .def_property_readonly("text", [](const Fit& f) { return data::fit_text(f, "fit"); });
   module.def("read_fit", [](const fs::path& path) { return data::read_fit(path); });
+  module.def("parse_fit", [](const std::string& text) { return data::parse_fit(text, "fit"); });
   module.def("write_fit", [](const Fit& fit, const fs::path& path) { data::write_fit(fit, path); });
 }
 
@@ -373,6 +373,7 @@ PYBIND11_MODULE(_core, module) {
   });
   module.def("sha256_of_file", &data::sha256_of_file);
   module.def("check_output", &tools::check_output);
+  module.def("check_made_from", &tools::check_made_from);
   module.def("simulate", &simulate);
   module.def("fit", &fit);
   module.def("predict", &predict);

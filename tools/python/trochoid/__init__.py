@@ -87,6 +87,22 @@ def _output(name: str, value: Optional[Path], *inputs: Any) -> Optional[str]:
     return os.fsdecode(value)
 
 
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        a, b = np.asarray(a), np.asarray(b)
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f")
+    return bool(a == b)
+
+
+class _Record:
+    """Equal where all fields are, arrays element by element; NaN, the unknown, equals NaN."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(_same(mine, vars(other)[name]) for name, mine in vars(self).items())
+
+
 def _toml_value(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -148,14 +164,20 @@ class Scene:
     def __repr__(self) -> str:
         return f"Scene.from_toml({self.toml!r})"
 
+    def __eq__(self, other: object) -> bool:
+        return self.toml == other.toml if isinstance(other, Scene) else NotImplemented
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene.from_toml, (self.toml,)
+
 
 def scenes() -> dict[str, str]:
     """Names of the bundled scenes with a sentence about each."""
     return _core.bundled_scenes()
 
 
-@dataclasses.dataclass
-class Track:
+@dataclasses.dataclass(eq=False)
+class Track(_Record):
     """The path of one body; n samples, strictly increasing in time; frames without the body have none.
 
     Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN.
@@ -179,8 +201,8 @@ class Track:
         return len(self.t_s)
 
 
-@dataclasses.dataclass
-class TrackFile:
+@dataclasses.dataclass(eq=False)
+class TrackFile(_Record):
     """The tracks of a recording and where they come from."""
 
     tracks: list[Track]
@@ -340,9 +362,19 @@ class Fit:
         worth = self.verdict or self.outcome  # another tool's file may lack the verdict
         return f"<Fit of {self.model}: {worth}, chi2 {self.chi2:.6g} for {self.dof}>"
 
+    def __eq__(self, other: object) -> bool:
+        return self._value.text == other._value.text if isinstance(other, Fit) else NotImplemented
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _fit_of_text, (self._value.text,)
+
     def write(self, path: Path) -> None:
         """Writes the fit file (JSON), whole or not at all."""
         _core.write_fit(self._value, _path("path", path))
+
+
+def _fit_of_text(text: str) -> Fit:
+    return Fit(_core.parse_fit(text))
 
 
 def read_fit(path: Path) -> Fit:
@@ -350,8 +382,13 @@ def read_fit(path: Path) -> Fit:
     return Fit(_core.read_fit(_path("path", path)))
 
 
-def _fit(given: Union[Path, Fit]) -> Fit:
-    return given if isinstance(given, Fit) else Fit(_core.read_fit(_path("fit", given)))
+def _fit(given: Union[Path, Fit], tracks: Any) -> Fit:
+    """A fit to be shown over tracks: of a file the fit tells whether it was made from it."""
+    fit = given if isinstance(given, Fit) else Fit(_core.read_fit(_path("fit", given)))
+    if isinstance(tracks, (str, os.PathLike)):
+        name = "fit" if isinstance(given, Fit) else os.fsdecode(given)
+        _core.check_made_from(fit._value, name, os.fsdecode(tracks))
+    return fit
 
 
 def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, model: str = "",
@@ -397,8 +434,8 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     return result
 
 
-@dataclasses.dataclass
-class PredictedArc:
+@dataclasses.dataclass(eq=False)
+class PredictedArc(_Record):
     """The fitted model's path over one arc, m moments: every sample's and several in between."""
 
     object: int
@@ -412,12 +449,12 @@ def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
             fit_track: int = 0) -> list[PredictedArc]:
     """Replays a fit over the track it was made from; ``fit_track`` counts tracks fitted together."""
     file = TrackFile(_all_tracks(tracks)[0])
-    arcs = _core.predict(_fit(fit)._value, _file_dict(file), _whole("fit_track", fit_track))
+    arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(file), _whole("fit_track", fit_track))
     return [PredictedArc(**arc) for arc in arcs]
 
 
-@dataclasses.dataclass
-class OverlayFrames:
+@dataclasses.dataclass(eq=False)
+class OverlayFrames(_Record):
     """Picture k of an overlay shows frame[k] of the recording, at t_s[k]."""
 
     frame_rate_hz: float   #: of the overlay
@@ -452,14 +489,14 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
                "fit_track": _whole("fit_track", fit_track)}
     file = track if isinstance(track, TrackFile) else TrackFile(_all_tracks(track)[0])
     frames = _core.overlay(_path("video", video), _file_dict(file),
-                           _fit(fit)._value if fit is not None else None,
+                           _fit(fit, track)._value if fit is not None else None,
                            Scene(scene)._value if scene is not None else None,
                            _optional(_path, "camera", camera), options)
     return OverlayFrames(**frames)
 
 
-@dataclasses.dataclass
-class Trajectory:
+@dataclasses.dataclass(eq=False)
+class Trajectory(_Record):
     """A finished run. ``run["x_m"]`` is the column of that name, (rows,)."""
 
     model: str

@@ -13,7 +13,7 @@
 #include "common/validators.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/fitting/parallel.hpp"
+#include "trochoid/data/parallel.hpp"
 
 // trochoid campaign: many recordings, one process each; what is done is not done again.
 namespace trochoid::tools {
@@ -71,12 +71,11 @@ std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Op
 void run_items(const Campaign& campaign, const std::vector<const CampaignItem*>& items, int jobs) {
   Progress progress("campaign", "recordings");
   std::atomic<std::int64_t> done{0};
-  const auto count = static_cast<int>(items.size());
-  fitting::in_parallel(count, jobs, [&](int i) {
-    const CampaignRecord record = run_item(campaign, *items[static_cast<std::size_t>(i)]);
+  data::in_parallel(items.size(), jobs, [&](std::size_t i) {
+    const CampaignRecord record = run_item(campaign, *items[i]);
     detail(fmt::format("{}: exit status {} after {:.2f} s {}", record.name, record.exit_status,
                        record.seconds, record.message));
-    progress.update(++done, count);
+    progress.update(++done, static_cast<std::int64_t>(items.size()));
   });
 }
 

@@ -12,6 +12,7 @@
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
+#include "common/scene_library.hpp"
 #include "common/validators.hpp"
 #include "draw/encoded_file.hpp"
 #include "draw/overlay.hpp"
@@ -42,10 +43,9 @@ OverlayInput read_inputs(const Options& options) {
     input.scene = data::read_scene(options.scene);
   else if (input.fit)
     input.scene = scene_of_fit(*input.fit, options.fit);
-  if (!options.camera.empty())
-    input.camera = data::read_camera(options.camera);
-  else if (!options.scene.empty() && !input.scene->camera.file.empty())
-    input.camera = data::read_camera(input.scene->camera.file);  // one that is gone is named
+  // The camera of a scene that was kept in a fit may have gone since; one given here is named.
+  input.camera = named_camera(options.camera, options.scene.empty() ? data::Scene{} : *input.scene,
+                              options.scene);
   input.fit_track = options.fit_track;
   return input;
 }

@@ -77,12 +77,10 @@ Run prepared(const Options& options) {
   if (options.objects > 0) run.scene.tracking.objects = options.objects;
   if (!options.at.empty()) run.scene.tracking.at_px = parse_point(options.at);
   if (options.rate_hz > 0.0) run.scene.camera.frame_rate_hz = options.rate_hz;
+  run.camera = named_camera(options.camera, run.scene, options.scene);
   if (!options.camera.empty()) {
-    run.camera = data::read_camera(options.camera);
     run.scene.camera.scale_px_per_m.reset();
     run.scene.camera.height_m.reset();
-  } else if (!run.scene.camera.file.empty()) {
-    run.camera = data::read_camera(run.scene.camera.file);
   }
   return run;
 }

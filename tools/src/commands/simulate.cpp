@@ -155,8 +155,8 @@ void simulate_scene(const Options& options) {
   check_rows(named.string(), scene.run);
   const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
   if (run.values.rows() == 0)
-    throw InputError(fmt::format("{}: [start] leaves nothing to simulate: {} Start elsewhere",
-                                 options.scene, model::sentence(run.outcome)));
+    throw InputError(fmt::format("{}: the start leaves nothing to simulate: {} Start elsewhere",
+                                 named.string(), model::sentence(run.outcome)));
   if (options.fit.empty()) tell_idle_keys(options.scene, scene);
   data::Table table = trajectory_table(run);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);

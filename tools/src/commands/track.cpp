@@ -10,6 +10,7 @@
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
+#include "common/scene_library.hpp"
 #include "common/track_options.hpp"
 #include "common/validators.hpp"
 #include "trochoid/data/error.hpp"
@@ -111,8 +112,7 @@ void run(const Options& options) {
   check_outputs({options.output, options.edges, options.smooth, timing_file(options.output)},
                 {options.video, options.scene, options.camera});
   const data::Scene scene = scene_of(options);
-  std::optional<data::Camera> camera;
-  if (!options.camera.empty()) camera = data::read_camera(options.camera);
+  const std::optional<data::Camera> camera = named_camera(options.camera, scene, options.scene);
   tracking::TrackOptions how;
   how.objects = scene.tracking.objects;
   how.from = options.from;

@@ -45,11 +45,12 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
   if (child == 0) {
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != parent) _exit(127);  // it ended before it could be asked for a signal
+    dup2(pipe_ends[1], STDERR_FILENO);
     const int nothing = open("/dev/null", O_RDWR);
     const int written = open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    if (nothing < 0 || written < 0) end_unstarted(errno);
     dup2(nothing, STDIN_FILENO);
     dup2(written, STDOUT_FILENO);
-    dup2(pipe_ends[1], STDERR_FILENO);
     execvp(argv[0], argv.data());
     end_unstarted(errno);
   }
@@ -61,10 +62,12 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
       run.error_output.append(buffer.data(), static_cast<std::size_t>(n));
     int status = 0;
     rusage usage{};
-    wait4(child, &status, 0, &usage);
+    pid_t waited = 0;
+    while ((waited = wait4(child, &status, 0, &usage)) < 0 && errno == EINTR) {
+    }
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     run.seconds = elapsed.count();
-    run.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    run.exit_status = waited == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     run.started = run.exit_status != 127;
     run.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
   }

@@ -8,6 +8,7 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -75,7 +76,7 @@ void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
   body.l_m = *l;
   body.I_kg_m2 = body.mass_kg ? *body.mass_kg * weight_arm_m2_s2 / *a : 1.0;
   if (!body.mass_kg) body.mass_kg = *a / weight_arm_m2_s2;
-  const data::FitParameter* spin = fit.find("omega_s_rad_s");
+  const data::FitParameter* spin = fit.find("omega_s_rad_s", arc);
   const bool seen = spin != nullptr && spin->identifiable && spin->value * *b > 0.0;
   const double omega_s = seen ? spin->value : std::copysign(kAnySpin_rad_s, *b);
   scene.start.omega_s_rad_s = omega_s;
@@ -97,6 +98,10 @@ void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
 
 }  // namespace
 
+double time_factor(const data::Fit& fit) {
+  return value_of(fit, "frame_rate_factor", 0).value_or(1.0);
+}
+
 double arc_start_s(const data::Fit& fit, std::size_t arc) {
   return arc == 0 ? fit.time_origin_s : fit.arcs.at(arc).from_s;
 }
@@ -105,7 +110,8 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   if (arc >= fit.arcs.size())
     throw InputError(
         fmt::format("the fit has {} arcs, counted from 0: no arc {}", fit.arcs.size(), arc));
-  data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in the fit");
+  data::Scene scene =
+      fitting::scene_as_fitted(data::parse_scene(fit.scene_toml, "the scene stored in the fit"));
   scene.model.name = fit.model;
   scene.start = {};
   for (const auto& [name, field] : kStart)
@@ -121,7 +127,7 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
         "the fit found the puck to touch the floor on a radius of {:.4g} m; a scene's puck touches "
         "it on all of its face. Fix contact_radius_m in the fit to simulate it",
         contact->value));
-  scene.run.until_s = fit.arcs[arc].to_s - arc_start_s(fit, arc);
+  scene.run.until_s = time_factor(fit) * (fit.arcs[arc].to_s - arc_start_s(fit, arc));
   return scene;
 }
 

@@ -14,7 +14,10 @@ namespace trochoid::tools {
 /// @throws InputError if there is no such arc.
 [[nodiscard]] data::Scene fitted_scene(const data::Fit& fit, std::size_t arc);
 
-/// Where the arc's initial state belongs [s].
+/// True over measured duration, as fitted (a clip whose container lies); 1 where it was not.
+[[nodiscard]] double time_factor(const data::Fit& fit);
+
+/// Where the arc's initial state belongs, by the recording's clock [s].
 [[nodiscard]] double arc_start_s(const data::Fit& fit, std::size_t arc);
 
 }  // namespace trochoid::tools

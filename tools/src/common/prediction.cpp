@@ -39,9 +39,6 @@ const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& 
 data::Scene scene_in(const data::Fit& fit) {
   data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in the fit");
   if (scene.model.name == "auto") scene.model.name = fit.model;
-  // A friction that the scene did not name was found all the same.
-  if (const data::FitParameter* friction = fit.find("friction"))
-    if (!scene.model.friction) scene.model.friction = friction->value;
   return scene;
 }
 
@@ -66,14 +63,35 @@ std::vector<double> grid_of(const data::Track& track, const data::FitArc& arc) {
   return grid;
 }
 
+// Rows of the image in which the body was at these times, straight from sample to sample.
+std::vector<double> rows_of(const data::Track& track, const std::vector<double>& t_s) {
+  std::vector<const data::TrackSample*> seen;
+  for (const data::TrackSample& sample : track.samples)
+    if (std::isfinite(sample.centre_px.y())) seen.push_back(&sample);
+  if (seen.empty()) return {};
+  std::vector<double> rows_px;
+  std::size_t next = 0;
+  for (const double t : t_s) {
+    while (next < seen.size() && seen[next]->t_s < t) ++next;
+    const data::TrackSample &after = *seen[std::min(next, seen.size() - 1)],
+                            &before = *seen[next == 0 ? 0 : next - 1];
+    const double width_s = after.t_s - before.t_s;
+    const double w = width_s > 0.0 ? std::clamp((t - before.t_s) / width_s, 0.0, 1.0) : 0.0;
+    rows_px.push_back(std::lerp(before.centre_px.y(), after.centre_px.y(), w));
+  }
+  return rows_px;
+}
+
+double scale_of(const data::Fit& fit) {
+  const data::FitParameter* scale = fit.find("scale");
+  return scale != nullptr ? scale->value : 1.0;
+}
+
 bool models_tilt(const std::string& model) {
   return model != "puck" && model != "pivot";
 }
-bool models_spin(const std::string& model) {
-  return model != "free";
-}
 
-// Height of the CoM above the floor: the models' x, y, theta determine it once the support is
+// Height of the CoM above the floor [m]: the models' x, y, theta determine it once the support is
 // known.
 double height_m(const data::Scene& scene, const std::string& model, const data::Fit& fit,
                 double theta_rad) {
@@ -91,31 +109,31 @@ double height_m(const data::Scene& scene, const std::string& model, const data::
 std::vector<Observable> observables_of(const std::string& model) {
   std::vector<Observable> wanted{Observable::x_m, Observable::y_m};
   if (models_tilt(model)) wanted.insert(wanted.end(), {Observable::theta_rad, Observable::phi_rad});
-  if (models_spin(model)) wanted.push_back(Observable::psi_rad);
+  wanted.push_back(Observable::psi_rad);
   return wanted;
 }
 
-PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
-                        const data::Scene& scene, const data::Track& track, std::size_t arc_index) {
+PredictedArc replay_arc(const std::string& model, const data::Fit& fit, const data::Scene& scene,
+                        const data::Track& track, std::size_t arc_index) {
   const data::FitArc& arc = fit.arcs[arc_index];
   PredictedArc replayed;
   replayed.object = arc.object;
   replayed.from_s = arc.from_s;
   replayed.to_s = arc.to_s;
-  replayed.has_tilt = models_tilt(predictor.model_name());
-  replayed.has_spin = models_spin(predictor.model_name());
+  replayed.has_tilt = models_tilt(model);
   replayed.t_s = grid_of(track, arc);
   model::PredictRequest request;
   request.t_s = replayed.t_s;
   request.start_s = arc_start_s(fit, arc_index);
-  request.observables = observables_of(predictor.model_name());
+  request.observables = observables_of(model);
   request.lies_where_it_fell = true;
   const model::Prediction run =
-      predictor.predict(fitting::fitted_values(predictor, fit, arc_index), request);
+      fitting::fitted_prediction(fit, scene, arc_index, request, rows_of(track, replayed.t_s));
   const bool goes_on =
       run.outcome == model::Outcome::reached_end || run.outcome == model::Outcome::flat;
   if (!goes_on) replayed.ended = sentence(run.outcome);
   const auto columns = static_cast<Eigen::Index>(request.observables.size());
+  const double scale = scale_of(fit);
   for (std::size_t n = 0; n < replayed.t_s.size(); ++n) {
     const auto row = run.values.segment(static_cast<Eigen::Index>(n) * columns, columns);
     data::Pose<> pose;
@@ -123,8 +141,8 @@ PredictedArc replay_arc(const model::Predictor& predictor, const data::Fit& fit,
       pose.theta_rad = row[2];
       pose.phi_rad = row[3];
     }
-    if (replayed.has_spin) pose.psi_rad = row[columns - 1];
-    pose.centre_m = {row[0], row[1], height_m(scene, predictor.model_name(), fit, pose.theta_rad)};
+    pose.psi_rad = row[columns - 1];
+    pose.centre_m = {row[0], row[1], scale * height_m(scene, model, fit, pose.theta_rad)};
     replayed.pose.push_back(pose);
   }
   return replayed;
@@ -147,11 +165,10 @@ void put_where_seen(PredictedArc& arc, const data::Track& track) {
 
 PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int track_index) {
   const data::Scene scene = scene_in(fit);
-  const auto predictor = model::make_predictor(scene);
-  PredictedPath path{.model = predictor->model_name(), .arcs = {}};
+  PredictedPath path{.model = fit.model, .arcs = {}};
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
     if (const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index)) {
-      path.arcs.push_back(replay_arc(*predictor, fit, scene, *track, i));
+      path.arcs.push_back(replay_arc(path.model, fit, scene, *track, i));
       if (path.angles_alone()) put_where_seen(path.arcs.back(), *track);
     }
   if (path.arcs.empty())
@@ -164,7 +181,6 @@ PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int tr
 
 std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data::TrackFile& tracks,
                                                 int track_index, double tolerance) {
-  const auto predictor = model::make_predictor(scene_in(fit));
   for (std::size_t i = 0; i < fit.arcs.size(); ++i) {
     const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index);
     if (track == nullptr) continue;
@@ -174,7 +190,7 @@ std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data
     request.start_s = arc_start_s(fit, i);
     request.tolerance = tolerance;
     const model::Prediction run =
-        predictor->predict(fitting::fitted_values(*predictor, fit, i), request);
+        fitting::fitted_prediction(fit, scene_in(fit), i, request, rows_of(*track, grid));
     if (run.outcome != model::Outcome::reached_end) return std::nullopt;
     return run.values;
   }
@@ -212,7 +228,7 @@ std::optional<data::Pose<>> PredictedPath::at(int object, double t_s) const {
 std::optional<double> spin_residual_rad(const data::TrackSample& sample, int object,
                                         const PredictedPath& path) {
   const PredictedArc* arc = path.arc_at(object, sample.t_s);
-  if (!sample.psi || arc == nullptr || !arc->has_spin) return std::nullopt;
+  if (!sample.psi || arc == nullptr) return std::nullopt;
   const auto pose = path.at(object, sample.t_s);
   if (!pose) return std::nullopt;
   return std::remainder(sample.psi->value_rad - pose->psi_rad, 2.0 * std::numbers::pi);

@@ -21,7 +21,6 @@ struct PredictedArc {
   std::vector<double> t_s;
   std::vector<data::Pose<>> pose;
   bool has_tilt = false;  ///< pose.theta_rad and phi_rad are predicted
-  bool has_spin = false;  ///< pose.psi_rad is predicted
 };
 
 struct PredictedPath {

@@ -33,6 +33,13 @@ data::Scene load_scene(const std::string& file_or_name) {
       file_or_name));
 }
 
+std::optional<data::Camera> named_camera(const std::filesystem::path& given,
+                                         const data::Scene& scene, const std::string& scene_name) {
+  if (!given.empty()) return data::read_camera(given);
+  if (scene.camera.file.empty()) return std::nullopt;
+  return in_scene(scene_name, [&] { return data::read_camera(scene.camera.file); });
+}
+
 void tell_idle_keys(const std::string& scene_name, const data::Scene& scene) {
   const std::vector<std::string> idle = model::idle_keys(scene);
   if (idle.empty()) return;

@@ -1,8 +1,11 @@
 #pragma once
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "trochoid/data/camera.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/scene.hpp"
 
@@ -22,6 +25,12 @@ struct BundledScene {
 
 /// Says in one line on stderr which keys of the scene its model passes over, if any.
 void tell_idle_keys(const std::string& scene_name, const data::Scene& scene);
+
+/// The camera of the file `given`, else of the file that the scene (called `scene_name`) names, if
+/// there is one. @throws InputError that names the file, and the scene if that is where it stands.
+[[nodiscard]] std::optional<data::Camera> named_camera(const std::filesystem::path& given,
+                                                       const data::Scene& scene,
+                                                       const std::string& scene_name);
 
 /// Runs `use`, which is given nothing but the scene and tracks: what it finds wrong is the scene's,
 /// and is said with the scene's name (if it has one), unless it says that it is a track's.

@@ -54,10 +54,10 @@ class Curve {
   Curve(std::string label, std::size_t rows) : chart_{std::move(label), {}} {
     chart_.values.assign(rows, kNaN);
   }
-  void add(std::span<const double> at_s, double start_s, const Eigen::VectorXd& t_s,
+  void add(std::span<const double> at_s, const Eigen::VectorXd& t_s,
            const Eigen::VectorXd& values) {
     for (std::size_t i = 0; i < at_s.size(); ++i)
-      if (const double value = interpolated(t_s, values, at_s[i] - start_s); std::isfinite(value))
+      if (const double value = interpolated(t_s, values, at_s[i]); std::isfinite(value))
         chart_.values[i] = value;
   }
   void into(std::vector<DynamicsChart>& charts) {
@@ -84,23 +84,24 @@ std::vector<DynamicsChart> dynamics_of(const data::Fit& fit, int track, int obje
     data::Scene scene;
     const auto table = run_arc(fit, arc, scene);
     if (!table) continue;
-    const double start_s = arc_start_s(fit, arc);
-    const Eigen::VectorXd t_s = table->column("t_s");
+    // By the recording's clock.
+    const Eigen::VectorXd t_s =
+        (table->column("t_s") / time_factor(fit)).array() + arc_start_s(fit, arc);
     if (has_column(*table, "energy_J")) {
       const Eigen::VectorXd joule = table->column("energy_J");
       if (mass_known)
-        energy.add(at_s, start_s, t_s, kMillijoule * joule);
+        energy.add(at_s, t_s, kMillijoule * joule);
       else
-        per_moment.add(at_s, start_s, t_s, joule);
+        per_moment.add(at_s, t_s, joule);
     }
     if (!has_column(*table, "normal_force_N")) continue;
     const Eigen::VectorXd up_N = table->column("normal_force_N");
     const double weight_N = *scene.body->mass_kg * scene.model.gravity_m_s2;
-    normal.add(at_s, start_s, t_s, up_N / weight_N);
+    normal.add(at_s, t_s, up_N / weight_N);
     const Eigen::VectorXd along_N =
         (table->column("force_x_N").array().square() + table->column("force_y_N").array().square())
             .sqrt();
-    needed.add(at_s, start_s, t_s, along_N.cwiseQuotient(up_N));
+    needed.add(at_s, t_s, along_N.cwiseQuotient(up_N));
   }
   std::vector<DynamicsChart> charts;
   for (Curve* curve : {&energy, &per_moment, &normal, &needed}) curve->into(charts);

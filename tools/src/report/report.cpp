@@ -148,8 +148,15 @@ std::string correlation_table(const data::Fit& fit) {
   constexpr double kStrong = 0.9;
   const Eigen::Index size = fit.covariance.rows();
   if (size < 2 || size != static_cast<Eigen::Index>(fit.covariance_names.size())) return {};
+  // What is not seen has an error bar without end, though the model's curvature gives it one.
+  const auto seen = [&](Eigen::Index i) {
+    const data::FitParameter* its = fit.find(fit.covariance_names[static_cast<std::size_t>(i)]);
+    return its == nullptr || std::isfinite(its->sigma);
+  };
   const auto correlation = [&](Eigen::Index i, Eigen::Index k) {
-    return fit.covariance(i, k) / std::sqrt(fit.covariance(i, i) * fit.covariance(k, k));
+    return seen(i) && seen(k)
+               ? fit.covariance(i, k) / std::sqrt(fit.covariance(i, i) * fit.covariance(k, k))
+               : std::numeric_limits<double>::quiet_NaN();
   };
   const auto name = [&](Eigen::Index i) {
     return escaped(fit.covariance_names[static_cast<std::size_t>(i)]);

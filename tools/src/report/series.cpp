@@ -187,8 +187,7 @@ class Series {
     const Angle list[] = {
         {"tilt θ [deg]", &data::TrackSample::theta, &data::Pose<>::theta_rad, tilt},
         {"precession φ [deg]", &data::TrackSample::phi, &data::Pose<>::phi_rad, tilt},
-        {"spin ψ [deg]", &data::TrackSample::psi, &data::Pose<>::psi_rad,
-         arc_ != nullptr && arc_->has_spin}};
+        {"spin ψ [deg]", &data::TrackSample::psi, &data::Pose<>::psi_rad, arc_ != nullptr}};
     std::vector<json> charts;
     for (const Angle& angle : list) {
       std::vector<double> measured, predicted;

@@ -11,8 +11,8 @@
 #include <span>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/parallel.hpp"
 #include "trochoid/fitting/fit.hpp"
-#include "trochoid/fitting/parallel.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::tools {
@@ -221,8 +221,8 @@ std::vector<FitTrial> fit_trials(const MadeTrackOptions& tracks,
                                  const std::function<void(int)>& progress) {
   std::vector<std::vector<FitTrial>> scenes(static_cast<std::size_t>(count));
   std::atomic<int> done{0};
-  fitting::in_parallel(count, threads, [&](int i) {
-    scenes[static_cast<std::size_t>(i)] = trials_of_scene(tracks, strategies, seed, i);
+  data::in_parallel(scenes.size(), threads, [&](std::size_t i) {
+    scenes[i] = trials_of_scene(tracks, strategies, seed, static_cast<int>(i));
     if (progress) progress(++done);
   });
   std::vector<FitTrial> trials;
@@ -235,8 +235,8 @@ Coverage fit_coverage(const MadeTrackOptions& tracks, int draws, std::uint64_t s
                       const std::function<void(int)>& progress) {
   std::vector<Draw> all(static_cast<std::size_t>(draws));
   std::atomic<int> done{0};
-  fitting::in_parallel(draws, threads, [&](int i) {
-    all[static_cast<std::size_t>(i)] = draw(tracks, seed, i);
+  data::in_parallel(all.size(), threads, [&](std::size_t i) {
+    all[i] = draw(tracks, seed, static_cast<int>(i));
     if (progress) progress(++done);
   });
   Coverage coverage;

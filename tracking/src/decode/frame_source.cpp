@@ -192,7 +192,8 @@ class LibavSource final : public FrameSource {
     info_.interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
     info_.capture_rate_hz = capture_rate_hz(*container_);
     info_.frames = series_ ? static_cast<std::int64_t>(series_->pictures.size()) : pictures_shown();
-    info_.missing = series_ ? series_->missing() : 0;
+    if (series_) info_.missing = series_->missing();
+    if (series_) info_.left_out = series_->left_out;
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }
 

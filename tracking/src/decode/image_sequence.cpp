@@ -40,6 +40,17 @@ bool is_image(const fs::path& path) {
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 
+/// A picture's name with every number in it replaced: what those of one series share.
+std::string pattern_of(const fs::path& picture) {
+  std::string pattern;
+  for (const char c : picture.stem().string())
+    if (!is_digit(c))
+      pattern += c;
+    else if (!pattern.ends_with('#'))
+      pattern += '#';
+  return pattern;
+}
+
 Pictures pictures_in(const fs::path& folder) {
   std::map<std::string, Pictures> by_type;
   for (const auto& entry : fs::directory_iterator(folder))
@@ -54,6 +65,23 @@ Pictures pictures_in(const fs::path& folder) {
              by_type.begin(), by_type.end(),
              [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); })
       ->second;
+}
+
+/// Takes the pictures that are no part of the numbered series which most of them are: a cover, a
+/// picture of the empty floor. They would be frames, and hide the gaps of the series.
+Pictures take_strays(Pictures& pictures) {
+  std::map<std::string, std::size_t> count;
+  for (const fs::path& picture : pictures) ++count[pattern_of(picture)];
+  const auto& [usual, most] = *std::max_element(
+      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (usual.find('#') == std::string::npos || 2 * most <= pictures.size()) return {};
+  const auto strays =
+      std::stable_partition(pictures.begin(), pictures.end(),
+                            [&](const fs::path& picture) { return pattern_of(picture) == usual; });
+  Pictures taken(strays, pictures.end());
+  pictures.erase(strays, pictures.end());
+  std::sort(taken.begin(), taken.end());
+  return taken;
 }
 
 /// Those with a printf-style name.
@@ -106,7 +134,7 @@ std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures,
   std::vector<std::string> names;
   for (const fs::path& picture : pictures) {
     if (picture.parent_path() != pictures.front().parent_path()) return std::nullopt;
-    names.push_back(picture.filename().string());
+    names.push_back(picture.stem().string() + lower_extension(picture));
   }
   const auto [least, most] = std::minmax_element(names.begin(), names.end());
   std::size_t head = static_cast<std::size_t>(
@@ -133,7 +161,7 @@ ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std
   std::vector<std::int64_t> frames(pictures.size());
   std::iota(frames.begin(), frames.end(), 0);
   const auto numbers = numbers_of(pictures, begin);
-  if (!numbers) return {std::move(pictures), std::move(frames)};
+  if (!numbers) return {std::move(pictures), std::move(frames), {}};
 
   std::vector<std::pair<std::int64_t, fs::path>> numbered;
   for (std::size_t i = 0; i < pictures.size(); ++i)
@@ -160,12 +188,17 @@ ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std
 }  // namespace
 
 std::optional<ImageSequence> find_image_sequence(const fs::path& path) {
-  if (fs::is_directory(path)) return in_order(pictures_in(path));
+  if (fs::is_directory(path)) {
+    Pictures pictures = pictures_in(path), strays = take_strays(pictures);
+    ImageSequence sequence = in_order(std::move(pictures));
+    sequence.left_out = std::move(strays);
+    return sequence;
+  }
   if (fs::exists(path)) return std::nullopt;
-  const std::string text = path.string();
-  if (text.find('%') != std::string::npos)
-    return in_order(pictures_of_series(path), path.filename().string().find('%'));
-  if (text.find_first_of("*?[") != std::string::npos) return in_order(pictures_like(path));
+  const std::string name = path.filename().string();
+  if (const std::size_t number = name.find('%'); number != std::string::npos)
+    return in_order(pictures_of_series(path), number);
+  if (path.string().find_first_of("*?[") != std::string::npos) return in_order(pictures_like(path));
   return std::nullopt;
 }
 

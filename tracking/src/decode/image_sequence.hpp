@@ -15,6 +15,8 @@ struct ImageSequence {
   /// than half are, numbers count something else and only order the pictures. Every tenth picture
   /// kept, say, is no gap.
   std::vector<std::int64_t> frames;
+  /// Of a folder, those of the same type that are named unlike the numbered ones, its majority.
+  std::vector<std::filesystem::path> left_out;
 
   [[nodiscard]] std::int64_t missing() const {
     return frames.back() + 1 - static_cast<std::int64_t>(frames.size());

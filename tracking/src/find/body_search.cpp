@@ -3,13 +3,14 @@
 #include <Eigen/LU>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "find/silhouette.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -109,8 +110,7 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
   constexpr std::size_t kMostTries = 16;
   constexpr int kEnough = 4;
   if (candidates.size() > kMostTries) candidates.resize(kMostTries);
-  const auto tried = [&](std::size_t k) -> std::optional<Sighting> {
-    if (k >= candidates.size()) return std::nullopt;
+  const auto tried = [&](std::size_t k) {
     const Frame& frame = held[candidates[k].held_index];
     Plate plate;
     background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
@@ -133,9 +133,10 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
   };
   // Two at a time, one on each core.
   for (std::size_t k = 0; k < candidates.size() && good < kEnough && clearest <= 0.85; k += 2) {
-    auto second = std::async(std::launch::async, tried, k + 1);
-    judge(candidates[k], tried(k));
-    if (const auto seen = second.get()) judge(candidates[k + 1], seen);
+    std::array<std::optional<Sighting>, 2> seen;
+    const std::size_t count = std::min(seen.size(), candidates.size() - k);
+    data::in_parallel(count, 2, [&](std::size_t i) { seen[i] = tried(k + i); });
+    for (std::size_t i = 0; i < count; ++i) judge(candidates[k + i], seen[i]);
   }
   return best;
 }

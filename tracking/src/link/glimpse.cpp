@@ -1,12 +1,12 @@
 #include "link/glimpse.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <future>
-#include <system_error>
-#include <thread>
+#include <memory>
+#include <mutex>
+#include <vector>
 
+#include "trochoid/data/parallel.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -113,19 +113,21 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
 
 void on_all_cores(const Background& background, const BodyFinder& finder, std::size_t count,
                   const std::function<void(Measuring&, std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  const auto worker = [&] {
-    Measuring measuring(background, finder);
-    for (std::size_t i = next++; i < count; i = next++) work(measuring, i);
+  std::mutex mutex;
+  std::vector<std::unique_ptr<Measuring>> idle;  // as many as threads, each with room of its own
+  const auto taken = [&] {
+    const std::lock_guard lock(mutex);
+    if (idle.empty()) return std::make_unique<Measuring>(background, finder);
+    auto measuring = std::move(idle.back());
+    idle.pop_back();
+    return measuring;
   };
-  std::vector<std::future<void>> team;
-  const std::size_t used = std::min<std::size_t>(std::thread::hardware_concurrency(), count);
-  try {
-    for (std::size_t i = 1; i < used; ++i) team.push_back(std::async(std::launch::async, worker));
-  } catch (const std::system_error&) {  // no more threads to be had: those there are do the work
-  }
-  worker();
-  for (auto& member : team) member.get();
+  data::in_parallel(count, 0, [&](std::size_t i) {
+    auto measuring = taken();
+    work(*measuring, i);
+    const std::lock_guard lock(mutex);
+    idle.push_back(std::move(measuring));
+  });
 }
 
 }  // namespace trochoid::tracking

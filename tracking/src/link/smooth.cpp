@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -142,8 +143,7 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
     }
     result[i] = {.value = x[0] * unit,
                  .sigma = scale * std::sqrt(std::max(0.0, P(0, 0))) * unit,
-                 .rate = x[1] * unit / step_s,
-                 .sigma_rate = scale * std::sqrt(std::max(0.0, P(1, 1))) * unit / step_s};
+                 .rate = x[1] * unit / step_s};
   }
   return result;
 }
@@ -210,7 +210,10 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
                    "vy_m_s", "x_px", "y_px", "sigma_x_px", "sigma_y_px", "interpolated", "object"};
   table.header = {{"smoothed", "Rauch-Tung-Striebel; never a measurement: fit the track itself"}};
   std::vector<double> cells;
-  for (const data::Track& track : file.tracks)
+  for (const data::Track& track : file.tracks) {
+    if (std::any_of(track.samples.begin(), track.samples.end(),
+                    [](auto& s) { return s.frame < 0; }))
+      throw TrackError("to be smoothed, a track needs the number of each sample's frame");
     for (const Stretch& stretch : stretches_of(track)) {
       if (measured(stretch) < kFewest) {
         result.left_out += measured(stretch);
@@ -219,8 +222,12 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
       const bool metres = std::all_of(stretch.sample.begin(), stretch.sample.end(), [](auto* s) {
         return s == nullptr || (s->has_metres() && s->has_covariance());
       });
-      const auto px = smoothed(stretch, 0, false), py = smoothed(stretch, 1, false);
-      std::vector<SmoothState> mx(px.size(), {kUnknown, kUnknown, kUnknown, kUnknown}), my = mx;
+      const bool pixels = std::all_of(stretch.sample.begin(), stretch.sample.end(), [](auto* s) {
+        return s == nullptr || s->centre_px.allFinite();
+      });
+      std::vector<SmoothState> mx(stretch.t_s.size(), {kUnknown, kUnknown, kUnknown});
+      auto my = mx, px = mx, py = mx;
+      if (pixels) px = smoothed(stretch, 0, false), py = smoothed(stretch, 1, false);
       if (metres) mx = smoothed(stretch, 0, true), my = smoothed(stretch, 1, true);
       for (std::size_t i = 0; i < px.size(); ++i) {
         const bool interpolated = stretch.sample[i] == nullptr;
@@ -231,6 +238,7 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
                                    interpolated ? 1.0 : 0.0, static_cast<double>(track.object)});
       }
     }
+  }
   const auto columns = static_cast<Eigen::Index>(table.columns.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   table.values = Eigen::Map<const RowMajor>(

@@ -9,11 +9,11 @@
 #include <numbers>
 
 #include "edges/colour_window.hpp"
-#include "pose/in_halves.hpp"
 #include "pose/outline_refine.hpp"
 #include "pose/pose_start.hpp"
 #include "pose/spin_mark.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -236,7 +236,7 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
   constexpr size_t kFitted = 3;
   const Scenery far = scenery.blurred(kFarBlurPx), near = scenery.blurred(kNearBlurPx);
   std::vector<std::optional<Refined>> drawn(starts.size());
-  in_halves(starts.size(), [&](size_t i) {
+  data::in_parallel(starts.size(), 2, [&](size_t i) {
     drawn[i] = refine(far, starts[i], kFar);
     if (drawn[i]) drawn[i] = refine(near, drawn[i]->pose, kNear);
   });
@@ -251,7 +251,8 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
     if (mirrors) chosen.push_back(mirrored(scenery.camera, scenery.motion, likely[i].second));
   }
   std::vector<std::optional<Fitted>> fits(chosen.size());
-  in_halves(chosen.size(), [&](size_t i) { fits[i] = fit_from(scenery, near, chosen[i]); });
+  data::in_parallel(chosen.size(), 2,
+                    [&](size_t i) { fits[i] = fit_from(scenery, near, chosen[i]); });
   std::optional<Fitted> best;
   for (auto& fit : fits) best = better(std::move(best), std::move(fit));
   return best;

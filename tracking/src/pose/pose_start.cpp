@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "geometry/outline_samples.hpp"
-#include "pose/in_halves.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -127,7 +127,8 @@ std::vector<Candidate> seek_on_floor(const Search& search, const Eigen::Vector2d
   const std::vector<data::Pose<>> all =
       search.motion.rotation() < 0 ? std::vector{data::Pose<>()} : attitudes(kAttitudeStep);
   std::vector<std::vector<Candidate>> found(all.size());
-  in_halves(all.size(), [&](size_t i) { found[i] = best_places(search, all[i], about_px); });
+  data::in_parallel(all.size(), 2,
+                    [&](size_t i) { found[i] = best_places(search, all[i], about_px); });
   return joined(found);
 }
 
@@ -162,7 +163,7 @@ std::vector<Candidate> seek_about_pivot(const Search& search, const Eigen::Vecto
        along += std::max(2.0 * cell_m, 0.1 * along))
     distances_m.push_back(along);
   std::vector<std::vector<Candidate>> found(distances_m.size());
-  in_halves(distances_m.size(), [&](size_t i) {
+  data::in_parallel(distances_m.size(), 2, [&](size_t i) {
     found[i] = seek_at_distance(search, pivot_m, distances_m[i], cell_m);
   });
   return joined(found);

@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace trochoid::data {
@@ -10,6 +12,9 @@ namespace trochoid::data {
 /// free: estimated; fixed: given; derived: computed from free ones and priors (with propagated
 /// sigma); prior: free but carried by its prior, the recording says nothing.
 enum class ParameterStatus { free, fixed, derived, prior };
+/// How a fit file spells them, in their order.
+inline constexpr std::array<std::string_view, 4> kParameterStatuses{"free", "fixed", "derived",
+                                                                    "prior"};
 
 /// One parameter as the fit leaves it.
 struct FitParameter {

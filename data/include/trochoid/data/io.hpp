@@ -24,8 +24,9 @@ void write_track(const TrackFile& file, const std::filesystem::path& path);
 [[nodiscard]] std::string to_toml(const Scene& scene);
 
 [[nodiscard]] Fit read_fit(const std::filesystem::path& path);
-/// The text of a fit file, ending in a newline.
+/// A fit from the text of its file, and back; the text ends in a newline.
 /// @param where names it in errors.
+[[nodiscard]] Fit parse_fit(const std::string& text, const std::string& where);
 [[nodiscard]] std::string fit_text(const Fit& fit, const std::string& where);
 void write_fit(const Fit& fit, const std::filesystem::path& path);
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "trochoid/data/fit.hpp"
 #include "trochoid/data/scene.hpp"
@@ -15,10 +16,11 @@ namespace trochoid::fitting {
 struct FitOptions {
   std::string model;  ///< overrides the scene's
   bool free_pivot = false;
-  std::string from, to;    ///< seconds or "f" frames
-  double hold_back = 0.0;  ///< share of each track's samples, at its end, that is not fitted
-  bool profile = false;    ///< profile likelihood of all but the initial angles and places
-  int bootstrap = 0;       ///< block bootstrap draws, 0 = off
+  std::string from, to;  ///< seconds or "f" frames
+  /// Share of each track's samples, at its end, that is not fitted; in 0..1, not 1.
+  double hold_back = 0.0;
+  bool profile = false;  ///< profile likelihood of all but the initial angles and places
+  int bootstrap = 0;     ///< block bootstrap draws, 0 = off
   std::uint64_t seed = 1;
   int threads = 0;         ///< 0 = all cores; the result does not depend on it
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
@@ -40,8 +42,10 @@ struct FitOptions {
 
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
 /// An unwelcome answer (no convergence, not identifiable, too short) is an outcome in the Fit.
-/// @throws InputError if the scene lacks what the model needs, or the given start names a parameter
-///         that the model does not have; TrackError if a track is unusable.
+/// @throws InputError if the scene lacks what the model needs, the given start names a parameter
+/// that
+///         the model does not have, or an option is out of its range; TrackError if a track is
+///         unusable.
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
                             const FitOptions& options = {});
 
@@ -53,6 +57,24 @@ struct FitOptions {
 /// arcs; what the fit says nothing of as the predictor has it.
 [[nodiscard]] Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
                                             std::size_t arc = 0);
+
+/// The scene as a fit of it takes it: with what [fit] prior says in place of what the body and its
+/// surroundings are given to be (mass_kg, gravity_m_s2, ...).
+[[nodiscard]] data::Scene scene_as_fitted(const data::Scene& scene);
+
+/// What a fit predicts for one of its arcs as the recording shows it: with the scale, the frame
+/// rate and the clocks that were fitted (`scale`, `frame_rate_factor`, `readout_s`,
+/// `angle_delay_s`).
+/// @param scene    the fit's, its model named.
+/// @param request  times by the recording's clock, lengths by its metres; no derivatives.
+/// @param row_px   for each time the row of the image where the body is; used, and needed, where
+///                 readout_s was fitted: a row that is missing or NaN counts as the first.
+/// @throws InputError if the scene does not suit its model, or readout_s was fitted and the image's
+///         height is unknown.
+[[nodiscard]] model::Prediction fitted_prediction(const data::Fit& fit, const data::Scene& scene,
+                                                  std::size_t arc,
+                                                  const model::PredictRequest& request,
+                                                  const std::vector<double>& row_px = {});
 
 /// The minimiser's library logs rejected steps to stderr; a program that does not want that calls
 /// this once before the first fit.

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <string_view>
 
 namespace trochoid::model {
@@ -15,6 +16,7 @@ enum class Outcome {
   tolerance_not_reachable,  ///< step size fell to rounding
   out_of_domain,            ///< parameters or state outside the model's range
 };
+inline constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::out_of_domain) + 1;
 
 [[nodiscard]] std::string_view name(Outcome outcome);      ///< e.g. "rim_switch"
 [[nodiscard]] std::string_view sentence(Outcome outcome);  ///< for people

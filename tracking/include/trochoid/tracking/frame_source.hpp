@@ -28,6 +28,7 @@ struct VideoInfo {
   double frame_rate_hz = 0.0;       ///< average of the time stamps
   std::int64_t frames = 0;          ///< as the container says, 0 if it does not
   std::int64_t missing = 0;         ///< beside those, by the numbers of a series' pictures
+  std::vector<std::filesystem::path> left_out{};  ///< of a folder: named unlike its series
   std::string codec;
   bool variable_rate = false;
   bool evened = false;      ///< it was variable, and a rate given instead takes it for even

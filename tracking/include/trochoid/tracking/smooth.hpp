@@ -9,8 +9,8 @@ namespace trochoid::tracking {
 
 /// One quantity over time as a smoother sees it.
 struct SmoothState {
-  double value = 0.0, sigma = 0.0;      ///< its unit
-  double rate = 0.0, sigma_rate = 0.0;  ///< its unit per second
+  double value = 0.0, sigma = 0.0;  ///< its unit
+  double rate = 0.0;                ///< its unit per second
 };
 
 /// Rauch-Tung-Striebel smoothing of a quantity whose acceleration wanders at random; how much is
@@ -30,6 +30,9 @@ struct SmoothTrack {
   std::int64_t interpolated = 0;  ///< rows
   std::int64_t left_out = 0;      ///< samples without a row
 };
+/// Pixels and metres are smoothed where all samples between two gaps have them (metres with their
+/// covariance), else NaN.
+/// @throws TrackError if a sample has no frame number.
 [[nodiscard]] SmoothTrack smooth_track(const data::TrackFile& file);
 
 }  // namespace trochoid::tracking

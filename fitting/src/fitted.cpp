@@ -1,0 +1,39 @@
+#include "judge/first_guess.hpp"
+#include "observe/observed.hpp"
+#include "observe/timing.hpp"
+#include "trochoid/fitting/fit.hpp"
+
+// A fit taken up again: the motion it found.
+namespace trochoid::fitting {
+
+data::Scene scene_as_fitted(const data::Scene& given) {
+  return completed(given, {});
+}
+
+Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
+                              std::size_t arc) {
+  const auto& parameters = predictor.parameters();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const data::FitParameter* fitted = fit.find(parameters[i].name, arc);
+    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
+  }
+  return values;
+}
+
+model::Prediction fitted_prediction(const data::Fit& fit, const data::Scene& given, std::size_t arc,
+                                    const model::PredictRequest& request,
+                                    const std::vector<double>& row_px) {
+  data::Scene scene = scene_as_fitted(given);
+  const auto plain = model::make_predictor(scene);
+  const auto seen = observed(*plain, scene, 0.0);
+  const model::Predictor& predictor = seen ? *seen : *plain;
+  const Eigen::VectorXd values = fitted_values(predictor, fit, arc);
+  if (!has_timing(predictor)) return predictor.predict(values, request);
+  ArcData samples;
+  samples.t_s.assign(request.t_s.begin(), request.t_s.end());
+  samples.row_px = row_px;
+  return predict_timed(predictor, values, request, samples, timing_of(predictor, scene));
+}
+
+}  // namespace trochoid::fitting

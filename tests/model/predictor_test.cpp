@@ -1,0 +1,80 @@
+#include "trochoid/model/predictor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "trochoid/data/io.hpp"
+
+// What every model's predictor promises, whatever its equations.
+namespace trochoid::model {
+namespace {
+
+constexpr const char* kDisc =
+    "[body]\nradius_m = 0.04\nthickness_m = 0.004\nmass_kg = 0.1\n"
+    "[start]\ntheta_rad = 0.9\nw2_rad_s = 20\nw3_rad_s = 5\nx_m = 0.3\ny_m = -0.1\n";
+constexpr const char* kPuck =
+    "[body]\nradius_m = 0.04\nmass_kg = 0.1\n[support]\nkind = 'flat'\n"
+    "[start]\nvx_m_s = 0.8\nw3_rad_s = 5\nx_m = 0.3\ny_m = -0.1\n";
+constexpr const char* kPinned =
+    "[body]\nradius_m = 0.04\n[support]\npivot_m = [0, 0, 0]\n[start]\nw3_rad_s = 30\n";
+constexpr const char* kTop =
+    "[body]\nkind = 'top'\nmass_kg = 0.1\nI_kg_m2 = 1e-4\nIs_kg_m2 = 1.5e-4\nl_m = 0.03\n"
+    "[start]\ntheta_rad = 0.6\nomega_s_rad_s = 60\n";
+
+struct Case {
+  const char* model;
+  const char* scene;
+  const char* terms;
+};
+
+class EveryPredictor : public testing::TestWithParam<Case> {
+ protected:
+  EveryPredictor()
+      : predictor_(
+            make_predictor(data::parse_scene(std::string(GetParam().scene) + "[model]\nname = '" +
+                                                 GetParam().model + "'\n" + GetParam().terms,
+                                             "scene"))),
+        values_(static_cast<Eigen::Index>(predictor_->parameters().size())) {
+    for (Eigen::Index i = 0; i < values_.size(); ++i)
+      values_[i] = predictor_->parameters()[static_cast<std::size_t>(i)].value;
+  }
+  [[nodiscard]] Prediction at(const std::vector<double>& t_s, int max_steps = 0) const {
+    PredictRequest request;
+    request.t_s = t_s;
+    request.start_s = kStart_s;
+    request.max_steps = max_steps;
+    request.observables.push_back(Observable::psi_rad);
+    return predictor_->predict(values_, request);
+  }
+
+  static constexpr double kStart_s = 0.25;
+  std::unique_ptr<Predictor> predictor_;
+  Eigen::VectorXd values_;
+};
+
+TEST_P(EveryPredictor, GivesTheStartThoughNothingElseIsAskedFor) {
+  const Prediction alone = at({kStart_s}), among = at({kStart_s, kStart_s + 0.1});
+  ASSERT_EQ(alone.outcome, Outcome::reached_end);
+  EXPECT_TRUE(alone.values.allFinite()) << alone.values.transpose();
+  EXPECT_EQ(alone.values, among.values.head(3));
+}
+
+TEST_P(EveryPredictor, KeepsToTheLimitOfSteps) {
+  EXPECT_EQ(at({kStart_s + 2.0}, 3).outcome, Outcome::step_limit);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, EveryPredictor,
+                         testing::Values(Case{"top", kTop, ""}, Case{"top-euler", kTop, ""},
+                                         Case{"smooth", kDisc, ""}, Case{"rolling", kDisc, ""},
+                                         Case{"sliding", kDisc, "friction = 0.2\n"},
+                                         Case{"puck", kPuck, "friction = 0.02\n"},
+                                         Case{"pivot", kPinned, "spin_down_dry_rad_s2 = 2\n"}),
+                         [](const auto& instance) {
+                           std::string name = instance.param.model;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace trochoid::model
