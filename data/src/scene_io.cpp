@@ -128,6 +128,11 @@ void check_tracking(const TableReader& reader, const TrackingSettings& tracking)
 
 // A group may be free but for some of its components, which have names of their own.
 void check_fit(const TableReader& reader, const FitSettings& fit) {
+  if (reader.has("free") && fit.free.empty())
+    reader.fail(
+        "free",
+        "free = [] names nothing; leave the key out for the model's choice, or name a value "
+        "of the start, e.g. [\"theta_rad\"], to fit the start alone");
   const auto refuse = [&](const char* key, const std::string& name) {
     reader.fail(key, fmt::format("{} names {}, which fixed gives a value; keep one", key, name));
   };

@@ -319,6 +319,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"PriorSigmaZero", "[fit]\nprior = { mass_kg = [0.03, 0] }", ":2:", "fixed"},
         Refusal{"BoundsReversed", "[fit]\nbounds = { l_m = [2, 1] }", ":2:", "lower < upper"},
         Refusal{"FreeTwice", "[fit]\nfree = ['l_m', 'l_m']", ":2:", "twice"},
+        Refusal{"FreeNothing", "[fit]\nfree = []", ":2:", "names nothing"},
         Refusal{"FreeAndFixed", "[fit]\nfree = ['l_m']\nfixed = { l_m = 1 }",
                 ":2:", "free names l_m, which fixed gives a value"},
         Refusal{"PriorAndFixed", "[fit]\nfixed = { l_m = 1 }\nprior = { l_m = [1, 0.1] }",

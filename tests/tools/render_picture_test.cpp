@@ -31,9 +31,11 @@ double share(const cv::Mat& light, int y, int x, float floor, float body) {
   return (floor - light.at<cv::Vec3f>(y, x)[1]) / (floor - body);
 }
 
+class CameraAbove : public testing::TestWithParam<data::Camera> {};
+
 // A disc flat under a camera looking straight down appears as a circle about its projected centre.
-TEST(PictureRenderer, PutsTheCentroidOfAFlatDiscAtItsProjectedCentre) {
-  const data::Camera camera = data::Camera::overhead(200, 160, 1000.0, 1.0);
+TEST_P(CameraAbove, ShowsTheCentroidOfAFlatDiscAtItsProjectedCentre) {
+  const data::Camera& camera = GetParam();
   const PictureRenderer renderer(flat_disc(), camera, plain());
   for (const double shift : {0.0, 0.00031, 0.00077}) {
     data::Pose<> pose;
@@ -58,6 +60,13 @@ TEST(PictureRenderer, PutsTheCentroidOfAFlatDiscAtItsProjectedCentre) {
     EXPECT_NEAR(area / (std::numbers::pi * 30.0 * 30.0), 1.0, kArea);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(PictureRenderer, CameraAbove,
+                         testing::Values(data::Camera::overhead(200, 160, 1000.0, 1.0),
+                                         data::Camera::from_scale(200, 160, 1000.0)),
+                         [](const auto& instance) {
+                           return instance.index == 0 ? "AtAHeight" : "FarAway";
+                         });
 
 // The tracker's outline and the renderer's rays know nothing of each other.
 TEST(PictureRenderer, HasItsEdgesWhereTheOutlineOfATiltedRingIsPredicted) {

@@ -183,8 +183,9 @@ std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& 
     const bool of_body =
         std::any_of(givens().begin(), givens().end(),
                     [&name = name](const Given& given) { return name == given.name; });
-    const bool of_model = std::any_of(
-        infos.begin(), infos.end(), [&name = name](const auto& info) { return name == info.name; });
+    const bool of_model = std::any_of(infos.begin(), infos.end(), [&name = name](const auto& info) {
+      return means(name, info.name);
+    });
     if (!of_body && !of_model && name != "frame_rate_hz") idle.push_back(name);
   }
   return idle;

@@ -9,16 +9,14 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <optional>
 
 #include "judge/adequacy.hpp"
-#include "judge/body_doubt.hpp"
 #include "judge/bootstrap.hpp"
+#include "judge/caveats.hpp"
 #include "judge/describe.hpp"
 #include "judge/draft.hpp"
 #include "judge/first_guess.hpp"
-#include "judge/leaning.hpp"
 #include "judge/profile.hpp"
 #include "judge/statistics.hpp"
 #include "observe/observed.hpp"
@@ -27,8 +25,6 @@
 #include "start/find.hpp"
 #include "start/starter.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/data/quantile.hpp"
-#include "trochoid/model/idle_keys.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -235,188 +231,6 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
         "and does not see what is common to all of it; the error bars count");
 }
 
-// The error bar of friction reaches as far as chi-square does on its flatter side; what goes with
-// friction goes farther with it.
-void heed_far_side(const Problem& problem, const Solution& solution, const FitOptions& options,
-                   Uncertainty& error, data::Fit& fit) {
-  constexpr double kWorthWords = 1.3;
-  if (problem.predictor->index_of("friction") < 0) return;
-  if (!explains(problem, solution)) return;  // a bar about another path means nothing
-  const auto far = far_side_of_friction(problem, solution, error, options.threads);
-  if (!far) return;
-  const double variance = error.covariance(far->index, far->index);
-  const double times = far->sigma / std::sqrt(variance);
-  const Eigen::VectorXd along = error.covariance.col(far->index) / variance;
-  error.covariance += (far->sigma * far->sigma - variance) * along * along.transpose();
-  error.identifiable[far->index] = far->sigma < natural_size(problem, far->index, solution.u);
-  if (times > kWorthWords)
-    fit.warnings.push_back(fmt::format(
-        "chi-square is lopsided in {}: its error bar is that of the flatter side, {:.2g} "
-        "times what the curvature says (the profile shows both sides)",
-        problem.name(far->index), times));
-}
-
-// What one sample alone tells, which may be wrong by more than its error says, is known no better
-// than as far as it goes without that sample.
-void heed_single_samples(const Problem& problem, const Solution& solution, Uncertainty& error,
-                         data::Fit& fit) {
-  constexpr double kWorthWords = 1.3;
-  if (!explains(problem, solution)) return;
-  const Eigen::VectorXd before = error.covariance.diagonal().cwiseSqrt();
-  for (const Leaning& leaning : leanings(problem, solution, before)) {
-    error.covariance += leaning.shift * leaning.shift.transpose();
-    std::vector<std::string> names;
-    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
-      const double sigma = std::sqrt(error.covariance(i, i));
-      if (sigma > kWorthWords * before[i]) names.push_back(problem.name(i));
-      error.identifiable[i] = error.identifiable[i] && sigma < natural_size(problem, i, solution.u);
-    }
-    if (!names.empty())
-      fit.warnings.push_back(
-          fmt::format("{} hang on the sample at t = {:.4g} s alone: their error bars hold "
-                      "what comes out without it",
-                      fmt::join(names, ", "), leaning.t_s));
-  }
-}
-
-// A puck's path is the same for either sense of its spin: unless a prior tells, the spin that fits
-// is as likely the other way round.
-void heed_either_sense(const Problem& problem, Uncertainty& error, data::Fit& fit) {
-  if (fit.model != "puck") return;
-  const int spin = problem.predictor->index_of("w3_rad_s");
-  constexpr double kTells = 2.0;  // standard deviations
-  bool either = false;
-  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
-    const FreeParameter& free = problem.free[i];
-    const int arc = std::max(0, free.arc);
-    if (free.index != spin || problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0 ||
-        (free.prior && std::abs(free.prior->value) > kTells * free.prior->sigma))
-      continue;
-    // What only its prior says of it is no observation of either.
-    constexpr double kOfPrior = 0.5;
-    if (free.prior && std::sqrt(error.covariance(i, i)) > kOfPrior * free.prior->sigma) continue;
-    const double value = problem.base[arc][spin];
-    error.covariance(i, i) += 2.0 * value * value;  // the mean square of 0 and 2 w3
-    either = true;
-  }
-  if (either)
-    fit.warnings.push_back(
-        "the path shows how fast the puck turns, not which way round: the error bar of w3_rad_s "
-        "holds either");
-}
-
-// What the model takes for given is known as well as its priors say, and no better.
-void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
-                 double frame_s, Uncertainty& error, data::Fit& fit) {
-  for (const Doubt& doubt : body_doubts(problem, solution.u, scene, frame_s)) {
-    error.covariance += doubt.shift * doubt.shift.transpose();
-    const data::Prior& prior = scene.fit.prior.at(doubt.name);
-    fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
-                                       prior.value, prior.sigma));
-  }
-  heed_either_sense(problem, error, fit);
-  const std::vector<Doubt> spins = unseen_spins(problem, solution.u, scene);
-  for (const Doubt& spin : spins) error.covariance += spin.shift * spin.shift.transpose();
-  if (!spins.empty())
-    fit.warnings.push_back(
-        "nothing shows the puck's spin: the friction is that of one that does not turn, and its "
-        "error bar allows for a rim as fast as the puck slides, as far as the path does not rule "
-        "that out; a mark on the face would tell");
-  for (const std::string& name : idle_priors(problem, scene))
-    fit.warnings.push_back(fmt::format(
-        "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
-}
-
-// Pictures a second by a track's times and frame numbers; 0 where it has none.
-double picture_rate_hz(std::span<const data::Track> tracks) {
-  std::vector<double> steps_s;
-  for (const data::Track& track : tracks)
-    for (std::size_t i = 1; i < track.samples.size(); ++i)
-      if (const data::TrackSample& a = track.samples[i - 1], &b = track.samples[i];
-          a.frame >= 0 && b.frame > a.frame)
-        steps_s.push_back((b.t_s - a.t_s) / static_cast<double>(b.frame - a.frame));
-  const double step_s = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
-  return step_s > 0.0 ? 1.0 / step_s : 0.0;
-}
-
-// A recording's own rate and one that is given for its camera may differ: then only what the latter
-// says of its own error is taken.
-void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks,
-                     data::Fit& fit) {
-  const auto prior = scene.fit.prior.find("frame_rate_hz");
-  if (prior == scene.fit.prior.end() || scene.camera.frame_rate_hz) return;
-  constexpr double kClearly = 0.1;
-  const double rate_hz = picture_rate_hz(tracks);
-  if (rate_hz == 0.0 || std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
-  fit.warnings.push_back(
-      fmt::format("[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} pictures a second, "
-                  "and its times are kept; if they are wrong, track again with [camera] "
-                  "frame_rate_hz = {:g}",
-                  prior->second.value, rate_hz, prior->second.value));
-}
-
-// Slips of units that a fit would follow without a word.
-void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
-  if (!scene.body || scene.body->kind == data::BodyKind::top || !(scene.body->radius_m > 0.0))
-    return;
-  constexpr double kLightest_kg_m3 = 5.0, kHeaviest_kg_m3 = 25e3, kThickest_radii = 20.0;
-  const data::Body& body = *scene.body;
-  const double volume_m3 =
-      std::numbers::pi * body.thickness_m *
-      (body.radius_m * body.radius_m - body.inner_radius_m * body.inner_radius_m);
-  if (body.mass_kg && volume_m3 > 0.0)
-    if (const double density = *body.mass_kg / volume_m3;
-        density < kLightest_kg_m3 || density > kHeaviest_kg_m3)
-      fit.warnings.push_back(
-          fmt::format("[body] mass_kg = {:g} makes a density of {:.2g} kg/m^3; is it in kg, "
-                      "and are the lengths in m?",
-                      *body.mass_kg, density));
-  if (body.thickness_m > kThickest_radii * body.radius_m)
-    fit.warnings.push_back(
-        fmt::format("[body] thickness_m = {:g} is {:.3g} times radius_m; are both in m?",
-                    body.thickness_m, body.thickness_m / body.radius_m));
-}
-
-// Positions and angles that were all but given up (reweight) are told: their number is no longer
-// what the fit stands on.
-void tell_given_up(const Problem& problem, data::Fit& fit) {
-  constexpr double kLittle = 0.1;
-  int given_up = 0, all = 0;
-  double first_s = std::numeric_limits<double>::infinity();
-  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
-    for (const Reading& reading : problem.arcs[arc].readings) {
-      ++all;
-      if (robust_weight(problem, static_cast<int>(arc), reading) > kLittle) continue;
-      ++given_up;
-      first_s = std::min(first_s, problem.arcs[arc].t_s[reading.sample]);
-    }
-  if (given_up > 0)
-    fit.warnings.push_back(fmt::format(
-        "{} of {} positions and angles lie far off and hardly count, the first at t = {:.4g} s",
-        given_up, all, first_s));
-}
-
-// A pivot is freed in vain where there is none.
-void heed_pivot(const Problem& problem, const data::Scene& scene, data::Fit& fit) {
-  const auto& infos = problem.predictor->parameters();
-  const bool has_pivot = std::any_of(infos.begin(), infos.end(),
-                                     [](const auto& info) { return info.name == "pivot_x_m"; });
-  if (scene.fit.free_pivot && !has_pivot)
-    fit.warnings.push_back(fmt::format(
-        "free_pivot: model '{}' has no pivot to fit, it counts for nothing", fit.model));
-}
-
-// Terms of other models; [start] is a hint for whichever wants it.
-void tell_idle_terms(const data::Scene& scene, data::Fit& fit) {
-  constexpr std::string_view kTerm = "model.";
-  for (const std::string& key : model::idle_keys(scene))
-    if (key.starts_with(kTerm))
-      fit.warnings.push_back(
-          fmt::format("[model] {}: model '{}' has no such term, it counts for "
-                      "nothing",
-                      key.substr(kTerm.size()), fit.model));
-}
-
 /// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
 /// has its own doubts.
 enum class Word { last, one_of_several };
@@ -478,6 +292,8 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
   const auto refuse_with = [&](const std::string& reason) {
     refused_ = true;
     refuse(problem_, reason, fit_);
+    tell_unlikely_body(scene_, fit_);
+    tell_held(scene_, fit_);
   };
   stages_.enter("looking for the path");
   if (first_part != nullptr && problem_.arcs.size() == 1)
@@ -519,13 +335,14 @@ data::Fit OneFit::described(Bars bars) {
   data::Fit fit = fit_;
   if (refused_) return fit;
   Uncertainty error = by_curvature_;
-  if (bars == Bars::full) heed_far_side(problem_, solution_, options_, error, fit);
+  if (bars == Bars::full) heed_far_side(problem_, solution_, options_.threads, error, fit);
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
-  heed_pivot(problem_, scene_, fit);
+  tell_idle_pivot(problem_, scene_, fit);
   tell_unlikely_body(scene_, fit);
   tell_other_rate(scene_, tracks_, fit);
   tell_given_up(problem_, fit);
+  tell_bounds(problem_, solution_, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);
   if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);

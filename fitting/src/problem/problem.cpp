@@ -204,24 +204,14 @@ bool is_loss(const Problem& problem, const FreeParameter& parameter) {
 namespace {
 
 bool listed(const std::vector<std::string>& names, const std::string& name) {
-  // A group such as "air_linear_N_m_s" covers its components "air_linear_N_m_s[1]".
-  return std::any_of(names.begin(), names.end(), [&](const std::string& entry) {
-    return name == entry || (name.starts_with(entry) && name.substr(entry.size()).starts_with("["));
-  });
-}
-
-// What [fit] says of a parameter: by its own name, else by that of its group.
-template <class Value>
-const Value* said_of(const std::string& name, const std::map<std::string, Value>& entries) {
-  auto entry = entries.find(name);
-  if (entry == entries.end()) entry = entries.find(name.substr(0, name.find('[')));
-  return entry == entries.end() ? nullptr : &entry->second;
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& entry) { return means(entry, name); });
 }
 
 void check_names(const model::Predictor& predictor, const data::FitSettings& settings) {
   const auto known = [&](const std::string& name) {
     return std::any_of(predictor.parameters().begin(), predictor.parameters().end(),
-                       [&](const ParameterInfo& info) { return listed({name}, info.name); });
+                       [&](const ParameterInfo& info) { return means(name, info.name); });
   };
   const auto complain = [&](const std::string& key, const std::string& name) {
     std::string all;
@@ -240,13 +230,24 @@ void check_names(const model::Predictor& predictor, const data::FitSettings& set
     if (!known(name)) complain("bounds", name);
 }
 
-// A value the model cannot have would be refused at every attempt of the search. Attitudes are
-// folded into their range.
-void check_fixed(const model::Predictor& predictor, const data::FitSettings& settings) {
+// A value the model cannot have would be refused at every attempt of the search, and a prior about
+// one would bend all the others. Attitudes are folded into their range.
+void check_values(const model::Predictor& predictor, const data::FitSettings& settings) {
+  constexpr double kSure = 3.0;  // standard deviations
   for (const ParameterInfo& info : predictor.parameters()) {
-    const double* value = said_of(info.name, settings.fixed);
-    if (value == nullptr || info.role == ParameterInfo::Role::initial) continue;
-    if (!(*value >= info.lower && *value <= info.upper))
+    const data::Prior* prior = said_of(info.name, settings.prior);
+    const auto refuse_prior = [&](double lower, double upper, const char* whose) {
+      if (prior != nullptr && !(prior->value + kSure * prior->sigma >= lower &&
+                                prior->value - kSure * prior->sigma <= upper))
+        throw InputError(fmt::format("[fit] prior: {} = {} +- {} lies outside {} {} .. {}",
+                                     info.name, prior->value, prior->sigma, whose, lower, upper));
+    };
+    if (const auto* bounds = said_of(info.name, settings.bounds))
+      refuse_prior(bounds->first, bounds->second, "its bounds");
+    if (info.role == ParameterInfo::Role::initial) continue;
+    refuse_prior(info.lower, info.upper, "what the model can have,");
+    if (const double* value = said_of(info.name, settings.fixed);
+        value != nullptr && !(*value >= info.lower && *value <= info.upper))
       throw InputError(fmt::format("[fit] fixed: {} = {} must lie between {} and {}", info.name,
                                    *value, info.lower, info.upper));
   }
@@ -288,6 +289,10 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
 
 }  // namespace
 
+bool means(const std::string& entry, const std::string& parameter) {
+  return parameter == entry || (parameter.starts_with(entry) && parameter[entry.size()] == '[');
+}
+
 bool leaves_choice(const std::string& name) {
   return is_pivot(name) || name == kReadout || name == kAngleDelay || name == kSlipScale;
 }
@@ -295,7 +300,7 @@ bool leaves_choice(const std::string& name) {
 Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                      const data::Scene& scene) {
   check_names(predictor, scene.fit);
-  check_fixed(predictor, scene.fit);
+  check_values(predictor, scene.fit);
   Problem problem;
   problem.predictor = &predictor;
   problem.arcs = std::move(arcs);

@@ -115,6 +115,19 @@ struct Problem {
 /// absent altogether. The friction of a sliding body and a top's a, b and l are not.
 [[nodiscard]] bool is_loss(const Problem& problem, const FreeParameter& parameter);
 
+/// Whether a name under [fit] means a parameter: its own, or that of a term, which stands for all
+/// its components ("air_linear_N_m_s" for "air_linear_N_m_s[1]").
+[[nodiscard]] bool means(const std::string& entry, const std::string& parameter);
+
+/// What a table under [fit] says of a parameter: by its own name, else by its term's; null:
+/// nothing.
+template <class Value>
+const Value* said_of(const std::string& parameter, const std::map<std::string, Value>& entries) {
+  auto entry = entries.find(parameter);
+  if (entry == entries.end()) entry = entries.find(parameter.substr(0, parameter.find('[')));
+  return entry == entries.end() ? nullptr : &entry->second;
+}
+
 /// Whether naming a parameter in [fit] free leaves the model its own choice of the others: where
 /// its pivot is, when it was seen, how friction sets in.
 [[nodiscard]] bool leaves_choice(const std::string& name);

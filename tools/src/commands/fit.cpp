@@ -131,7 +131,7 @@ void tell_odd_units(const std::string& path, const data::Track& track) {
   tell_far_positions(path, track);
   const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
                         static_cast<double>(track.samples.size() - 1);
-  if (step_s > kSparse_s)
+  if (step_s >= kSparse_s)
     note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 

@@ -145,11 +145,17 @@ Eigen::Vector3d PictureRenderer::direction(double x_px, double y_px) const {
          fy * ((1 - fx) * below[0] + fx * below[1]);
 }
 
+/// Where the line of sight begins: at the camera, or where that has no centre above all there is.
+Eigen::Vector3d PictureRenderer::eye(double x_px, double y_px) const {
+  constexpr double kAbove_m = 100.0;
+  if (camera_.projection == data::Camera::Projection::perspective) return camera_.position_m();
+  const data::Ray ray = camera_.ray_from_image({x_px, y_px});
+  return ray.origin_m - kAbove_m * ray.direction;
+}
+
 PictureRenderer::Seen PictureRenderer::trace(double x_px, double y_px, const Posed& body) const {
   const Eigen::Vector3d along = direction(x_px, y_px);
-  const Eigen::Vector3d origin = camera_.projection == data::Camera::Projection::orthographic
-                                     ? camera_.ray_from_image({x_px, y_px}).origin_m
-                                     : camera_.position_m();
+  const Eigen::Vector3d origin = eye(x_px, y_px);
   Seen seen;
   seen.along = body.body_from_table * along;
   seen.hit = meet_body(body_, body.body_from_table * (origin - body.centre_m), seen.along);
@@ -211,9 +217,7 @@ void PictureRenderer::draw_floor() {
         const double px = x + (k % kAcross + 0.5) / kAcross - 0.5;
         const double py = y + (k / kAcross + 0.5) / kAcross - 0.5;
         const Eigen::Vector3d along = direction(px, py);
-        const Eigen::Vector3d origin = camera_.projection == data::Camera::Projection::orthographic
-                                           ? camera_.ray_from_image({px, py}).origin_m
-                                           : camera_.position_m();
+        const Eigen::Vector3d origin = eye(px, py);
         if (along.z() < 0.0) sum += floor_colour(origin - origin.z() / along.z() * along);
       }
       sum /= static_cast<float>(kAcross * kAcross);
@@ -295,9 +299,7 @@ void PictureRenderer::draw_body(const data::Pose<>& pose, float share, cv::Mat& 
       cv::Vec3f value(colour.z(), colour.y(), colour.x());
       if (uncovered > 0) {
         const Eigen::Vector3d along = direction(px, py);
-        const Eigen::Vector3d origin = camera_.projection == data::Camera::Projection::orthographic
-                                           ? camera_.ray_from_image({px, py}).origin_m
-                                           : camera_.position_m();
+        const Eigen::Vector3d origin = eye(px, py);
         const float lit =
             style_.shadow ? floor_light(origin - origin.z() / along.z() * along, posed) : 1.0F;
         value +=

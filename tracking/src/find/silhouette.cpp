@@ -172,6 +172,17 @@ std::optional<double> split_inside(const cv::Mat& difference, const Contour& con
   return at;
 }
 
+/// The parts of a region that differ most, where its differences fall into two.
+std::vector<Contour> cores_of(const cv::Mat& difference, const Contour& region) {
+  const auto split = split_inside(difference, region);
+  if (!split) return {};
+  const cv::Rect part = cv::boundingRect(region);
+  std::vector<Contour> cores = contours_above(difference(part), *split);
+  for (Contour& core : cores)
+    for (cv::Point& p : core) p += part.tl();
+  return cores;
+}
+
 void largest_first(std::vector<Silhouette>& bodies) {
   std::sort(bodies.begin(), bodies.end(), [](const Silhouette& a, const Silhouette& b) {
     return a.detection.area_px2 > b.detection.area_px2;
@@ -247,12 +258,10 @@ std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
   };
   for (const Contour& contour : contours_above(d.size, d.threshold)) {
     add(contour);
-    const auto split = split_inside(d.size, contour);
-    if (!split) continue;
-    const cv::Rect part = cv::boundingRect(contour);
-    for (Contour core : contours_above(d.size(part), *split)) {
-      for (cv::Point& p : core) p += part.tl();
+    // Once takes the light parts of a shadow off, twice its dark ones.
+    for (const Contour& core : cores_of(d.size, contour)) {
       add(core);
+      for (const Contour& innermost : cores_of(d.size, core)) add(innermost);
     }
   }
   for (const Contour& contour : contours_above(d.brighter, d.threshold)) add(contour);

@@ -1,0 +1,252 @@
+#include "judge/caveats.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "judge/adequacy.hpp"
+#include "judge/body_doubt.hpp"
+#include "judge/leaning.hpp"
+#include "judge/profile.hpp"
+#include "problem/linearise.hpp"
+#include "trochoid/data/quantile.hpp"
+#include "trochoid/model/idle_keys.hpp"
+
+namespace trochoid::fitting {
+
+void heed_far_side(const Problem& problem, const Solution& solution, int threads,
+                   Uncertainty& error, data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  if (problem.predictor->index_of("friction") < 0) return;
+  if (!explains(problem, solution)) return;  // a bar about another path means nothing
+  const auto far = far_side_of_friction(problem, solution, error, threads);
+  if (!far) return;
+  const double variance = error.covariance(far->index, far->index);
+  const double times = far->sigma / std::sqrt(variance);
+  const Eigen::VectorXd along = error.covariance.col(far->index) / variance;
+  error.covariance += (far->sigma * far->sigma - variance) * along * along.transpose();
+  error.identifiable[far->index] = far->sigma < natural_size(problem, far->index, solution.u);
+  if (times > kWorthWords)
+    fit.warnings.push_back(fmt::format(
+        "chi-square is lopsided in {}: its error bar is that of the flatter side, {:.2g} "
+        "times what the curvature says (the profile shows both sides)",
+        problem.name(far->index), times));
+}
+
+void heed_single_samples(const Problem& problem, const Solution& solution, Uncertainty& error,
+                         data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  if (!explains(problem, solution)) return;
+  const Eigen::VectorXd before = error.covariance.diagonal().cwiseSqrt();
+  for (const Leaning& leaning : leanings(problem, solution, before)) {
+    error.covariance += leaning.shift * leaning.shift.transpose();
+    std::vector<std::string> names;
+    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+      const double sigma = std::sqrt(error.covariance(i, i));
+      if (sigma > kWorthWords * before[i]) names.push_back(problem.name(i));
+      error.identifiable[i] = error.identifiable[i] && sigma < natural_size(problem, i, solution.u);
+    }
+    if (!names.empty())
+      fit.warnings.push_back(
+          fmt::format("{} hang on the sample at t = {:.4g} s alone: their error bars hold "
+                      "what comes out without it",
+                      fmt::join(names, ", "), leaning.t_s));
+  }
+}
+
+namespace {
+
+// A puck's path is the same for either sense of its spin: unless a prior tells, the spin that fits
+// is as likely the other way round.
+void heed_either_sense(const Problem& problem, Uncertainty& error, data::Fit& fit) {
+  if (fit.model != "puck") return;
+  const int spin = problem.predictor->index_of("w3_rad_s");
+  constexpr double kTells = 2.0;  // standard deviations
+  bool either = false;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& free = problem.free[i];
+    const int arc = std::max(0, free.arc);
+    if (free.index != spin || problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0 ||
+        (free.prior && std::abs(free.prior->value) > kTells * free.prior->sigma))
+      continue;
+    // What only its prior says of it is no observation of either.
+    constexpr double kOfPrior = 0.5;
+    if (free.prior && std::sqrt(error.covariance(i, i)) > kOfPrior * free.prior->sigma) continue;
+    const double value = problem.base[arc][spin];
+    error.covariance(i, i) += 2.0 * value * value;  // the mean square of 0 and 2 w3
+    either = true;
+  }
+  if (either)
+    fit.warnings.push_back(
+        "the path shows how fast the puck turns, not which way round: the error bar of w3_rad_s "
+        "holds either");
+}
+
+}  // namespace
+
+void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
+                 double frame_s, Uncertainty& error, data::Fit& fit) {
+  for (const Doubt& doubt : body_doubts(problem, solution.u, scene, frame_s)) {
+    error.covariance += doubt.shift * doubt.shift.transpose();
+    const data::Prior& prior = scene.fit.prior.at(doubt.name);
+    fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
+                                       prior.value, prior.sigma));
+  }
+  heed_either_sense(problem, error, fit);
+  const std::vector<Doubt> spins = unseen_spins(problem, solution.u, scene);
+  for (const Doubt& spin : spins) error.covariance += spin.shift * spin.shift.transpose();
+  if (!spins.empty())
+    fit.warnings.push_back(
+        "nothing shows the puck's spin: the friction is that of one that does not turn, and its "
+        "error bar allows for a rim as fast as the puck slides, as far as the path does not rule "
+        "that out; a mark on the face would tell");
+  for (const std::string& name : idle_priors(problem, scene))
+    fit.warnings.push_back(fmt::format(
+        "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
+}
+
+namespace {
+
+// Pictures a second by a track's times and frame numbers; 0 where it has none.
+double picture_rate_hz(std::span<const data::Track> tracks) {
+  std::vector<double> steps_s;
+  for (const data::Track& track : tracks)
+    for (std::size_t i = 1; i < track.samples.size(); ++i)
+      if (const data::TrackSample& a = track.samples[i - 1], &b = track.samples[i];
+          a.frame >= 0 && b.frame > a.frame)
+        steps_s.push_back((b.t_s - a.t_s) / static_cast<double>(b.frame - a.frame));
+  const double step_s = steps_s.empty() ? 0.0 : data::median(std::move(steps_s));
+  return step_s > 0.0 ? 1.0 / step_s : 0.0;
+}
+
+}  // namespace
+
+void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks,
+                     data::Fit& fit) {
+  const auto prior = scene.fit.prior.find("frame_rate_hz");
+  if (prior == scene.fit.prior.end() || scene.camera.frame_rate_hz) return;
+  constexpr double kClearly = 0.1;
+  const double rate_hz = picture_rate_hz(tracks);
+  if (rate_hz == 0.0 || std::abs(std::log(prior->second.value / rate_hz)) < kClearly) return;
+  fit.warnings.push_back(
+      fmt::format("[fit] prior: frame_rate_hz = {:g}, but the track has {:.3g} pictures a second, "
+                  "and its times are kept; if they are wrong, track again with [camera] "
+                  "frame_rate_hz = {:g}",
+                  prior->second.value, rate_hz, prior->second.value));
+}
+
+void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
+  constexpr double kMoon_m_s2 = 1.0, kJupiter_m_s2 = 26.0;
+  if (const double g = scene.model.gravity_m_s2; g != 0.0 && (g < kMoon_m_s2 || g > kJupiter_m_s2))
+    fit.warnings.push_back(
+        fmt::format("[model] gravity_m_s2 = {:g}: on earth it is 9.81; is it in m/s^2?", g));
+  if (!scene.body || scene.body->kind == data::BodyKind::top || !(scene.body->radius_m > 0.0))
+    return;
+  constexpr double kLightest_kg_m3 = 5.0, kHeaviest_kg_m3 = 25e3, kThickest_radii = 20.0;
+  const data::Body& body = *scene.body;
+  const double volume_m3 =
+      std::numbers::pi * body.thickness_m *
+      (body.radius_m * body.radius_m - body.inner_radius_m * body.inner_radius_m);
+  if (body.mass_kg && volume_m3 > 0.0)
+    if (const double density = *body.mass_kg / volume_m3;
+        density < kLightest_kg_m3 || density > kHeaviest_kg_m3)
+      fit.warnings.push_back(
+          fmt::format("[body] mass_kg = {:g} makes a density of {:.2g} kg/m^3; is it in kg, "
+                      "and are the lengths in m?",
+                      *body.mass_kg, density));
+  if (body.thickness_m > kThickest_radii * body.radius_m)
+    fit.warnings.push_back(
+        fmt::format("[body] thickness_m = {:g} is {:.3g} times radius_m; are both in m?",
+                    body.thickness_m, body.thickness_m / body.radius_m));
+}
+
+void tell_given_up(const Problem& problem, data::Fit& fit) {
+  constexpr double kLittle = 0.1;
+  int given_up = 0, all = 0;
+  double first_s = std::numeric_limits<double>::infinity();
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+    for (const Reading& reading : problem.arcs[arc].readings) {
+      ++all;
+      if (robust_weight(problem, static_cast<int>(arc), reading) > kLittle) continue;
+      ++given_up;
+      first_s = std::min(first_s, problem.arcs[arc].t_s[reading.sample]);
+    }
+  if (given_up > 0)
+    fit.warnings.push_back(fmt::format(
+        "{} of {} positions and angles lie far off and hardly count, the first at t = {:.4g} s",
+        given_up, all, first_s));
+}
+
+namespace {
+
+std::string range_words(const std::pair<double, double>& bounds) {
+  const auto [lower, upper] = bounds;
+  return !std::isfinite(lower)   ? fmt::format("at most {:g}", upper)
+         : !std::isfinite(upper) ? fmt::format("at least {:g}", lower)
+                                 : fmt::format("in {:g} .. {:g}", lower, upper);
+}
+
+// Bounds are approached and never reached: by a thousandth of what they leave, or of themselves.
+bool stands_at(double value, double bound, double other) {
+  constexpr double kNear = 1e-3;
+  const double size = std::isfinite(other) ? std::abs(bound - other) : std::abs(bound);
+  return std::isfinite(bound) && std::abs(value - bound) <= kNear * size;
+}
+
+}  // namespace
+
+void tell_bounds(const Problem& problem, const Solution& solution, const data::Scene& scene,
+                 data::Fit& fit) {
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& free = problem.free[i];
+    const auto* bounds =
+        said_of(problem.predictor->parameters()[free.index].name, scene.fit.bounds);
+    if (bounds == nullptr) continue;
+    const double value = free.transform.value(solution.u[i]);
+    const auto [lower, upper] = *bounds;
+    const bool low = stands_at(value, lower, upper);
+    if (low || stands_at(value, upper, lower))
+      fit.warnings.push_back(fmt::format(
+          "{} stands at the {} bound, {:g}, that [fit] bounds give it: the track may say that it "
+          "is {}, and its error bar knows nothing of that",
+          problem.name(i), low ? "lower" : "upper", low ? lower : upper, low ? "less" : "more"));
+  }
+}
+
+void tell_held(const data::Scene& scene, data::Fit& fit) {
+  std::vector<std::string> held;
+  for (const auto& [name, bounds] : scene.fit.bounds)
+    held.push_back(fmt::format("{} {}", name, range_words(bounds)));
+  for (const auto& [name, value] : scene.fit.fixed)
+    held.push_back(fmt::format("{} = {:g}", name, value));
+  if (!held.empty())
+    fit.warnings.push_back(fmt::format(
+        "[fit] holds {}; is the track's motion among those that are left?", fmt::join(held, ", ")));
+}
+
+void tell_idle_pivot(const Problem& problem, const data::Scene& scene, data::Fit& fit) {
+  const auto& infos = problem.predictor->parameters();
+  const bool has_pivot = std::any_of(infos.begin(), infos.end(),
+                                     [](const auto& info) { return info.name == "pivot_x_m"; });
+  if (scene.fit.free_pivot && !has_pivot)
+    fit.warnings.push_back(fmt::format(
+        "free_pivot: model '{}' has no pivot to fit, it counts for nothing", fit.model));
+}
+
+void tell_idle_terms(const data::Scene& scene, data::Fit& fit) {
+  constexpr std::string_view kTerm = "model.";
+  for (const std::string& key : model::idle_keys(scene))
+    if (key.starts_with(kTerm))
+      fit.warnings.push_back(
+          fmt::format("[model] {}: model '{}' has no such term, it counts for "
+                      "nothing",
+                      key.substr(kTerm.size()), fit.model));
+}
+
+}  // namespace trochoid::fitting

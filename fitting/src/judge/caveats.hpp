@@ -1,0 +1,54 @@
+#pragma once
+#include <span>
+
+#include "judge/statistics.hpp"
+#include "problem/problem.hpp"
+#include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
+#include "trochoid/data/track.hpp"
+
+/// What must be said of a fit beside its numbers: heed_...() widens error bars for it, tell_...()
+/// says it; both add to the fit's warnings.
+namespace trochoid::fitting {
+
+/// The error bar of friction reaches as far as chi-square does on its flatter side; what goes with
+/// friction goes farther with it.
+void heed_far_side(const Problem& problem, const Solution& solution, int threads,
+                   Uncertainty& error, data::Fit& fit);
+
+/// What one sample alone tells, which may be wrong by more than its error says, is known no better
+/// than as far as it goes without that sample.
+void heed_single_samples(const Problem& problem, const Solution& solution, Uncertainty& error,
+                         data::Fit& fit);
+
+/// What the model takes for given is known as well as its priors say, and no better; and a puck
+/// whose spin nothing shows may turn, either way round.
+/// @param frame_s  as of observed().
+void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
+                 double frame_s, Uncertainty& error, data::Fit& fit);
+
+/// A recording's own rate and one that is given for its camera may differ: then only what the
+/// latter says of its own error is taken.
+void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks, data::Fit& fit);
+
+/// Slips of units that a fit would follow without a word.
+void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);
+
+/// Positions and angles that were all but given up (reweight): their number is no longer what the
+/// fit stands on.
+void tell_given_up(const Problem& problem, data::Fit& fit);
+
+/// Values that stand at a bound under [fit].
+void tell_bounds(const Problem& problem, const Solution& solution, const data::Scene& scene,
+                 data::Fit& fit);
+
+/// What [fit] holds, for where nothing fits.
+void tell_held(const data::Scene& scene, data::Fit& fit);
+
+/// A pivot is freed in vain where there is none.
+void tell_idle_pivot(const Problem& problem, const data::Scene& scene, data::Fit& fit);
+
+/// Terms of other models; [start] is a hint for whichever wants it.
+void tell_idle_terms(const data::Scene& scene, data::Fit& fit);
+
+}  // namespace trochoid::fitting
