@@ -15,11 +15,18 @@ namespace {
 
 constexpr std::size_t kMaxColumns = 4096;
 
+// Spreadsheets put quotes round some texts; a cell that holds quotes or commas of its own is none
+// of a table of numbers.
+std::string_view without_quotes(std::string_view cell) {
+  const bool quoted = cell.size() >= 2 && cell.front() == '"' && cell.back() == '"';
+  return quoted ? trimmed(cell.substr(1, cell.size() - 2)) : cell;
+}
+
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> cells;
   while (cells.size() <= kMaxColumns) {
     const auto comma = line.find(',');
-    cells.push_back(trimmed(line.substr(0, comma)));
+    cells.push_back(without_quotes(trimmed(line.substr(0, comma))));
     if (comma == std::string_view::npos) break;
     line.remove_prefix(comma + 1);
   }
@@ -72,14 +79,15 @@ bool CsvReader::next_content_line(std::string_view& line) {
     position_ = end + 1;
     ++line_;
     if (line.empty()) continue;
-    if (line.front() != '#') return true;
-    keep_header(line.substr(1));
+    if (line.front() != '#' && !line.starts_with("\"#")) return true;
+    keep_header(line);
   }
   return false;
 }
 
 void CsvReader::keep_header(std::string_view line) {
   while (line.ends_with(',')) line.remove_suffix(1);  // spreadsheets fill up all rows alike
+  line = without_quotes(line).substr(1);
   const auto colon = line.find(": ");
   const bool has_value = colon != std::string_view::npos;
   header_.emplace_back(one_line(trimmed(line.substr(0, colon))),
@@ -92,9 +100,12 @@ int CsvReader::index_of(std::string_view column) const {
 }
 
 bool CsvReader::next() {
-  std::string_view line;
-  if (!next_content_line(line)) return false;
-  cells_ = split(line);
+  const auto is_empty = [](std::string_view cell) { return cell.empty(); };
+  do {
+    std::string_view line;
+    if (!next_content_line(line)) return false;
+    cells_ = split(line);
+  } while (cells_.size() == columns_.size() && std::all_of(cells_.begin(), cells_.end(), is_empty));
   if (cells_.size() != columns_.size())
     throw InputError(fmt::format(
         "{}: {} cells where the header names {} columns", place(),

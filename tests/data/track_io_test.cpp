@@ -157,6 +157,17 @@ TEST(TrackFile, SavedByASpreadsheetMayHaveCommasBehindItsRemarks) {
   EXPECT_EQ(read.tracks.at(0).samples.size(), 2u);
 }
 
+TEST(TrackFile, SavedByASpreadsheetMayHaveQuotesRoundItsCellsAndEmptyRows) {
+  const TestFolder folder;
+  const TrackFile file =
+      read_track(folder.write("quoted.csv",
+                              "\"# source: made by Anna, by hand\",,\n\"t_s\",\"x_m\",\"y_m\"\n"
+                              "\"0\",1,2\n0.5,\"3\",4\n,,\n,,\n"));
+  EXPECT_EQ(file.source, "made by Anna, by hand");
+  ASSERT_EQ(file.tracks.at(0).samples.size(), 2U);
+  EXPECT_EQ(file.tracks[0].samples[1].centre_m, Eigen::Vector2d(3, 4));
+}
+
 TEST(TrackFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
   const TestFolder folder;
   const TrackFile read =
@@ -247,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(
                 ":2:", "sxx_m2, syy_m2 > 0"},
         Refusal{"TooCorrelated", "t_s,x_m,y_m,sxx_m2,sxy_m2,syy_m2\n0,1,2,1,1.5,1\n",
                 ":2:", "no covariance"},
-        Refusal{"QuotedNames", "\"t_s\",\"x_m\",\"y_m\"\n0,1,2\n", ":1:", "remove the quotes"},
+        Refusal{"QuotedNames", "'t_s','x_m','y_m'\n0,1,2\n", ":1:", "remove the quotes"},
         Refusal{"AngleWithoutSigma", "t_s,x_m,y_m,theta_rad,sigma_theta_rad\n0,1,2,0.5,\n",
                 ":2:", "sigma_theta_rad"},
         Refusal{"Degrees", "t_s,x_m,y_m,theta_rad,sigma_theta_rad\n0,1,2,57,0.1\n",

@@ -53,6 +53,10 @@ class Simulate(unittest.TestCase):
         self.assertTrue(all(trochoid.scenes().values()))
         self.assertEqual(trochoid.simulate("thesis-base", until_s=1.0).model, "top")
 
+    def test_a_key_is_a_key_whatever_it_holds(self):
+        with self.assertRaisesRegex(trochoid.InputError, "is not a key of .body."):
+            trochoid.Scene({"body": {"radius_m = 1\n#": 1}})
+
     def test_a_scene_survives_the_trip_through_its_text(self):
         scene = trochoid.Scene(TOP)
         self.assertEqual(trochoid.Scene.from_toml(scene.toml).toml, scene.toml)
@@ -213,6 +217,24 @@ class Fit(unittest.TestCase):
         self.assertEqual(again["l_m"].value, fit["l_m"].value)
         self.assertNotEqual(again, trochoid.fit(noisy_track(seed=2), model="top"))
         self.assertEqual(pickle.loads(pickle.dumps(trochoid.Scene(TOP))), trochoid.Scene(TOP))
+
+    def test_a_fit_is_asked_for_its_parameters_like_a_dict_and_not_changed(self):
+        fit = trochoid.fit(noisy_track(), model="top")
+        self.assertIn("l_m", fit)
+        self.assertNotIn("nope", fit)
+        self.assertEqual(list(fit), list(fit.parameters))
+        with self.assertRaisesRegex(AttributeError, "cannot be changed"):
+            fit.model = "rolling"
+        with self.assertRaisesRegex(AttributeError, "a Fit has no attribute 'chi'"):
+            fit.chi
+
+    def test_a_simulated_motion_is_fitted_as_a_track_of_it(self):
+        run = trochoid.simulate(TOP)
+        of_run = trochoid.fit(run, model="top")
+        of_track = trochoid.fit(trochoid.Track(run["t_s"], np.column_stack([run["x_m"], run["y_m"]])),
+                                model="top")
+        self.assertEqual(of_run["l_m"].value, of_track["l_m"].value)
+        self.assertLess(len(repr(run)), 100)
 
     def test_a_fit_is_not_replayed_over_the_file_of_another_track(self):
         with tempfile.TemporaryDirectory() as folder:

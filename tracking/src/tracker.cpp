@@ -497,6 +497,11 @@ class Tracking {
           "{} picture{} of the folder, named unlike the others, {} left out: {}{}", others.size(),
           others.size() == 1 ? "" : "s", others.size() == 1 ? "is" : "are",
           others.front().filename().string(), others.size() == 1 ? "" : ", ..."));
+    if (const std::int64_t repeated = recording_.repeated(); repeated > 0)
+      result.file.notes.push_back(fmt::format(
+          "{} of {} pictures repeat the one before, though the body moves: their time stamps are "
+          "wrong; was the clip converted from another rate, or did the camera stutter?",
+          repeated, frames_));
     if (recording_.info().evened)
       result.file.notes.push_back(
           "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "

@@ -22,7 +22,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import reprlib
-from typing import Any, Callable, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -103,6 +103,16 @@ class _Record:
         return all(_same(mine, vars(other)[name]) for name, mine in vars(self).items())
 
 
+def _toml_text(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+
+
+def _toml_key(key: Any) -> str:
+    """As it is where it may be: messages then show it so."""
+    text = _text("key", key)
+    return text if text.replace("_", "").isalnum() and text.isascii() else _toml_text(text)
+
+
 def _toml_value(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -111,9 +121,9 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, os.PathLike):
         value = os.fsdecode(value)
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+        return _toml_text(value)
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_toml_value(v)}" for key, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_toml_key(k)} = {_toml_value(v)}" for k, v in value.items()) + "}"
     if isinstance(value, (Sequence, np.ndarray)):
         return "[" + ", ".join(_toml_value(v) for v in value) + "]"
     if isinstance(value, (int, np.integer)):
@@ -128,7 +138,8 @@ def _scene_of_dict(tables: Mapping[str, Mapping[str, Any]]) -> "_core.SceneValue
     for name, table in tables.items():
         if not isinstance(table, Mapping):
             raise InputError(f"scene: '{name}' is not a table; give a dict of dicts")
-        lines += [f"[{name}]"] + [f"{key} = {_toml_value(value)}" for key, value in table.items()]
+        lines += [f"[{name}]"] + [f"{_toml_key(key)} = {_toml_value(value)}"
+                                  for key, value in table.items()]
         owners += [name] * (1 + len(table))
     return _core.SceneValue.of_tables("\n".join(lines) + "\n", owners)
 
@@ -176,7 +187,7 @@ def scenes() -> dict[str, str]:
     return _core.bundled_scenes()
 
 
-@dataclasses.dataclass(eq=False)
+@dataclasses.dataclass(eq=False, repr=False)
 class Track(_Record):
     """The path of one body; n samples, strictly increasing in time; frames without the body have none.
 
@@ -200,8 +211,12 @@ class Track(_Record):
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def __repr__(self) -> str:
+        span = f", {self.t_s[0]:.6g} .. {self.t_s[-1]:.6g} s" if len(self) else ""
+        return f"<Track of object {self.object}: {len(self)} samples{span}>"
 
-@dataclasses.dataclass(eq=False)
+
+@dataclasses.dataclass(eq=False, repr=False)
 class TrackFile(_Record):
     """The tracks of a recording and where they come from."""
 
@@ -213,6 +228,9 @@ class TrackFile(_Record):
     angles_folded: bool = False   #: faces look alike: theta is min(theta, pi - theta)
     notes: list[str] = dataclasses.field(default_factory=list)
     summary: Optional[dict[str, Any]] = None  #: of track(): frames, found, lost, doubtful, damaged
+
+    def __repr__(self) -> str:
+        return f"<TrackFile of {self.source or 'no recording'}: {', '.join(map(repr, self.tracks))}>"
 
     def write(self, path: Path) -> None:
         """Writes the track file (CSV), whole or not at all."""
@@ -296,7 +314,7 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
     return file
 
 
-Tracks = Union[Path, Track, TrackFile, Sequence[Union[Path, Track, TrackFile]]]
+Tracks = Union[Path, Track, TrackFile, "Trajectory", Sequence[Union[Path, Track, TrackFile, "Trajectory"]]]
 
 
 def _all_tracks(given: Tracks) -> tuple[list[Track], dict[str, str]]:
@@ -307,6 +325,10 @@ def _all_tracks(given: Tracks) -> tuple[list[Track], dict[str, str]]:
         return [given], {}
     if isinstance(given, TrackFile):
         return list(given.tracks), {}
+    if isinstance(given, Trajectory):
+        return [Track(given["t_s"], np.column_stack([given["x_m"], given["y_m"]]))], {}
+    if isinstance(given, Iterator):
+        given = list(given)
     if not isinstance(given, Sequence):
         raise InputError(f"tracks: a {type(given).__name__} is no track, track file or path")
     tracks: list[Track] = []
@@ -343,6 +365,15 @@ class Fit:
         """(k, k) covariance of the k free parameters ``covariance_names``."""
         return self._value.covariance
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self._value.parameters)
+
     def __getitem__(self, name: str) -> Parameter:
         parameters = self.parameters
         try:
@@ -351,9 +382,14 @@ class Fit:
             raise KeyError(f"{name}; there are {', '.join(parameters)}") from None
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
+        if name.startswith("_") or not hasattr(self._value, name):
+            raise AttributeError(f"a Fit has no attribute {name!r}")
         return getattr(self._value, name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name != "_value":
+            raise AttributeError("a Fit is what was found and cannot be changed")
+        super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *(n for n in dir(self._value) if not n.startswith("_"))})
@@ -397,7 +433,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
         start: Optional[Mapping[str, float]] = None, output: Optional[Path] = None) -> Fit:
     """Fits model parameters to one or more tracks of a body (``trochoid fit``).
 
-    tracks     a path, Track or TrackFile, or a list of them (several recordings of one body)
+    tracks     a path, Track, TrackFile or Trajectory, or a list (several recordings of one body)
     model      top, rolling, sliding, puck, pivot or auto; overrides the scene's
     from_, to  first and last sample: seconds (1.5) or a frame ("f120")
     free_pivot fit the pivot's x and y (top); else it is where the scene says, or at 0, 0
@@ -495,7 +531,7 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
     return OverlayFrames(**frames)
 
 
-@dataclasses.dataclass(eq=False)
+@dataclasses.dataclass(eq=False, repr=False)
 class Trajectory(_Record):
     """A finished run. ``run["x_m"]`` is the column of that name, (rows,)."""
 
@@ -512,6 +548,13 @@ class Trajectory(_Record):
     error_estimate_rad: float    #: of the direction of the axis
     steps: int
     evaluations: int             #: of the right-hand side
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __repr__(self) -> str:
+        return (f"<Trajectory of {self.model} by {self.integrator}: {len(self)} rows to "
+                f"{self.end_s:.6g} s, {self.outcome}>")
 
     def __getitem__(self, column: str) -> np.ndarray:
         try:

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -49,6 +50,7 @@ struct Views {
   std::vector<cv::Mat> pictures;  ///< of `found`
   cv::Size size;
   int looked_at = 0;
+  std::string other_board;  ///< what is seen of one that was not looked for, in words
   std::optional<int> orientation;
 
   // Turned upright, pictures taken with the camera the other way up are another camera's: its
@@ -72,6 +74,10 @@ struct Views {
     if (auto view = tracking::find_board(luma, pattern, name)) {
       found.push_back(std::move(*view));
       pictures.push_back(luma);
+    } else if (other_board.empty() && !pattern.marker_m) {
+      if (const auto seen = tracking::chessboard_in(luma, pattern))
+        other_board =
+            fmt::format("the board in {} has {}x{} inner corners", name, seen->width, seen->height);
     }
   }
 };
@@ -101,26 +107,40 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   }
 }
 
+// Each file once: the same picture under two names tells nothing twice.
+std::vector<fs::path> files_named(const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> files;
+  std::map<std::string, fs::path> by_checksum;
+  for (const fs::path& input : inputs)
+    for (const fs::path& file : tracking::files_of_recording(input)) {
+      if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
+      const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(file), file);
+      if (fresh)
+        files.push_back(file);
+      else
+        note(fmt::format("{}: is the same picture as {} and counts once", file.string(),
+                         same->second.string()));
+    }
+  return files;
+}
+
 Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
   Views views;
   Progress progress("calibrate", "files");
-  std::int64_t done = 0;
-  for (const fs::path& path : options.inputs) {
-    if (!fs::exists(path)) throw InputError(fmt::format("{}: no such file", path.string()));
-    if (fs::is_directory(path))
-      throw InputError(fmt::format("{}: is a folder; give its pictures, e.g. {}", path.string(),
-                                   (path / "*.png").string()));
-    look_into(path, pattern, views);
-    progress.update(++done, static_cast<std::int64_t>(options.inputs.size()));
+  const std::vector<fs::path> files = files_named(options.inputs);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    look_into(files[i], pattern, views);
+    progress.update(static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(files.size()));
   }
   if (views.found.size() < 3) {
     const bool in_all = static_cast<int>(views.found.size()) == views.looked_at;
     throw InputError(
         fmt::format("the board ({} of {:g} mm) is whole in {} of {} pictures; three are needed{}",
                     options.pattern, options.square_mm, views.found.size(), views.looked_at,
-                    in_all             ? ", tilted in different directions"
-                    : pattern.marker_m ? ". Is --pattern the number of squares?"
-                                       : ". Is --pattern the number of inner corners?"));
+                    in_all                       ? ", tilted in different directions"
+                    : !views.other_board.empty() ? "; " + views.other_board
+                    : pattern.marker_m           ? ". Is --pattern the number of squares?"
+                                                 : ". Is --pattern the number of inner corners?"));
   }
   return views;
 }
@@ -173,8 +193,9 @@ std::size_t floor_view(const Options& options, const Views& views) {
     if (fs::path(name).lexically_normal() == wanted || fs::path(name).filename() == wanted)
       return i;
   }
-  throw InputError(
-      fmt::format("--floor {}: none of the pictures with a board has this name", options.floor));
+  throw InputError(fmt::format(
+      "--floor {}: no picture of this name shows the board whole; is it among the pictures?",
+      options.floor));
 }
 
 std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const char* y,
@@ -221,8 +242,8 @@ std::string place_floor(const Options& options, const Views& views, data::Camera
   const tracking::BoardView& view = views.found[floor_view(options, views)];
   const double rms = tracking::set_floor(camera, {view.board_m, view.image_px}, height_m);
   return fmt::format(
-      "floor: the board in {}, rms {:.3f} px{}", view.name, rms,
-      options.floor.empty() ? " (the first picture; choose another with --floor)" : "");
+      "floor: the board in {}, rms {:.3f} px{}; origin in its middle, x along its rows", view.name,
+      rms, options.floor.empty() ? " (the first picture; choose another with --floor)" : "");
 }
 
 // The corners found and, twenty times enlarged, how far the camera puts them elsewhere.
@@ -331,7 +352,8 @@ void add_calibrate_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("calibrate", "Find a camera from pictures of a board, and the floor");
-  command->add_option("inputs", options->inputs, "Pictures of the board, or a video of it")
+  command
+      ->add_option("inputs", options->inputs, "Pictures of the board, a folder of them or a video")
       ->required();
   command->add_option("--pattern", options->pattern,
                       "Inner corners of a chessboard, squares of a ChArUco board [9x6]");

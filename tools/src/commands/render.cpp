@@ -111,15 +111,18 @@ data::Camera camera_of(const Options& options, const data::Scene& scene, const M
   return camera_over(motion, *scene.body, options.width_px, options.height_px);
 }
 
+bool in_picture(const data::Pose<>& pose, const data::Camera& camera) {
+  const Eigen::Vector2d p = camera.image_from_table<double>(pose.centre_m);
+  return p.x() > 0.0 && p.y() > 0.0 && p.x() < camera.width_px - 1.0 &&
+         p.y() < camera.height_px - 1.0;
+}
+
 std::string truth_row(int frame, double t_s, const data::Pose<>& pose, const data::Camera& camera) {
   const Eigen::Quaterniond q(Eigen::AngleAxisd(pose.phi_rad, Eigen::Vector3d::UnitZ()) *
                              Eigen::AngleAxisd(pose.theta_rad, Eigen::Vector3d::UnitX()) *
                              Eigen::AngleAxisd(pose.psi_rad, Eigen::Vector3d::UnitZ()));
   const Eigen::Vector2d p = camera.image_from_table<double>(pose.centre_m);
-  const double inside =
-      p.x() > 0.0 && p.y() > 0.0 && p.x() < camera.width_px - 1.0 && p.y() < camera.height_px - 1.0
-          ? 1.0
-          : 0.0;
+  const double inside = in_picture(pose, camera) ? 1.0 : 0.0;
   return fmt::format(
       "{},{:.9f},{:.9f},{:.9f},{:.9f},{:.5f},{:.5f},{:.9f},{:.9f},{:.9f},{:.9f},{:.8f},{:.8f},"
       "{:.8f},{:.0f}\n",
@@ -169,7 +172,8 @@ Targets targets_of(const fs::path& output, bool lossless) {
   const std::string ending = lossless ? ".mkv" : ".mp4";
   const std::string given = output.extension().string();
   if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
-    throw InputError(fmt::format("{}: name {}", output.string(),
+    throw InputError(fmt::format("{}: name {}; a folder with a dot in its name ends in /",
+                                 output.string(),
                                  lossless ? "a folder or, as it is to be lossless, a .mkv file"
                                           : "a folder, an .mp4 or an .mkv file"));
   if (output.extension().empty())
@@ -272,6 +276,24 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
   return truth;
 }
 
+// What the scene promises and the recording does not show.
+void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
+                 int frames) {
+  const auto seen = [&](int frame) {
+    return in_picture(motion.at(frame / scene.run.rate_hz), camera);
+  };
+  int outside = 0, first = -1;
+  for (int frame = 0; frame < frames; ++frame)
+    if (!seen(frame) && outside++ == 0) first = frame;
+  if (outside > 0)
+    note(fmt::format(
+        "the body's centre is outside the picture in {} of {} frames, first at {:.3g} s", outside,
+        frames, first / scene.run.rate_hz));
+  if (scene.tracking.objects > 1)
+    note(fmt::format("one body is drawn; [tracking] objects = {} is for following a recording",
+                     scene.tracking.objects));
+}
+
 void tell(const Options& options, const Targets& targets, const data::Camera& camera, int frames) {
   if (options.json)
     return print_json({{"video", targets.video.string()},
@@ -304,6 +326,7 @@ void run(const Options& options) {
   data::write_camera(camera, targets.camera);
   data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);
   video.commit();
+  tell_unseen(motion, scene, camera, frames);
   tell(options, targets, camera, frames);
 }
 

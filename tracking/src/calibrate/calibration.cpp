@@ -59,9 +59,33 @@ void sharpen(const cv::Mat& luma, std::vector<cv::Point2f>& corners) {
                    {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, kSteps, kSettled_px});
 }
 
+}  // namespace
+
+std::optional<cv::Size> chessboard_in(const cv::Mat& luma, const BoardPattern& pattern) {
+  constexpr double kEnough_px = 320.0;
+  constexpr int kFewest = 3;
+  const double shrink = std::min(1.0, kEnough_px / std::max(luma.cols, luma.rows));
+  cv::Mat small;
+  cv::resize(luma, small, {}, shrink, shrink, cv::INTER_AREA);
+  for (const int more_columns : {0, -1, 1})
+    for (const int more_rows : {0, -1, 1}) {
+      const cv::Size size(pattern.columns + more_columns, pattern.rows + more_rows);
+      std::vector<cv::Point2f> corners;
+      if (std::min(size.width, size.height) >= kFewest &&
+          cv::findChessboardCorners(small, size, corners))
+        return size;
+    }
+  return std::nullopt;
+}
+
+namespace {
+
 std::optional<BoardView> find_chessboard(const cv::Mat& luma, const BoardPattern& pattern) {
   const cv::Size size(pattern.columns, pattern.rows);
   std::vector<cv::Point2f> corners;
+  // Where there is another board, its search takes half a minute.
+  const auto seen = chessboard_in(luma, pattern);
+  if (seen && *seen != size) return std::nullopt;
   if (!cv::findChessboardCorners(luma, size, corners) &&
       !cv::findChessboardCornersSB(luma, size, corners,
                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE))

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <new>
 #include <optional>
 #include <utility>
@@ -335,12 +336,20 @@ class LibavSource final : public FrameSource {
                       index, orientation, info_.orientation));
   }
 
+  /// Of a series, the file of the picture that was decoded last.
+  [[nodiscard]] std::string name_of_picture() const {
+    if (!series_) return "";
+    const fs::path& file = series_->pictures[static_cast<std::size_t>(frames_read_ - 1)];
+    return fmt::format(" ({})", file.filename().string());
+  }
+
   void convert(Frame& frame) {
     check_orientation(frame.index);
     const cv::Size size = turn_.upright(picture_->width, picture_->height);
     if (size != cv::Size(info_.width_px, info_.height_px))
-      fail(fmt::format("frame {}: the picture size changes from {} x {} to {} x {}", frame.index,
-                       info_.width_px, info_.height_px, size.width, size.height));
+      fail(fmt::format("frame {}{}: the picture size changes from {} x {} to {} x {}", frame.index,
+                       name_of_picture(), info_.width_px, info_.height_px, size.width,
+                       size.height));
     frame.damaged =
         (picture_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture_->decode_error_flags != 0;
     frame.luma = luma_of(*picture_, scaler_);
@@ -409,9 +418,11 @@ class LibavSource final : public FrameSource {
 }  // namespace
 
 std::vector<fs::path> files_of_recording(const fs::path& path) {
-  if (std::optional<ImageSequence> series = find_image_sequence(path))
-    return std::move(series->pictures);
-  return {path};
+  std::optional<ImageSequence> series = find_image_sequence(path);
+  if (!series) return {path};
+  std::vector<fs::path> files = std::move(series->pictures);
+  std::move(series->left_out.begin(), series->left_out.end(), std::back_inserter(files));
+  return files;
 }
 
 std::string sha256_of_recording(const fs::path& path) {

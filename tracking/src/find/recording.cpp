@@ -52,6 +52,7 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
       remember_window();
       window_.erase(window_.begin(), window_.end() - static_cast<std::ptrdiff_t>(keep));
     }
+    repeats_.add(frame->luma);
     if (each) each(*frame);
     bytes += bytes_of(*frame);
     window_.push_back(std::move(*frame));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "find/background.hpp"
+#include "find/repeats.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tracking {
@@ -22,6 +23,8 @@ class Recording {
             std::size_t held_bytes);
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
+  /// Pictures so far that repeat the one before.
+  [[nodiscard]] std::int64_t repeated() const { return repeats_.count(); }
   [[nodiscard]] const std::vector<Frame>& window() const { return window_; }
   /// Lets all but the last `keep` frames of the window go and reads on until it is full again.
   /// `each`, if given, sees every new frame as it comes.
@@ -43,6 +46,7 @@ class Recording {
   std::size_t held_bytes_;
   std::unique_ptr<FrameSource> source_;
   std::vector<Frame> window_;
+  Repeats repeats_;
   bool ended_ = false;
   std::vector<Frame> elsewhere_;  ///< pictures of other parts of the recording
   bool looked_ahead_ = false, sampled_ = true;

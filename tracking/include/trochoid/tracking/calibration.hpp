@@ -32,6 +32,11 @@ struct BoardView {
 [[nodiscard]] std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pattern,
                                                   const std::string& name);
 
+/// Inner corners along and across the chessboard in a picture (CV_8UC1), if it has as many as the
+/// pattern or one more or less either way and is seen in the picture shrunk to a quick look.
+[[nodiscard]] std::optional<cv::Size> chessboard_in(const cv::Mat& luma,
+                                                    const BoardPattern& pattern);
+
 /// A view that contradicts the others, or the few corners of it that do.
 struct LeftOut {
   std::size_t view = 0;                     ///< of those given

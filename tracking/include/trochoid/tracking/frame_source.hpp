@@ -70,7 +70,7 @@ class FrameSource {
 [[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,
                                                       const SourceOptions& options = {});
 /// The files that hold a recording: itself, or the pictures of a sequence in the order they are
-/// read.  @throws InputError if a sequence has none.
+/// read and then those of its folder that are left out.  @throws InputError if a sequence has none.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_recording(
     const std::filesystem::path& path);
 /// SHA-256 of a video file; of an image sequence, of the list of its pictures' own in the order
