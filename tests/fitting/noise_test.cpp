@@ -40,7 +40,7 @@ NoiseGroup alone(const Eigen::VectorXd& residual) {
 
 double expected_inflation(const NoiseEvidence& evidence) {
   double sum = 0.0;
-  for (const NoiseKind& kind : evidence.kinds) sum += kind.belief * kind.inflation();
+  for (const NoiseKind& kind : evidence.kinds) sum += kind.posterior * kind.inflation();
   return sum;
 }
 
@@ -64,7 +64,7 @@ TEST(Noise, OfAWhiteRecordIsTakenForWhite) {
   for (int record = 0; record < 40; ++record) {
     const NoiseEvidence evidence = noise_evidence({alone(autoregressive(0.0, 200, generator))});
     for (const NoiseKind& kind : evidence.kinds)
-      taken_for_white += kind.share == 0.0 && kind.belief > 0.5;
+      taken_for_white += kind.share == 0.0 && kind.posterior > 0.5;
   }
   EXPECT_GE(taken_for_white, 36);
 }

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "choose/softness.hpp"
 #include "judge/draft.hpp"
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -21,18 +21,10 @@
 namespace trochoid::fitting {
 namespace {
 
-// The bundled copies are thinned to 30 Hz, too few for bodies that turn four times a second.
-std::string reference_folder() {
-  return std::string(TROCHOID_SHARED_DIR) + "/reference/";
+// An independent integrator's motion: the first seconds at the full rate.
+std::string motion_file(const std::string& name) {
+  return std::string(TROCHOID_SOURCE_DIR) + "/tests/fitting/motions/" + name + ".csv";
 }
-
-class RimFit : public testing::Test {
- protected:
-  void SetUp() override {
-    if (!std::filesystem::exists(reference_folder() + "s06_roll_disc.csv"))
-      GTEST_SKIP() << "no reference trajectories at full rate";
-  }
-};
 
 struct Case {
   data::Scene scene;
@@ -60,10 +52,10 @@ std::map<std::string, std::vector<double>> columns_of(const std::string& path) {
 // `until_s` keeps the test short; the start and the losses the scene knows are not the truth.
 Case noisy(const std::string& name, double until_s, double sigma_m, std::size_t step = 1,
            unsigned seed = 7) {
-  const std::string folder = reference_folder();
-  Case made{data::read_reference_case(folder + name + ".json").scene, {}};
+  const std::string given = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ".json";
+  Case made{data::read_reference_case(given).scene, {}};
   made.scene.start = {};
-  const auto columns = columns_of(folder + name + ".csv");
+  const auto columns = columns_of(motion_file(name));
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal(0.0, sigma_m);
   for (std::size_t i = 0; i < columns.at("t").size() && columns.at("t")[i] <= until_s; i += step) {
@@ -94,7 +86,7 @@ std::map<std::string, double> losses_of_the_sliding_disc() {
 // 4 sigma of a few numbers: once in some thousand seeds.
 constexpr double kFar = 4.0;
 
-TEST_F(RimFit, FindsARollingDiscFromItsPathAlone) {
+TEST(RimFit, FindsARollingDiscFromItsPathAlone) {
   const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
@@ -107,7 +99,7 @@ TEST_F(RimFit, FindsARollingDiscFromItsPathAlone) {
 // or half a turn off, any tilt), and stretches are missing.
 Case with_faults(const std::string& name, double until_s, std::size_t step) {
   Case made = noisy(name, until_s, 2e-4, step);
-  const auto columns = columns_of(reference_folder() + name + ".csv");
+  const auto columns = columns_of(motion_file(name));
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
@@ -134,7 +126,7 @@ Case with_faults(const std::string& name, double until_s, std::size_t step) {
   return made;
 }
 
-TEST_F(RimFit, IsNotMisledByEveryFifthSample) {
+TEST(RimFit, IsNotMisledByEveryFifthSample) {
   const Case disc = with_faults("s06_roll_disc", 2.0, 4);
   const data::Fit rolling = fitting::fit(std::span(&disc.track, 1), disc.scene);
   ASSERT_TRUE(rolling.converged) << rolling.reason;
@@ -151,7 +143,7 @@ TEST_F(RimFit, IsNotMisledByEveryFifthSample) {
 
 // From positions alone: single ones 5 to 50 mm off, or eight in a row, as when the tracker follows
 // something else for a while. Nothing else in the track says which they are.
-TEST_F(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
+TEST(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
   for (const int run : {1, 8}) {
     Case c = noisy("s06_roll_disc", 2.0, 2e-4);
     std::mt19937_64 generator(5);
@@ -173,7 +165,7 @@ TEST_F(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
   }
 }
 
-TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
+TEST(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
   Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-5, 1e-5, 4e-6);  // off by factors of four
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -184,7 +176,7 @@ TEST_F(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
 }
 
 // How far a value follows what the model takes for given, a fit with another given tells.
-TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
+TEST(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   constexpr double kDoubt = 0.005;
   const Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   const double mass_kg = *c.scene.body->mass_kg;
@@ -208,7 +200,7 @@ TEST_F(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
 
 // Gravity would tell the scale, which is kept at its prior: an error of that bends all the rest,
 // and the error bars must hold it.
-TEST_F(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
+TEST(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
   constexpr double kDoubt = 0.01;
   const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
   data::Scene doubtful = c.scene;
@@ -227,7 +219,7 @@ TEST_F(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
 
 // What is not known of the scale and of gravity are two things: their variances add up, and the
 // scale, which is kept, is known as well as before.
-TEST_F(RimFit, TheErrorsOfTwoPriorsAddUp) {
+TEST(RimFit, TheErrorsOfTwoPriorsAddUp) {
   const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
   const double radius_m = c.scene.body->radius_m;
   const auto fitted = [&](bool scale, bool gravity) {
@@ -248,7 +240,7 @@ TEST_F(RimFit, TheErrorsOfTwoPriorsAddUp) {
   }
 }
 
-TEST_F(RimFit, NothingButAKeptScaleCanBeFree) {
+TEST(RimFit, NothingButAKeptScaleCanBeFree) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
   for (const data::FitParameter& p : free.parameters)
@@ -260,7 +252,7 @@ TEST_F(RimFit, NothingButAKeptScaleCanBeFree) {
 }
 
 // A disc cannot have more of one moment than twice the other, which no prior knows.
-TEST_F(RimFit, WhatNoBodyCanBeIsNoDoubt) {
+TEST(RimFit, WhatNoBodyCanBeIsNoDoubt) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   const double mass_kg = *c.scene.body->mass_kg, R = c.scene.body->radius_m;
   const double most = 0.5 * mass_kg * R * R;  // of a disc without thickness
@@ -272,7 +264,7 @@ TEST_F(RimFit, WhatNoBodyCanBeIsNoDoubt) {
 }
 
 // Whoever predicts from the fit alone has to know of it.
-TEST_F(RimFit, KeepsWhatIsFixedOfTheStart) {
+TEST(RimFit, KeepsWhatIsFixedOfTheStart) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
   c.scene.fit.fixed["w3_rad_s"] = free.find("w3_rad_s")->value;
@@ -284,7 +276,7 @@ TEST_F(RimFit, KeepsWhatIsFixedOfTheStart) {
   EXPECT_EQ(fit.find("psi_rad"), nullptr) << "unseen, not fixed";
 }
 
-TEST_F(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
+TEST(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
   using testing::Contains;
   using testing::HasSubstr;
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
@@ -300,7 +292,50 @@ TEST_F(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
   EXPECT_THAT(fit.warnings, testing::Not(Contains(HasSubstr("theta_rad"))));  // a hint for others
 }
 
-TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
+std::string all_warnings(const data::Fit& fit) {
+  std::string all;
+  for (const std::string& warning : fit.warnings) all += warning + "\n";
+  return all;
+}
+
+TEST(RimFit, APriorOnATermIsOneOnEachOfItsCoefficients) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  c.scene.model.air_linear_N_m_s = Eigen::Vector3d(2e-6, 2e-6, 2e-6);
+  c.scene.fit.prior["air_linear_N_m_s"] = {2e-6, 1e-8};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  for (const char* name : {"air_linear_N_m_s[1]", "air_linear_N_m_s[3]"}) {
+    ASSERT_NE(fit.find(name), nullptr);
+    EXPECT_LT(fit.find(name)->sigma, 1.1e-8) << name;
+  }
+  EXPECT_THAT(all_warnings(fit), testing::Not(testing::HasSubstr("counts for nothing")));
+}
+
+TEST(RimFit, WhatStandsAtItsBoundIsSaidTo) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  c.scene.fit.bounds["theta_rad"] = {1.26, 1.5};  // it is 1.222
+  EXPECT_THAT(all_warnings(fitting::fit(std::span(&c.track, 1), c.scene)),
+              testing::HasSubstr("theta_rad stands at the lower bound, 1.26"));
+}
+
+TEST(RimFit, WhatIsHeldIsToldWhereNothingFits) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  c.scene.fit.bounds["theta_rad"] = {0.1, 0.3};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_FALSE(fit.converged);
+  EXPECT_THAT(all_warnings(fit), testing::HasSubstr("theta_rad"));
+}
+
+TEST(RimFit, APriorOnWhatCannotBeIsRefused) {
+  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  c.scene.model.rolling_friction_m = 1e-5;
+  c.scene.fit.prior["rolling_friction_m"] = {-1e-4, 1e-6};
+  EXPECT_THROW((void)fitting::fit(std::span(&c.track, 1), c.scene), InputError);
+  c.scene.fit.prior["rolling_friction_m"] = {1e-4, 1e-6};
+  c.scene.fit.bounds["rolling_friction_m"] = {0.0, 5e-5};
+  EXPECT_THROW((void)fitting::fit(std::span(&c.track, 1), c.scene), InputError);
+}
+
+TEST(RimFit, FindsTheFrictionOfASlidingDisc) {
   Case c = noisy("s08_slide_disc", 0.6, 1e-4);
   c.scene.model.name = "sliding";
   c.scene.model.friction.reset();  // 0.3 in truth; no first value is needed
@@ -313,7 +348,7 @@ TEST_F(RimFit, FindsTheFrictionOfASlidingDisc) {
 
 // Two turns of the node line in a dozen samples: starts have to be found on windows shorter than
 // what the quick search looks at.
-TEST_F(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
+TEST(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
   Case c = noisy("s09_ring_retrograde_drag", 9.0, 1e-4, 2);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(7.5e-6, 7.5e-6, 4.5e-5);
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -323,10 +358,10 @@ TEST_F(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
 }
 
 // No plain model predicts such a track to its end, and none with a single loss.
-TEST_F(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
+TEST(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
   constexpr double kAngle_rad = 0.005;
   Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
-  const auto columns = columns_of(reference_folder() + "s08_slide_disc.csv");
+  const auto columns = columns_of(motion_file("s08_slide_disc"));
   std::mt19937_64 generator(8);
   std::normal_distribution<double> normal(0.0, kAngle_rad);
   for (std::size_t i = 0; i < c.track.samples.size(); ++i) {
@@ -349,7 +384,7 @@ TEST_F(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
 }
 
 // Over 1e-3 m/s in truth, given as a third of that.
-TEST_F(RimFit, FindsHowFrictionSetsIn) {
+TEST(RimFit, FindsHowFrictionSetsIn) {
   Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
   c.scene.model.slip_regularisation_m_s = 3e-4;
   c.scene.fit.free = {"slip_regularisation_m_s"};
@@ -361,7 +396,7 @@ TEST_F(RimFit, FindsHowFrictionSetsIn) {
 }
 
 // With friction that sets in and stops, neighbouring valleys leave several times the noise.
-TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
+TEST(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
   Case c = noisy("s08_slide_disc", 2.0, 1e-4, 4);
   c.scene.model.friction = 0.2;  // 0.3 in truth; the losses are three times theirs
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(3e-6, 3e-6, 6e-7);
@@ -375,7 +410,7 @@ TEST_F(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
 }
 
 // The exact law: spells of sticking come and go, and derivatives hold across them.
-TEST_F(RimFit, FindsStickAndSlipOfTheExactLaw) {
+TEST(RimFit, FindsStickAndSlipOfTheExactLaw) {
   Case c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
   c.scene.model.friction = 0.2;  // 0.3 in truth
   c.scene.fit.fixed = losses_of_the_sliding_disc();
@@ -409,14 +444,14 @@ Rung softly_from_near(Case c) {
 }
 
 // A softer law follows it as far as it may be sharpened, and its speed then looks well determined.
-TEST_F(RimFit, FrictionAsSharpAsAFitLetsItBeIsCoulombs) {
+TEST(RimFit, FrictionAsSharpAsAFitLetsItBeIsCoulombs) {
   const Rung rung = softly_from_near(noisy("s10_stick_slip_event", 2.0, 1e-4));
   EXPECT_FALSE(rung.scene.model.slip_regularisation_m_s);
   EXPECT_LT(pull(rung.fit, "friction", 0.3), kFar);
 }
 
 // At 60 Hz the sharpest law that a fit takes for Coulomb's leaves a chi-square higher by 42.
-TEST_F(RimFit, CoulombsLawIsReachedFromTheGentleOneThatStandsInForIt) {
+TEST(RimFit, CoulombsLawIsReachedFromTheGentleOneThatStandsInForIt) {
   const Rung rung = softly_from_near(noisy("s10_stick_slip_event", 2.0, 1e-4, 2, 1));
   EXPECT_FALSE(rung.scene.model.slip_regularisation_m_s);
   EXPECT_LT(rung.fit.chi2 / rung.fit.dof, 1.2);
@@ -593,7 +628,7 @@ TEST_F(SlidingRimFit, ThatErrorBarIsLookedForOnce) {
   EXPECT_EQ(lines, once);
 }
 
-TEST_F(RimFit, WarnsOfATrackShorterThanANutation) {
+TEST(RimFit, WarnsOfATrackShorterThanANutation) {
   const Case brief = noisy("s06_roll_disc", 0.12, 2e-4), whole = noisy("s06_roll_disc", 1.0, 2e-4);
   const auto warned = testing::Contains(testing::HasSubstr("turns of the node line"));
   EXPECT_THAT(fitting::fit(std::span(&brief.track, 1), brief.scene).warnings, warned);
@@ -601,7 +636,7 @@ TEST_F(RimFit, WarnsOfATrackShorterThanANutation) {
 }
 
 // (theta, phi) and (pi - theta, phi + pi) are one attitude of a plain disc.
-TEST_F(RimFit, NamesAnAttitudeByItsLesserTilt) {
+TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
   const Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   FitOptions options;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -617,7 +652,7 @@ TEST_F(RimFit, NamesAnAttitudeByItsLesserTilt) {
     EXPECT_LT(pull(mirrored, name, fit.find(name)->value), 0.1) << name;  // the same minimum
 }
 
-TEST_F(RimFit, BoundsALossThatIsNotThere) {
+TEST(RimFit, BoundsALossThatIsNotThere) {
   Case c = noisy("s06_roll_disc", 1.5, 2e-4);
   c.scene.model.pivoting_friction_m = 1e-4;
   c.scene.model.couple_regularisation_rad_s = 0.01;
@@ -629,9 +664,9 @@ TEST_F(RimFit, BoundsALossThatIsNotThere) {
   EXPECT_LT(loss->sigma, 1e-4);
 }
 
-TEST_F(RimFit, LeavesMirroredFramesAside) {
+TEST(RimFit, LeavesMirroredFramesAside) {
   Case c = noisy("s06_roll_disc", 1.5, 1e-4);
-  const auto columns = columns_of(reference_folder() + "s06_roll_disc.csv");
+  const auto columns = columns_of(motion_file("s06_roll_disc"));
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal(0.0, 0.01);
   for (std::size_t i = 0; i < c.track.samples.size(); ++i) {

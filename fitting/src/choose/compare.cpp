@@ -76,8 +76,9 @@ void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const 
                });
 }
 
-// What a slip that friction ends within a few samples was is not seen, and under friction that sets
-// in softly it is looked into only now: on the way it makes many more sets of losses alike.
+// A slip that friction ends within a few samples is not seen, so the chosen rung may as well roll
+// at first. Under friction that sets in softly this is tried only here, at the end: earlier it
+// would make many more sets of losses look alike.
 void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& chosen) {
   if (chosen.rolls_at_first || softness_is_open(chosen)) return;
   const auto own =

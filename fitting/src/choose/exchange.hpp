@@ -3,10 +3,10 @@
 
 namespace trochoid::fitting {
 
-/// Of the known rungs the simplest that suffices, and from it on by what may do better, as long as
-/// that changes which it is; then from others that are as good. Terms are added one at a time, by
-/// what is gained at once, and those of a last resort all together: what never stood beside the
-/// others may do as well as one of them.
+/// Chooses the simplest of the known rungs that suffices and fits its neighbours (one term less,
+/// more or another one), as long as that changes the choice; then does the same from rungs that are
+/// as good. Needed because terms were added one at a time by what each gained, and those of the
+/// last resort together: two that were never tried side by side may be the better pair.
 /// @returns the rung that is chosen in the end; null where none could be fitted.
 [[nodiscard]] const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs);
 

@@ -15,13 +15,13 @@ namespace {
 // Whether a rung's losses that a smaller one lacks may be zero, by error bars so many times as
 // wide.
 bool may_do_without(const Rung& rung, const data::Fit& fit, const Rung& smaller, double times) {
-  constexpr double kSurely = 4.0;  // sigmas, which curvature may misjudge
+  constexpr double kSurelyThere_sigmas = 4.0;  // which curvature may misjudge
   std::set<std::string> lost = parameters_of(rung.scene);
   for (const std::string& name : parameters_of(smaller.scene)) lost.erase(name);
   lost.erase(kSlipScale);  // the smaller one's is fitted anew
   return std::all_of(lost.begin(), lost.end(), [&](const std::string& name) {
     const data::FitParameter* loss = fit.find(name);
-    return loss != nullptr && std::abs(loss->value) < kSurely * times * loss->sigma;
+    return loss != nullptr && std::abs(loss->value) < kSurelyThere_sigmas * times * loss->sigma;
   });
 }
 
@@ -73,14 +73,15 @@ void step_down(const Contest& contest, const Rung& from, Rungs& rungs) {
 }
 
 void let_go_of_friction(const Contest& contest, Rungs& rungs) {
-  constexpr double kSurely = 4.0;       // sigmas
+  constexpr double kSurelyThere_sigmas = 4.0;
   constexpr double kNoFriction = 1e-3;  // a hundredth of what the slipperiest floors have
   const std::optional<int> smooth = smooth_term(contest.ladder);
   const Rung* best = simplest_sufficient(contest.ladder, rungs);
   if (!smooth || best == nullptr || !best->fit.converged || best->fit.model != "sliding") return;
   const data::Fit full = with_full_bars(*best);
   const data::FitParameter* friction = full.find("friction");
-  if (friction == nullptr || friction->value > kSurely * friction->sigma + kNoFriction) return;
+  if (friction == nullptr || friction->value > kSurelyThere_sigmas * friction->sigma + kNoFriction)
+    return;
   Terms terms = best->terms;
   std::erase_if(terms, [&](int index) {
     return contest.ladder.terms[static_cast<std::size_t>(index)].last_resort;

@@ -3,9 +3,9 @@
 
 namespace trochoid::fitting {
 
-/// Everything but the last resort was added before it was known what that explains: terms the data
-/// do not need any more are left out again, one at a time, as long as that costs no strong
-/// evidence; those whose error bars say that it would are not tried.
+/// Leaves out terms that the data no longer need, one at a time, as long as that costs no strong
+/// evidence: most were added before those of the last resort, which may explain what they did.
+/// Terms whose error bars say that it would cost more are not tried.
 /// @param from  one of the rungs, to which the smaller ones are added.
 void step_down(const Contest& contest, const Rung& from, Rungs& rungs);
 

@@ -96,7 +96,7 @@ using Known = std::map<std::set<int>, Least>;  // by what is zero
 Least find_least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held,
                  Known& known);
 
-// When all parameters but these have done what they can, which are zero or held.
+// The least chi-square over all parameters that are neither zero nor held.
 const Least& least(const Tangent& at, const std::set<int>& zero, const std::set<int>& held,
                    Known& known) {
   const auto found = known.find(zero);

@@ -96,9 +96,9 @@ Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool bounded, const 
   return spread;
 }
 
-// Beside a loss that could be anything, bars would tell of what is assumed about losses rather than
-// of the track: rivals that are too large widen them so far, and the rest is told in words. Of a
-// loss that acts on nearly every body it is no assumption that it is there.
+// Rivals with a loss of their own may widen an error bar up to a bound; beyond it the bar would
+// speak of the assumed losses rather than of the track, and a note tells the rest. Losses that act
+// on nearly every body widen without bound: that they are there is no assumption.
 void keep_within_bounds(const std::vector<data::FitParameter>& parameters,
                         Eigen::MatrixXd& spread) {
   constexpr double kWidest = 2.5;

@@ -75,8 +75,8 @@ void take(Draft draft, Rung& rung);
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const Terms& usual = {});
 
-/// Whether a rung's verdict is not that its path is only followed or not even that, and what is
-/// left looks like noise or hardly exceeds the track's own: then it hangs together for the tracker.
+/// Whether a rung's verdict is good, good_correlated or weak, and its residuals are white or within
+/// 1.3 of the stated noise (a tracker's errors may hang together).
 [[nodiscard]] bool explains(const Rung& rung);
 
 /// How a rung is looked for: searched for where the solution below does not lead to it, or not.

@@ -32,14 +32,14 @@ Terms as_likely(const Rungs& rungs, const Rung& chosen, std::size_t most) {
 // @returns a rung that explains about as long a first part as any, or all of the track; of losses
 // that do so alike it has several.
 Rung longest_rolling(const Contest& contest, Rung known) {
-  constexpr double kSurely = 0.9;  // of the first part: before its end a slip may have begun
+  constexpr double kSurelyRolling = 0.9;  // of the first part: before its end a slip may have begun
   constexpr double kLonger = 1.05, kAsLong = 0.85;  // of its duration
   constexpr int kMostParts = 4;
   const double from_s = known.first_part.from_s;  // later than the track's where it is cut
   for (int part = 0; part < kMostParts; ++part) {
     const double before_s = known.first_part.until_s - from_s;
     Contest early = contest;
-    early.options.to = fmt::format("{:.17g}", from_s + kSurely * before_s);
+    early.options.to = fmt::format("{:.17g}", from_s + kSurelyRolling * before_s);
     Rungs rungs;
     Rung& first = rungs.emplace_back(rung_with(contest.ladder, known.terms));
     fit_from_values(contest.tracks, known.first_part.values, options_for(first, early.options),

@@ -64,13 +64,14 @@ std::optional<Draft> fit_sharply(std::span<const data::Track> tracks, const FitO
 // Whether so many standard deviations of eps are beyond what a parabola may hide of Coulomb's law.
 // As sharp as a fit lets it be it shows nothing but that limit.
 bool shows_without_asking(const Draft& gentle) {
-  constexpr double kSurely = 10.0;       // squared
+  constexpr double kSurelySoft_squared = 10.0;  // squared
   constexpr double kByCurvature = 10.0;  // full error bars are hardly ever so many times as wide
   constexpr double kAtLimit = 1.05;
   const data::FitParameter* eps = gentle.fit.find(kSlipScale);
   const auto shows = [](const data::FitParameter* found, double times) {
     return found != nullptr && found->value > kAtLimit * kSharpest_m_s &&
-           found->value * found->value > kSurely * times * times * found->sigma * found->sigma;
+           found->value * found->value >
+               kSurelySoft_squared * times * times * found->sigma * found->sigma;
   };
   return shows(eps, kByCurvature) ||
          (shows(eps, 1.0) && shows(gentle.full().find(kSlipScale), 1.0));

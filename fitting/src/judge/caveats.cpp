@@ -12,7 +12,7 @@
 
 #include "judge/adequacy.hpp"
 #include "judge/body_doubt.hpp"
-#include "judge/leaning.hpp"
+#include "judge/influence.hpp"
 #include "judge/profile.hpp"
 #include "problem/linearise.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -44,8 +44,8 @@ void heed_single_samples(const Problem& problem, const Solution& solution, Uncer
   constexpr double kWorthWords = 1.3;
   if (!explains(problem, solution)) return;
   const Eigen::VectorXd before = error.covariance.diagonal().cwiseSqrt();
-  for (const Leaning& leaning : leanings(problem, solution, before)) {
-    error.covariance += leaning.shift * leaning.shift.transpose();
+  for (const InfluentialSample& sample : influential_samples(problem, solution, before)) {
+    error.covariance += sample.shift * sample.shift.transpose();
     std::vector<std::string> names;
     for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
       const double sigma = std::sqrt(error.covariance(i, i));
@@ -56,7 +56,7 @@ void heed_single_samples(const Problem& problem, const Solution& solution, Uncer
       fit.warnings.push_back(
           fmt::format("{} hang on the sample at t = {:.4g} s alone: their error bars hold "
                       "what comes out without it",
-                      fmt::join(names, ", "), leaning.t_s));
+                      fmt::join(names, ", "), sample.t_s));
   }
 }
 

@@ -127,7 +127,7 @@ void warn_thick_air(data::Fit& fit) {
 
 void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit) {
-  const Criteria score = criteria(problem, u, error.surprise);
+  const Criteria score = criteria(problem, u, error.minus2_log_likelihood);
   fit.chi2 = score.chi2;
   fit.dof = score.rows - static_cast<int>(problem.free.size());
   fit.aicc = score.aicc;

@@ -39,10 +39,10 @@ Problem without_outliers(Problem problem) {
 // The polish weighs every sample by its residual, the search does not. Writes the values found into
 // problem.base. Half a turn off, a direction lies across the pole, where no step leads back: where
 // the path has to be looked for, angles are compared each by itself.
-Found search_without_outliers(Problem& problem, const Quest& quest) {
+Found search_without_outliers(Problem& problem, const SearchRequest& asked) {
   Problem search = without_outliers(problem);
-  for (ArcData& arc : search.arcs) arc.angles_apart = quest.options->strategy != "single";
-  Found found = find(search, quest);
+  for (ArcData& arc : search.arcs) arc.angles_apart = asked.options->strategy != "single";
+  Found found = find(search, asked);
   problem.base = search.base;
   return found;
 }
@@ -83,7 +83,7 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
   const auto go_on = [&](double tolerance) {
     const int steps = affordable_steps(problem, 1.0, kMostSteps);
     Solution next =
-        seek(problem, solution.u, {.iterations = steps, .function_tolerance = tolerance});
+        minimise(problem, solution.u, {.iterations = steps, .function_tolerance = tolerance});
     if (!next.usable) return false;
     next.converged = next.converged || solution.converged;
     solution = std::move(next);
@@ -108,9 +108,9 @@ Solution seek_while_it_gains(const Problem& problem, const Eigen::VectorXd& u, i
   constexpr double kWorth = 0.1;  // of chi-square, a third of an error bar
   constexpr int kMostRounds = 5;
   const SolveOptions options{.iterations = steps, .function_tolerance = 1e-7};
-  Solution found = seek(problem, u, options);
+  Solution found = minimise(problem, u, options);
   for (int round = 1; round < kMostRounds && found.usable && found.iterations == steps; ++round) {
-    Solution farther = seek(problem, found.u, options);
+    Solution farther = minimise(problem, found.u, options);
     if (!farther.usable || farther.chi2 > found.chi2 - kWorth) break;
     farther.converged = farther.converged || found.converged;
     found = std::move(farther);
@@ -162,7 +162,7 @@ Solution recall_vanished(Problem& problem, Solution solution) {
 // From where the search ended to the minimum; the values are then in problem.base as well.
 Solution polish(Problem& problem, Solution solution, const FitOptions& options, data::Fit& fit) {
   if (hold_vanished(problem, solution.u))
-    solution = seek(without_outliers(problem), problem.start());
+    solution = minimise(without_outliers(problem), problem.start());
   solution = settle_weights(problem, std::move(solution), options.tolerance);
   solution = recall_vanished(problem, std::move(solution));
   fit.integration_error_sigma = silence_integration(problem, solution, options.tolerance);

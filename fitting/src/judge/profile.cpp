@@ -39,7 +39,7 @@ class OneParameter {
     for (std::size_t arc = 0; arc < held_.base.size(); ++arc)
       if (parameter.arc < 0 || parameter.arc == static_cast<int>(arc))
         held_.base[arc][parameter.index] = parameter.transform.value(u);
-    const Solution best = seek(held_, others_, options);
+    const Solution best = minimise(held_, others_, options);
     if (!best.usable) return std::numeric_limits<double>::infinity();
     others_ = best.u;
     return best.chi2 + outside(u) - solution_.chi2;

@@ -161,7 +161,7 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
   const Eigen::MatrixXd unit_steps = seen.axes * seen.inverse.asDiagonal();
   result.whiteness = {};
   result.drift = {};
-  result.surprise = 0.0;
+  result.minus2_log_likelihood = 0.0;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
     const auto rows = static_cast<double>(
@@ -169,9 +169,9 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
     if (rows == 0.0) continue;
     found.channels.push_back(channel_noise(problem, all, channel, scaled, unit_steps));
     const Whiteness& one = found.channels.back().whiteness;
-    result.surprise += found.channels.back().surprise +
-                       2.0 * rows * std::log(problem.noise_scale[c]) +
-                       cost_of_standing_out(problem, channel);
+    result.minus2_log_likelihood += found.channels.back().minus2_log_likelihood +
+                                    2.0 * rows * std::log(problem.noise_scale[c]) +
+                                    cost_of_standing_out(problem, channel);
     if (one.inflation > 1.0)
       for (int axis = 0; axis < (c == 0 ? 2 : 1); ++axis)
         found.offsets.push_back(common_offset(problem, all, channel, axis));
@@ -294,7 +294,7 @@ double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u)
   return worst;
 }
 
-Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise) {
+Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double minus2_log_likelihood) {
   Problem plain = problem;
   plain.noise_scale.fill(1.0);
   Criteria result;
@@ -309,9 +309,9 @@ Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surpr
   }
   const double n = result.rows;
   const double k = static_cast<double>(problem.free.size()) + 1.0;
-  result.bic = surprise + k * std::log(n);
+  result.bic = minus2_log_likelihood + k * std::log(n);
   // Akaike's correction has no meaning for fewer rows than that.
-  result.aicc = surprise + 2.0 * k + 2.0 * k * (k + 1.0) / std::max(1.0, n - k - 1.0);
+  result.aicc = minus2_log_likelihood + 2.0 * k + 2.0 * k * (k + 1.0) / std::max(1.0, n - k - 1.0);
   return result;
 }
 

@@ -24,7 +24,7 @@ struct Uncertainty {
   double widened = 1.0;
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
   /// their correlation allowed for, without its constant.
-  double surprise = 0.0;
+  double minus2_log_likelihood = 0.0;
 };
 
 /// The size at which a parameter of a free index counts as "known to 100 %" [its unit].
@@ -52,8 +52,9 @@ struct Criteria {
   int rows = 0;
   double aicc = 0.0, bic = 0.0;
 };
-/// AICc and BIC from Uncertainty::surprise: what residuals that hang together may owe to the
-/// tracker does not count as evidence between models.
-[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double surprise);
+/// AICc and BIC from Uncertainty::minus2_log_likelihood: what residuals that hang together may owe
+/// to the tracker does not count as evidence between models.
+[[nodiscard]] Criteria criteria(const Problem& problem, const Eigen::VectorXd& u,
+                                double minus2_log_likelihood);
 
 }  // namespace trochoid::fitting

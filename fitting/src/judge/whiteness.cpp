@@ -214,7 +214,7 @@ double step_s(const Problem& problem) {
 
 ChannelNoise channel_noise(const Problem& problem, const Linearised& all, Channel channel,
                            const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& unit_steps) {
-  constexpr double kCorrelated = 0.5;  // belief in white noise
+  constexpr double kCorrelated = 0.5;  // posterior of white noise
   std::vector<NoiseGroup> groups;
   Correlations plain;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
@@ -229,16 +229,16 @@ ChannelNoise channel_noise(const Problem& problem, const Linearised& all, Channe
   ChannelNoise noise;
   noise.channel = channel;
   noise.kinds = evidence.kinds;
-  noise.surprise = evidence.surprise;
+  noise.minus2_log_likelihood = evidence.minus2_log_likelihood;
   noise.whiteness.p_value = plain.p_value();
   double white = 0.0, inflation = 0.0;
   for (const NoiseKind& kind : noise.kinds) {
-    white += kind.share == 0.0 ? kind.belief : 0.0;
-    inflation += kind.belief * kind.inflation();
+    white += kind.share == 0.0 ? kind.posterior : 0.0;
+    inflation += kind.posterior * kind.inflation();
   }
-  const NoiseKind likeliest =
-      *std::max_element(noise.kinds.begin(), noise.kinds.end(),
-                        [](const NoiseKind& a, const NoiseKind& b) { return a.belief < b.belief; });
+  const NoiseKind likeliest = *std::max_element(
+      noise.kinds.begin(), noise.kinds.end(),
+      [](const NoiseKind& a, const NoiseKind& b) { return a.posterior < b.posterior; });
   noise.excess = excess_of(likeliest, groups);
   noise.drift = drift_of(likeliest, groups);
   if (white > kCorrelated && noise.excess == 1.0) {
@@ -259,7 +259,7 @@ Eigen::MatrixXd seen_through(const Problem& problem, const Linearised& all,
       const Eigen::MatrixXd part = scaled(rows, columns);
       for (const NoiseKind& kind : noise.kinds)
         sum(columns, columns) +=
-            noise.excess * kind.belief * kind.variance * seen_through(kind, part);
+            noise.excess * kind.posterior * kind.variance * seen_through(kind, part);
     }
   }
   return sum;

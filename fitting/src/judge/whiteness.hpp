@@ -27,14 +27,14 @@ struct Drift {
   double parameters = 0.0;  ///< 0: nothing to tell from
 };
 
-/// The same in full.
+/// What the residuals of one channel say of its noise.
 struct ChannelNoise {
   Channel channel = Channel::position;
   Whiteness whiteness;
   std::vector<NoiseKind> kinds;
   /// Factor of the variance for what hangs together otherwise, say swings.
   double excess = 1.0;
-  double surprise = 0.0;  ///< as in NoiseEvidence
+  double minus2_log_likelihood = 0.0;  ///< as in NoiseEvidence
   Drift drift;
 };
 /// The kinds of noise are those of all arcs together: one tracker made them.

@@ -59,9 +59,9 @@ double gain_of(const Path& path, const Motion& before, double tau, int at, doubl
   // While a chain learns how fast it goes nothing is expected of it, else none would ever begin.
   constexpr int kLearning = 3;
   constexpr double kLittle = 1.0;
-  double surprise = std::log(variance / noise);
-  if (before.length < kLearning) surprise = std::min(surprise, kReward - kLittle);
-  return kReward - 0.5 * off.squaredNorm() / variance - surprise;
+  double penalty = std::log(variance / noise);
+  if (before.length < kLearning) penalty = std::min(penalty, kReward - kLittle);
+  return kReward - 0.5 * off.squaredNorm() / variance - penalty;
 }
 
 Motion advanced(const Path& path, const Motion& before, double tau, int at, double jerk2_s) {

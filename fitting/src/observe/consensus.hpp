@@ -11,7 +11,7 @@ namespace trochoid::fitting {
 /// Each sample of the chain is predicted from those before it by a Kalman filter that knows
 /// position, velocity and acceleration, with white jerk; of all chains the one that gains most is
 /// taken (dynamic programming over the sample before). A sample gains what is left of a fixed
-/// reward after its surprise. How strong the jerk is, the gain of the whole chain tells.
+/// reward after its penalty. How strong the jerk is, the gain of the whole chain tells.
 /// @param t_s      increasing.
 /// @param xy_m     n x 2.
 /// @param sigma_m  stated noise of each coordinate per sample, > 0; its scale may be too small.

@@ -116,17 +116,17 @@ void add(const std::vector<Eigen::MatrixXd>& group, const NoiseKind& kind, Likel
 }
 
 // Twice the negative logarithm of the likelihood with the best variance.
-double surprise(const Likelihood& sum, double& variance) {
+double minus2_log_likelihood(const Likelihood& sum, double& variance) {
   variance = std::max(sum.squares / sum.left, 1e-300);
   return sum.log_determinant + sum.left * std::log(variance);
 }
 
 // Of the residuals as they are, for all kinds; these are given the best variance.
-std::vector<double> plain_surprises(const std::vector<NoiseGroup>& groups,
-                                    std::vector<NoiseKind>& kinds) {
+std::vector<double> plain_minus2_logs(const std::vector<NoiseGroup>& groups,
+                                      std::vector<NoiseKind>& kinds) {
   constexpr int kTogether = 8;
   using Lanes = Follower<kTogether>::Array;
-  std::vector<double> surprises(kinds.size());
+  std::vector<double> minus2_logs(kinds.size());
   for (std::size_t first = 0; first < kinds.size(); first += kTogether) {
     Lanes share = Lanes::Zero(), rho = Lanes::Zero();
     const int count = static_cast<int>(std::min<std::size_t>(kTogether, kinds.size() - first));
@@ -151,17 +151,18 @@ std::vector<double> plain_surprises(const std::vector<NoiseGroup>& groups,
       }
     for (int k = 0; k < count; ++k) {
       const std::size_t i = first + static_cast<std::size_t>(k);
-      surprises[i] = surprise({log_determinant[k], squares[k], left}, kinds[i].variance);
+      minus2_logs[i] =
+          minus2_log_likelihood({log_determinant[k], squares[k], left}, kinds[i].variance);
     }
   }
-  return surprises;
+  return minus2_logs;
 }
 
-double restricted_surprise(const std::vector<std::vector<Eigen::MatrixXd>>& groups,
-                           NoiseKind& kind) {
+double restricted_minus2_log_likelihood(const std::vector<std::vector<Eigen::MatrixXd>>& groups,
+                                        NoiseKind& kind) {
   Likelihood sum;
   for (const auto& group : groups) add(group, kind, sum);
-  return surprise(sum, kind.variance);
+  return minus2_log_likelihood(sum, kind.variance);
 }
 
 // White noise, and a grid over the shares and the correlation times, these evenly in their
@@ -175,7 +176,7 @@ std::vector<NoiseKind> candidates(Eigen::Index longest) {
     for (const double share : kShares) kinds.push_back({share, std::exp(-1.0 / time)});
   for (NoiseKind& kind : kinds) {
     const bool white = kind.share == 0.0;
-    kind.belief =
+    kind.posterior =
         white ? kWhiteBefore : (1.0 - kWhiteBefore) / static_cast<double>(kinds.size() - 1);
   }
   return kinds;
@@ -199,37 +200,39 @@ NoiseEvidence noise_evidence(const std::vector<NoiseGroup>& groups) {
   if (longest < kFewest || rows < 2 * taken)
     return {{NoiseKind{}}, static_cast<double>(rows) * std::log(power / static_cast<double>(rows))};
   std::vector<NoiseKind> kinds = candidates(longest);
-  std::vector<double> surprises = plain_surprises(groups, kinds);
-  const double plain = *std::min_element(surprises.begin(), surprises.end());
+  std::vector<double> minus2_logs = plain_minus2_logs(groups, kinds);
+  const double plain = *std::min_element(minus2_logs.begin(), minus2_logs.end());
   std::vector<std::vector<Eigen::MatrixXd>> rows_of_all;
   for (const NoiseGroup& group : groups) rows_of_all.push_back(rows_of(group));
   constexpr double kNegligible = 1e-3;
   // The parameters' part of the likelihood is worth, for each of them, the logarithm of how much
   // more noise there is at its frequencies, at most the inflation, and a little for what they would
   // rather follow of such noise: where the plain one and what is known beforehand leave next to no
-  // belief beyond that, they say enough.
+  // posterior beyond that, they say enough.
   constexpr double kRather = 2.0;
-  const auto doubt = [&](std::size_t i) { return surprises[i] - 2.0 * std::log(kinds[i].belief); };
+  const auto doubt = [&](std::size_t i) {
+    return minus2_logs[i] - 2.0 * std::log(kinds[i].posterior);
+  };
   double least_doubt = doubt(0);
   for (std::size_t i = 1; i < kinds.size(); ++i) least_doubt = std::min(least_doubt, doubt(i));
   const double far = least_doubt - 2.0 * std::log(kNegligible);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     const double of_each = kRather + std::log(kinds[i].inflation());
-    surprises[i] = doubt(i) > far + of_each * static_cast<double>(taken)
-                       ? std::numeric_limits<double>::infinity()
-                       : restricted_surprise(rows_of_all, kinds[i]);
+    minus2_logs[i] = doubt(i) > far + of_each * static_cast<double>(taken)
+                         ? std::numeric_limits<double>::infinity()
+                         : restricted_minus2_log_likelihood(rows_of_all, kinds[i]);
   }
-  const double least = *std::min_element(surprises.begin(), surprises.end());
+  const double least = *std::min_element(minus2_logs.begin(), minus2_logs.end());
   for (std::size_t i = 0; i < kinds.size(); ++i)
-    kinds[i].belief *= std::exp(-0.5 * (surprises[i] - least));
-  const auto share_belief = [&] {
+    kinds[i].posterior *= std::exp(-0.5 * (minus2_logs[i] - least));
+  const auto normalise = [&] {
     double all = 0.0;
-    for (const NoiseKind& kind : kinds) all += kind.belief;
-    for (NoiseKind& kind : kinds) kind.belief /= all;
+    for (const NoiseKind& kind : kinds) all += kind.posterior;
+    for (NoiseKind& kind : kinds) kind.posterior /= all;
   };
-  share_belief();
-  std::erase_if(kinds, [&](const NoiseKind& kind) { return kind.belief < kNegligible; });
-  share_belief();
+  normalise();
+  std::erase_if(kinds, [&](const NoiseKind& kind) { return kind.posterior < kNegligible; });
+  normalise();
   return {std::move(kinds), plain};
 }
 

@@ -19,8 +19,8 @@ using NoiseGroup = std::vector<NoiseSeries>;
 struct NoiseKind {
   double share = 0.0;  ///< of the variance, of the autoregressive process
   double rho = 0.0;
-  double variance = 1.0;  ///< of one residual
-  double belief = 1.0;    ///< probability given the residuals; all kinds together: 1
+  double variance = 1.0;   ///< of one residual
+  double posterior = 1.0;  ///< probability given the residuals; all kinds together: 1
 
   /// Variance of a long mean over that of independent residuals of the same size.
   [[nodiscard]] double inflation() const { return 1.0 + 2.0 * share * rho / (1.0 - rho); }
@@ -31,7 +31,7 @@ struct NoiseEvidence {
   std::vector<NoiseKind> kinds{{}};  ///< those the residuals allow
   /// Twice the negative logarithm of the greatest likelihood of the residuals as they are, without
   /// its constant.
-  double surprise = 0.0;
+  double minus2_log_likelihood = 0.0;
 };
 
 /// The kinds of noise the residuals allow, with how likely each is. Residuals are smaller and

@@ -12,9 +12,9 @@ bool is_among(const std::vector<int>& places, int i) {
   return std::find(places.begin(), places.end(), i) != places.end();
 }
 
-// What is kept shifts the others by what they would do for it; what the data would rather have of
-// it counts for nothing. So it is seen through the others alone, and by its prior.
-void see_through_others(const std::vector<int>& kept, Linearised& all) {
+// A kept parameter's prior must widen the others' error bars, while the data must not tighten that
+// prior: of its column only what the others' columns span is left.
+void project_on_others(const std::vector<int>& kept, Linearised& all) {
   std::vector<int> others;
   for (int i = 0; i < static_cast<int>(all.jacobian.cols()); ++i)
     if (!is_among(kept, i)) others.push_back(i);
@@ -80,7 +80,7 @@ Linearised linearise(const Problem& problem, const Eigen::VectorXd& u) {
   };
   put_priors(false);
   if (kept.empty()) return all;
-  see_through_others(kept, all);
+  project_on_others(kept, all);
   put_priors(true);
   return all;
 }

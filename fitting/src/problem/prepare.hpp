@@ -13,7 +13,7 @@ namespace trochoid::fitting {
 
 /// The tracks' arcs, what may vary and where it starts, noise scales and the integrator's
 /// tolerance: all that is known before the search.
-/// @throws InputError if a track is unusable or has fewer measurements than there are parameters.
+/// @throws TrackError if a track is unusable or has fewer measurements than there are parameters.
 [[nodiscard]] Problem prepare(std::span<const data::Track> tracks,
                               const model::Predictor& predictor, const data::Scene& scene,
                               const FitOptions& options);

@@ -61,7 +61,7 @@ struct FreeParameter {
   int arc = -1;   ///< -1: shared by all arcs
   Transform transform;
   std::optional<data::Prior> prior;
-  std::optional<data::Prior> leash;  ///< on u, while exploring: short windows see no friction
+  std::optional<data::Prior> soft_prior;  ///< on u, while exploring: short windows see no friction
   double given = 0.0;  ///< value before any fitting: the scene's, or the model's default
   bool held = false;   ///< stays where it is for now
 };
@@ -182,8 +182,8 @@ struct SolveOptions {
 /// derivatives cost many plain predictions; the losses of a spin-down trade with each other along
 /// one. There Levenberg-Marquardt with geodesic acceleration, which needs a quarter of the
 /// derivatives and stops at no wall; elsewhere solve().
-[[nodiscard]] Solution seek(const Problem& problem, const Eigen::VectorXd& u,
-                            const SolveOptions& options = {});
+[[nodiscard]] Solution minimise(const Problem& problem, const Eigen::VectorXd& u,
+                                const SolveOptions& options = {});
 
 /// Readings within so many scaled sigmas count in full: clean Gaussian data are left alone.
 inline constexpr double kInlier = 3.5;

@@ -52,7 +52,7 @@ class ArcCost : public ceres::CostFunction {
   int shared_ = 0, own_ = 0;
 };
 
-// What is known from outside, (value - prior)/sigma; or a leash, the same on u itself.
+// What is known from outside, (value - prior)/sigma; or a soft_prior, the same on u itself.
 class PriorCost : public ceres::CostFunction {
  public:
   PriorCost(const Transform& transform, const data::Prior& prior, int size, int entry)
@@ -127,7 +127,7 @@ void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     const FreeParameter& parameter = problem.free[i];
     if (parameter.prior) add_prior(i, parameter.transform, *parameter.prior);
-    if (parameter.leash) add_prior(i, Transform{}, *parameter.leash);
+    if (parameter.soft_prior) add_prior(i, Transform{}, *parameter.soft_prior);
   }
 }
 

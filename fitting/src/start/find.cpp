@@ -28,7 +28,7 @@ Found with_spin(const Problem& problem, Found found) {
   fold_tilt(*problem.predictor, whole.base[0], sign);
   start_spin(whole, 0);
   constexpr double kNear = 1e-5;  // the polish goes on from there
-  found.solution = seek(whole, whole.start(), {.function_tolerance = kNear});
+  found.solution = minimise(whole, whole.start(), {.function_tolerance = kNear});
   return found;
 }
 
@@ -73,7 +73,7 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
     Problem between = eased(problem, *bridge);
     apply(start, between);
     const Solution solution =
-        seek(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
+        minimise(between, between.start(), {.iterations = 20, .function_tolerance = 1e-3});
     if (!solution.usable) continue;
     between.set_base(solution.u);
     start = start_from(between, start.path);
@@ -153,7 +153,7 @@ Starter without_friction(const Starter& starter) {
 }
 
 // The search proper, on a problem whose spin angle is out of the way.
-Found search_path(const Problem& problem, const Quest& quest) {
+Found search_path(const Problem& problem, const SearchRequest& asked) {
   constexpr double kSlowly = 1.2;
   constexpr double kNearlyExplained = 2.0;  // times the gate
   Found best;
@@ -165,13 +165,13 @@ Found search_path(const Problem& problem, const Quest& quest) {
     return surely_found(problem, best);
   };
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
-  for (const Relative& relative : quest.relatives) {
+  for (const Relative& relative : asked.relatives) {
     Problem easier = eased(problem, *relative.model);
     // From positions alone neighbouring valleys are many, and a start has to be near the right one.
     easier.rough = seen;
     const bool rolls = relative.model->model_name() == "rolling";
     easier.partial = rolls ? std::make_shared<Partial>() : nullptr;
-    const Starter starter = rolls && !seen ? without_friction(quest.starter) : quest.starter;
+    const Starter starter = rolls && !seen ? without_friction(asked.starter) : asked.starter;
     const Found rough = search(easier, starter, rolls ? Effort::brief : Effort::full);
     if (rough.solution.usable && rough.unexplained < kRoughly) {
       easier.set_base(rough.solution.u);
@@ -195,7 +195,7 @@ Found search_path(const Problem& problem, const Quest& quest) {
     }
     *problem.work = work;
   }
-  if (!exhausted(problem, best)) take(search(problem, quest.starter));
+  if (!exhausted(problem, best)) take(search(problem, asked.starter));
   return best;
 }
 
@@ -226,7 +226,7 @@ Solution seek_friction(const Problem& part, Solution known, const SolveOptions& 
   for (const double friction : likeliest_frictions(part)) {
     Problem trial = part;
     apply({"", {{"friction", friction}}}, trial);
-    Solution found = seek(trial, trial.start(), options);
+    Solution found = minimise(trial, trial.start(), options);
     if (reduced_chi2(part, found) < reduced_chi2(part, known)) known = std::move(found);
   }
   return known;
@@ -251,7 +251,7 @@ Found grow_into_sliding(const Problem& problem, const Start& start, int window, 
     // The first slips settle the friction; later ones are followed over their ripples.
     const double most = (next > kWellBeyond * beyond ? kFollowed : 1.0) * chi2_gate(part.rows());
     Solution best;
-    if (slides) best = seek(part, part.start(), options);
+    if (slides) best = minimise(part, part.start(), options);
     if (reduced_chi2(part, best) > most) best = seek_friction(part, std::move(best), options);
     // Short slips that come and go with every parameter make ripples.
     if (const double off = reduced_chi2(part, best); off > most && off < kNear * most)
@@ -272,10 +272,10 @@ Found grow_into_sliding(const Problem& problem, const Start& start, int window, 
 }
 
 // From a given start that rolls, for a while.
-Found rolls_first(const Problem& problem, const Quest& quest) {
-  if (quest.relatives.empty()) return {};
-  Problem rolling = eased(problem, *quest.relatives.front().model);
-  apply({"rolls_first", quest.options->start}, rolling);
+Found rolls_first(const Problem& problem, const SearchRequest& asked) {
+  if (asked.relatives.empty()) return {};
+  Problem rolling = eased(problem, *asked.relatives.front().model);
+  apply({"rolls_first", asked.options->start}, rolling);
   const int window = explained_samples(rolling);
   // The first slips bend the rolling body's values before they make them fail.
   for (const double share : {1.0, 0.85, 0.7, 0.55}) {
@@ -284,7 +284,7 @@ Found rolls_first(const Problem& problem, const Quest& quest) {
     if (before < kFewest) break;
     Problem part = windowed(rolling, before);
     const Solution solution =
-        seek(part, part.start(), {.iterations = 20, .function_tolerance = 1e-3});
+        minimise(part, part.start(), {.iterations = 20, .function_tolerance = 1e-3});
     if (!solution.usable) continue;
     part.set_base(solution.u);
     rolling.base = part.base;
@@ -296,7 +296,7 @@ Found rolls_first(const Problem& problem, const Quest& quest) {
 
 // Where nothing passed, losses that start weaker or stronger may lead elsewhere: a top's nutation
 // is lost with its phase. Only where a search takes milliseconds.
-Found with_other_losses(const Problem& problem, const Quest& quest, Found best) {
+Found with_other_losses(const Problem& problem, const SearchRequest& asked, Found best) {
   constexpr double kQuick = 3e5;  // steps
   for (const double factor : {4.0, 0.25, 16.0, 0.06}) {
     Problem other = problem;
@@ -308,13 +308,13 @@ Found with_other_losses(const Problem& problem, const Quest& quest, Found best) 
       for (Eigen::VectorXd& base : other.base) base[parameter.index] *= factor;
     }
     if (!any || best.passed || *problem.work > kQuick) return best;
-    Found found = search_path(other, quest);
+    Found found = search_path(other, asked);
     if (better(found, best)) best = std::move(found);
   }
   return best;
 }
 
-Found find_arc(Problem problem, const Quest& quest) {
+Found find_arc(Problem problem, const SearchRequest& asked) {
   if (!problem.work) problem.work = std::make_shared<double>(0.0);
   const bool spins = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
     return problem.predictor->parameters()[p.index].name == "psi_rad";
@@ -325,23 +325,23 @@ Found find_arc(Problem problem, const Quest& quest) {
     path.arcs[0] = problem.arcs[0].without(Channel::psi);
     for (int i = static_cast<int>(path.free.size()) - 1; i >= 0; --i)
       if (is_spin(path, i)) path.free.erase(path.free.begin() + i);
-    return with_spin(problem, find_arc(path, quest));
+    return with_spin(problem, find_arc(path, asked));
   }
-  const FitOptions& options = *quest.options;
+  const FitOptions& options = *asked.options;
   const Start given{"given", options.start};
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   if (options.strategy == "single") return grow(problem, given, all);
   if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
-  if (options.strategy == kRollsFirst) return rolls_first(problem, quest);
-  if (options.strategy == "integral") return from_best_start(problem, quest.starter);
+  if (options.strategy == kRollsFirst) return rolls_first(problem, asked);
+  if (options.strategy == "integral") return from_best_start(problem, asked.starter);
   if (options.strategy == "multiple") return shoot_top(problem, given);
   if (options.strategy != "auto")
     throw InputError(
         fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
                     options.strategy));
-  Found best = with_other_losses(problem, quest, search_path(problem, quest));
+  Found best = with_other_losses(problem, asked, search_path(problem, asked));
   best.cut_short = !best.passed && exhausted(problem, best);
-  if (best.passed || !quest.start_given) return best;
+  if (best.passed || !asked.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
   from_given.cut_short = best.cut_short && !from_given.passed;
   return from_given.solution.usable &&
@@ -353,15 +353,15 @@ Found find_arc(Problem problem, const Quest& quest) {
 }  // namespace
 
 // Every arc alone, then all together from each arc's idea of the shared parameters.
-Found find(Problem& problem, const Quest& quest) {
-  if (problem.arcs.size() == 1) return find_arc(problem, quest);
+Found find(Problem& problem, const SearchRequest& asked) {
+  if (problem.arcs.size() == 1) return find_arc(problem, asked);
   const int arcs = static_cast<int>(problem.arcs.size());
-  const int threads = quest.options->threads;
+  const int threads = asked.options->threads;
   std::vector<Problem> alone;
   for (int arc = 0; arc < arcs; ++arc) alone.push_back(single_arc(problem, arc));
   std::vector<Found> found(alone.size());
   data::in_parallel(arcs, threads,
-                    [&](std::size_t arc) { found[arc] = find_arc(alone[arc], quest); });
+                    [&](std::size_t arc) { found[arc] = find_arc(alone[arc], asked); });
   Found best;
   for (int arc = 0; arc < arcs; ++arc) {
     if (!found[arc].solution.usable) {

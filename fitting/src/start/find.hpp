@@ -12,7 +12,7 @@ struct Relative {
 };
 
 /// How to look for a solution.
-struct Quest {
+struct SearchRequest {
   Starter starter;
   const FitOptions* options = nullptr;
   bool start_given = false;
@@ -24,6 +24,6 @@ struct Quest {
 /// Every arc alone (in parallel), without a guess or from the given start; then all arcs together
 /// from each arc's idea of the shared parameters. Writes the arcs' values into problem.base.
 /// @throws InputError if the strategy is unknown.
-[[nodiscard]] Found find(Problem& problem, const Quest& quest);
+[[nodiscard]] Found find(Problem& problem, const SearchRequest& asked);
 
 }  // namespace trochoid::fitting

@@ -83,7 +83,7 @@ std::optional<Prelude> before(const Problem& problem, const Eigen::VectorXd& u, 
   for (double share = 1.0; share > kLeast && share * samples > kFewest; share *= kShorter) {
     prelude.part.arcs[0] = problem.arcs[0].slice(0, static_cast<int>(share * samples));
     const SolveOptions options{.iterations = 25, .function_tolerance = 1e-4};
-    Solution solution = seek(prelude.part, prelude.solution.u, options);
+    Solution solution = minimise(prelude.part, prelude.solution.u, options);
     if (!solution.usable) continue;
     prelude.solution = std::move(solution);
     if (judged(prelude.part, prelude.solution, "").passed) return prelude;
@@ -109,7 +109,7 @@ Found fall_anew(const Problem& problem, Found found) {
     const Eigen::VectorXd from =
         looks.best(kLooks, prelude->solution.u, L, kSteps, found.solution.u);
     if (from.size() == 0) break;
-    Found other = judged(problem, seek(problem, from), found.path);
+    Found other = judged(problem, minimise(problem, from), found.path);
     if (!better(other, found)) continue;
     other.strays_s = found.strays_s;
     found = std::move(other);
@@ -128,7 +128,7 @@ Found hop(const Problem& problem, Found best, int misses) {
        ++round) {
     const Eigen::VectorXd from = looks.best(kLooks, best.solution.u, L, kSteps, best.solution.u);
     if (from.size() == 0) break;
-    Found found = judged(problem, seek(problem, from, {.iterations = 20}), best.path);
+    Found found = judged(problem, minimise(problem, from, {.iterations = 20}), best.path);
     // A ripple of less than 1 in chi-square moves nothing by more than its error bar.
     const double gain = best.solution.chi2 - found.solution.chi2;
     missed = found.solution.usable && gain > 1.0 ? 0 : missed + 1;

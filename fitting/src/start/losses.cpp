@@ -47,19 +47,19 @@ constexpr double kNear = 1e-5;
 Solution descend(Problem& problem) {
   const bool losses = std::any_of(problem.free.begin(), problem.free.end(),
                                   [&](const FreeParameter& p) { return is_loss(problem, p); });
-  if (!losses) return seek(problem, problem.start(), {.function_tolerance = kNear});
+  if (!losses) return minimise(problem, problem.start(), {.function_tolerance = kNear});
   // Far below one sigma of anything, also where residuals are larger than the noise.
   const auto nothing = [](double chi2) { return std::max(0.1, 1e-4 * chi2); };
   double before = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 6; ++round) {
     const Solution solution =
-        seek(problem, problem.start(), {.iterations = 15, .function_tolerance = kNear});
+        minimise(problem, problem.start(), {.iterations = 15, .function_tolerance = kNear});
     const bool stands_still = before - solution.chi2 < nothing(solution.chi2);
     if (!solution.usable || solution.converged || stands_still) return solution;
     before = solution.chi2;
     hold_vanished(problem, solution.u);
   }
-  return seek(problem, problem.start(), {.function_tolerance = kNear});
+  return minimise(problem, problem.start(), {.function_tolerance = kNear});
 }
 
 // A vanished loss, what it would do, and what the others would do beside it.

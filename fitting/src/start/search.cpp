@@ -157,7 +157,8 @@ std::vector<Start> settled(const Problem& window, const Starter& starter, Starts
   for (std::size_t i = 0; i < std::min(kSettled, starts.size()) && !exhausted(window, {}); ++i) {
     Problem trial = plain;
     apply(starts[i], trial);
-    const Solution end = seek(trial, trial.start(), {.iterations = 20, .function_tolerance = 1e-4});
+    const Solution end =
+        minimise(trial, trial.start(), {.iterations = 20, .function_tolerance = 1e-4});
     if (end.usable) ends.emplace_back(end.chi2, start_at(trial, end.u, starts[i].path));
   }
   std::stable_sort(ends.begin(), ends.end(),

@@ -161,9 +161,10 @@ class Shooter {
       const FreeParameter& parameter = problem_.free[chain_.dynamics()[i]];
       polished.base[0][parameter.index] = parameter.transform.value(iterate.p[static_cast<int>(i)]);
     }
-    return judged(polished,
-                  seek(polished, polished.start(), {.iterations = 30, .function_tolerance = 1e-3}),
-                  "multiple_shooting");
+    return judged(
+        polished,
+        minimise(polished, polished.start(), {.iterations = 30, .function_tolerance = 1e-3}),
+        "multiple_shooting");
   }
 
   [[nodiscard]] const Chain& chain() const { return chain_; }

@@ -14,12 +14,12 @@ constexpr int kThinned = 300;  // samples an exploratory fit looks at
 
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
 // are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
-void leash(Problem& problem) {
+void add_soft_priors(Problem& problem) {
   for (FreeParameter& parameter : problem.free) {
     const std::string& name = problem.predictor->parameters()[parameter.index].name;
     if ((parameter.transform.is_over_decades() && is_loss(problem, parameter)) ||
         name == kSlipScale)
-      parameter.leash = data::Prior{parameter.transform.inverse(parameter.given), 1.0};
+      parameter.soft_prior = data::Prior{parameter.transform.inverse(parameter.given), 1.0};
   }
 }
 
@@ -33,7 +33,7 @@ Problem windowed(const Problem& problem, int samples) {
   Problem part = problem;
   const int step = std::max(1, samples / kThinned);
   part.arcs[0] = problem.arcs[0].slice(0, samples, step);
-  leash(part);
+  add_soft_priors(part);
   return part;
 }
 
@@ -94,8 +94,8 @@ bool explained_within(const Problem& problem, const Found& best, double deviatio
 }
 
 bool surely_explained(const Problem& problem, const Found& best) {
-  constexpr double kSurely = 0.5;
-  return explained_within(problem, best, kSurely);
+  constexpr double kSure_deviations = 0.5;
+  return explained_within(problem, best, kSure_deviations);
 }
 
 bool exhausted(const Problem& problem, const Found& best) {
@@ -246,7 +246,7 @@ Solution without_strays(Problem& current, int& window, Solution solution,
     strays_s.push_back(part.arcs[0].t_s[stray]);
     current = without_samples(current, {strays_s.back()});
     --window;
-    solution = seek(windowed(current, window), solution.u, options);
+    solution = minimise(windowed(current, window), solution.u, options);
   }
   return solution;
 }
@@ -283,7 +283,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
     const SolveOptions options{.iterations = first ? 60 : 25,
                                .function_tolerance = first && window < all ? 1e-4 : 1e-3};
     const Solution solution =
-        without_strays(current, window, seek(part, part.start(), options), options, strays_s);
+        without_strays(current, window, minimise(part, part.start(), options), options, strays_s);
     part = windowed(current, window);
     all = static_cast<int>(current.arcs[0].t_s.size());
     const double reduced = solution.chi2 / free_rows(part);
@@ -321,9 +321,9 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
     before = window;
     window = std::min(static_cast<int>(rate * window) + 8, all);
   }
-  Solution solution =
-      problem.rough ? seek(current, current.start(), {.iterations = 20, .function_tolerance = 1e-3})
-                    : solve_to_the_end(current);
+  Solution solution = problem.rough ? minimise(current, current.start(),
+                                               {.iterations = 20, .function_tolerance = 1e-3})
+                                    : solve_to_the_end(current);
   Found found = judged(current, std::move(solution), start.path);
   found.strays_s = std::move(strays_s);
   return fall_anew(current, std::move(found));

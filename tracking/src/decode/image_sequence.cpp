@@ -72,9 +72,10 @@ Pictures pictures_in(const fs::path& folder) {
 Pictures take_strays(Pictures& pictures) {
   std::map<std::string, std::size_t> count;
   for (const fs::path& picture : pictures) ++count[pattern_of(picture)];
-  const auto& [usual, most] = *std::max_element(
+  const auto most = std::max_element(
       count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (usual.find('#') == std::string::npos || 2 * most <= pictures.size()) return {};
+  const std::string& usual = most->first;
+  if (usual.find('#') == std::string::npos || 2 * most->second <= pictures.size()) return {};
   const auto strays =
       std::stable_partition(pictures.begin(), pictures.end(),
                             [&](const fs::path& picture) { return pattern_of(picture) == usual; });

@@ -23,7 +23,7 @@ struct ParameterInfo {
   std::string name;
   std::string unit;
   Role role = Role::dynamics;
-  double lower = 0.0, upper = 0.0;  ///< open physical range, may be infinite
+  double lower = 0.0, upper = 0.0;  ///< physical range, may be infinite
   bool logarithmic = false;         ///< positive over decades: fit its logarithm
   double value = 0.0;               ///< default: from the scene's [body], [model], [start]
   bool worth_fitting = true;        ///< the model's choice when the scene names no free parameters

@@ -1,4 +1,4 @@
-#include "judge/leaning.hpp"
+#include "judge/influence.hpp"
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -83,25 +83,26 @@ Problem deaf_to(Problem problem, const Sample& sample) {
 
 }  // namespace
 
-std::vector<Leaning> leanings(const Problem& problem, const Solution& solution,
-                              const Eigen::VectorXd& sigmas) {
+std::vector<InfluentialSample> influential_samples(const Problem& problem, const Solution& solution,
+                                                   const Eigen::VectorXd& sigmas) {
   // A sample with nine tenths of a direction moves it by three error bars when it goes, and that is
   // in order.
   constexpr double kFar = 5.0;
   const SolveOptions down{.iterations = 60, .function_tolerance = 1e-7};
-  std::vector<Leaning> found;
+  std::vector<InfluentialSample> found;
   for (const Sample& sample : carrying_most(problem, solution.u)) {
     Problem deaf = deaf_to(problem, sample);
     // The integration's noise stops a descent along a floor that hardly slopes.
     constexpr double kFine = 1e-8;
     deaf.tolerance = std::min(problem.tolerance, kFine);
-    const Solution there = seek(deaf, solution.u, down);
+    const Solution there = minimise(deaf, solution.u, down);
     if (!there.usable) continue;
-    Leaning leaning{problem.arcs[sample.arc].t_s[sample.index], Eigen::VectorXd(sigmas.size())};
+    InfluentialSample without{problem.arcs[sample.arc].t_s[sample.index],
+                              Eigen::VectorXd(sigmas.size())};
     for (int i = 0; i < static_cast<int>(sigmas.size()); ++i)
-      leaning.shift[i] = problem.value(i, there.u) - problem.value(i, solution.u);
-    if ((leaning.shift.cwiseAbs() - kFar * sigmas).maxCoeff() > 0.0)
-      found.push_back(std::move(leaning));
+      without.shift[i] = problem.value(i, there.u) - problem.value(i, solution.u);
+    if ((without.shift.cwiseAbs() - kFar * sigmas).maxCoeff() > 0.0)
+      found.push_back(std::move(without));
   }
   return found;
 }

@@ -6,8 +6,8 @@
 
 namespace trochoid::fitting {
 
-/// A sample on which a solution leans.
-struct Leaning {
+/// A sample on which a solution hangs.
+struct InfluentialSample {
   double t_s = 0.0;
   Eigen::VectorXd shift;  ///< of the values, when the sample is left out
 };
@@ -18,7 +18,8 @@ struct Leaning {
 /// samples that carry most of a direction of the parameters, goes downhill from there, and returns
 /// those without which a parameter comes to lie many of its error bars away.
 /// @param sigmas  the error bars of the values.
-[[nodiscard]] std::vector<Leaning> leanings(const Problem& problem, const Solution& solution,
-                                            const Eigen::VectorXd& sigmas);
+[[nodiscard]] std::vector<InfluentialSample> influential_samples(const Problem& problem,
+                                                                 const Solution& solution,
+                                                                 const Eigen::VectorXd& sigmas);
 
 }  // namespace trochoid::fitting

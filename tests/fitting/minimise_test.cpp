@@ -81,43 +81,43 @@ Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
 
 // Straight steps are as short as the valley is narrow: the steps a minimiser has by default would
 // not take them to its end, which is where the residuals are the noise alone.
-TEST(Seek, FollowsABentValleyToItsEnd) {
+TEST(Minimise, FollowsABentValleyToItsEnd) {
   constexpr double kSigma = 1.0, kRows = 24.0;
   const Bent bent(300.0);
   const Problem problem = problem_of(bent, kSigma);
   const Eigen::Vector2d far(-3.0, 9.0);
-  const Solution found = seek(problem, far);
+  const Solution found = minimise(problem, far);
   EXPECT_NEAR(found.u[0], 1.0, 0.01 * kSigma);
   EXPECT_NEAR(found.u[1], 1.0, 0.02 * kSigma);
   EXPECT_NEAR(found.chi2, kRows, 0.01);
   EXPECT_LE(bent.derivatives(), SolveOptions{}.iterations);
 }
 
-TEST(Seek, StaysWhereNothingIsToBeGained) {
+TEST(Minimise, StaysWhereNothingIsToBeGained) {
   const Bent bent(300.0);
-  const Solution solution = seek(problem_of(bent, 1.0), Eigen::Vector2d(1.0, 1.0));
+  const Solution solution = minimise(problem_of(bent, 1.0), Eigen::Vector2d(1.0, 1.0));
   EXPECT_TRUE(solution.usable && solution.converged);
   EXPECT_EQ(bent.derivatives(), 1);
 }
 
 // A stiff run has another error with derivatives than without. A minimiser that compares the two
 // takes that for a gain, or finds no step that gains as much.
-TEST(Seek, ReachesTheEndAlsoWhereRunsWithDerivativesAreABitOff) {
+TEST(Minimise, ReachesTheEndAlsoWhereRunsWithDerivativesAreABitOff) {
   for (const double error : {0.02, -0.02}) {
     const Bent rough(300.0, error);
-    const Solution found = seek(problem_of(rough, 1.0), Eigen::Vector2d(-3.0, 9.0));
+    const Solution found = minimise(problem_of(rough, 1.0), Eigen::Vector2d(-3.0, 9.0));
     EXPECT_TRUE(found.converged);
     EXPECT_NEAR(found.u[0], 1.0, std::abs(error));
     EXPECT_NEAR(found.u[1], 1.0, 2.0 * std::abs(error));
   }
 }
 
-TEST(Seek, HeedsWhatIsKnownBeforehand) {
+TEST(Minimise, HeedsWhatIsKnownBeforehand) {
   const Bent bent(1.0);
   Problem problem = problem_of(bent, 1.0);
   constexpr double kKnown = 3.0, kSigma = 0.1;
   problem.free[0].prior = data::Prior{kKnown, kSigma};
-  const Solution solution = seek(problem, Eigen::Vector2d(0.0, 0.0));
+  const Solution solution = minimise(problem, Eigen::Vector2d(0.0, 0.0));
   const Solution plain = solve(problem, Eigen::Vector2d(0.0, 0.0));
   EXPECT_NEAR(solution.u[0], plain.u[0], 1e-3 * kSigma);
   EXPECT_NEAR(solution.chi2, plain.chi2, 1e-4);

@@ -31,8 +31,9 @@ bool all_rows(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd&
     if (known.prior)
       add(i, (known.transform.value(u[i]) - known.prior->value) / known.prior->sigma,
           known.held ? 0.0 : known.transform.slope(u[i]) / known.prior->sigma);
-    if (known.leash && !known.held)
-      add(i, (u[i] - known.leash->value) / known.leash->sigma, 1.0 / known.leash->sigma);
+    if (known.soft_prior && !known.held)
+      add(i, (u[i] - known.soft_prior->value) / known.soft_prior->sigma,
+          1.0 / known.soft_prior->sigma);
   }
   return true;
 }
@@ -206,7 +207,7 @@ class Seeker {
 
 }  // namespace
 
-Solution seek(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options) {
+Solution minimise(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options) {
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   const bool spin_down = problem.predictor->model_name() == "pivot";
   if (problem.arcs.size() > 1 || !(rim || spin_down)) return solve(problem, u, options);
