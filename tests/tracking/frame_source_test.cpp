@@ -380,14 +380,16 @@ TEST_F(FrameSourceTest, APhotographUnlikeTheFirstOfItsSeriesIsRefused) {
   EXPECT_EQ(count, 4);
 
   photograph(marked_picture(), 3, folder_ / "p2.jpg");
-  EXPECT_THAT(error_of(series, rate), HasSubstr("frame 2: the camera was held another way"));
+  EXPECT_THAT(error_of(series, rate),
+              HasSubstr("frame 2 (p2.jpg): the camera was held another way"));
   // Of as many pixels, but higher than wide.
   cv::Mat portrait;
   cv::transpose(marked_picture(), portrait);
   photograph(portrait, 6, folder_ / "p2.jpg");
-  EXPECT_THAT(error_of(series, rate),
-              HasSubstr(cv::format("frame 2: the picture size changes from %d x %d to %d x %d",
-                                   kWidth, kHeight, kHeight, kWidth)));
+  EXPECT_THAT(
+      error_of(series, rate),
+      HasSubstr(cv::format("frame 2 (p2.jpg): the picture size changes from %d x %d to %d x %d",
+                           kWidth, kHeight, kHeight, kWidth)));
 }
 
 TEST_F(FrameSourceTest, APictureOfASeriesThatCannotBeDecodedIsNotPassedOver) {

@@ -17,9 +17,7 @@ namespace {
 
 // Whitened by the track's own sigmas, none weighed down; empty where the model has no prediction.
 Eigen::VectorXd plain_residuals(const Problem& problem, int arc, const Eigen::VectorXd& u) {
-  Problem plain = problem;
-  plain.noise_scale.fill(1.0);
-  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
+  const Problem plain = in_stated_sigmas(problem, Weights::dropped);
   Eigen::VectorXd residuals;
   return evaluate(plain, arc, u, residuals, nullptr) ? residuals : Eigen::VectorXd();
 }
@@ -46,8 +44,7 @@ Squares squares(const Problem& problem, const Solution& solution) {
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     const ArcData& data = problem.arcs[arc];
     if (data.observable_index(model::Observable::x_m) < 0) continue;
-    Problem plain = problem;
-    plain.noise_scale.fill(1.0);
+    const Problem plain = in_stated_sigmas(problem, Weights::kept);
     Eigen::VectorXd r;
     if (!evaluate(plain, arc, solution.u, r, nullptr)) return {.ok = false};
     const Eigen::MatrixX2d xy = data.positions_m();

@@ -87,9 +87,7 @@ std::vector<double> fit_again(Problem problem, const Solution& solution) {
 
 data::Bootstrap bootstrap(const Problem& problem, const Solution& solution,
                           double correlation_time_s, int draws, std::uint64_t seed, int threads) {
-  Problem plain = problem;
-  plain.noise_scale.fill(1.0);
-  for (Eigen::VectorXd& weights : plain.row_weights) weights.resize(0);
+  const Problem plain = in_stated_sigmas(problem, Weights::dropped);
   const int arcs = static_cast<int>(plain.arcs.size());
   std::vector<Eigen::VectorXd> residuals(plain.arcs.size());
   std::vector<std::vector<SeriesOfReadings>> series(plain.arcs.size());

@@ -295,8 +295,7 @@ double integration_error_sigma(const Problem& problem, const Eigen::VectorXd& u)
 }
 
 Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double minus2_log_likelihood) {
-  Problem plain = problem;
-  plain.noise_scale.fill(1.0);
+  const Problem plain = in_stated_sigmas(problem, Weights::kept);
   Criteria result;
   for (int arc = 0; arc < static_cast<int>(plain.arcs.size()); ++arc) {
     Eigen::VectorXd r;

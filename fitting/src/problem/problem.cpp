@@ -180,6 +180,13 @@ std::string Shortfalls::words() const {
       where, all, by_outcome[commonest].load(), ending);
 }
 
+Problem in_stated_sigmas(Problem problem, Weights weights) {
+  problem.noise_scale.fill(1.0);
+  if (weights == Weights::dropped)
+    for (Eigen::VectorXd& of_arc : problem.row_weights) of_arc.resize(0);
+  return problem;
+}
+
 Problem single_arc(const Problem& problem, int arc) {
   Problem part = problem;
   part.arcs = {problem.arcs[arc]};

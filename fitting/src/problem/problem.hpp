@@ -108,6 +108,11 @@ struct Problem {
   [[nodiscard]] int max_steps() const;  ///< of one integration
 };
 
+enum class Weights { kept, dropped };
+/// The problem with residuals in the sigmas that the tracks state, whatever noise was found, and
+/// with or without the robust weights.
+[[nodiscard]] Problem in_stated_sigmas(Problem problem, Weights weights);
+
 /// One arc of a problem with the parameters it sees.
 [[nodiscard]] Problem single_arc(const Problem& problem, int arc);
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "observe/smoothing.hpp"
 #include "problem/problem.hpp"
@@ -16,8 +17,7 @@ struct RawResiduals {
 
 RawResiduals raw_residuals(Problem problem, const Eigen::VectorXd& u) {
   RawResiduals raw;
-  problem.noise_scale.fill(1.0);
-  for (auto& weights : problem.row_weights) weights.resize(0);
+  problem = in_stated_sigmas(std::move(problem), Weights::dropped);
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     Eigen::VectorXd residuals;
     raw.ok = raw.ok && evaluate(problem, arc, u, residuals, nullptr);

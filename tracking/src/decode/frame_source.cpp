@@ -325,22 +325,22 @@ class LibavSource final : public FrameSource {
                        series_->pictures.size(), series_->pictures[place].filename().string());
   }
 
+  /// Of a series, the file of the picture that was decoded last.
+  [[nodiscard]] std::string name_of_picture() const {
+    if (!series_) return "";
+    const fs::path& file = series_->pictures[static_cast<std::size_t>(frames_read_ - 1)];
+    return fmt::format(" ({})", file.filename().string());
+  }
+
   /// A recording's camera stands still: what its pictures say of how it was held must agree.
   void check_orientation(std::int64_t index) const {
     if (!photographs_) return;
     const int orientation = turn_of(*stream_, picture_.get()).orientation();
     if (orientation != info_.orientation)
       fail(
-          fmt::format("frame {}: the camera was held another way than for the first (Exif "
+          fmt::format("frame {}{}: the camera was held another way than for the first (Exif "
                       "orientation {} after {}); if it was not, remove what they say of it",
-                      index, orientation, info_.orientation));
-  }
-
-  /// Of a series, the file of the picture that was decoded last.
-  [[nodiscard]] std::string name_of_picture() const {
-    if (!series_) return "";
-    const fs::path& file = series_->pictures[static_cast<std::size_t>(frames_read_ - 1)];
-    return fmt::format(" ({})", file.filename().string());
+                      index, name_of_picture(), orientation, info_.orientation));
   }
 
   void convert(Frame& frame) {

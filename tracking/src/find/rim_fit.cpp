@@ -293,7 +293,6 @@ RimFit report(const EllipseFit& fit, const std::vector<Edge>& edges, int asked) 
   const double spread = std::max(result.rms_px, 0.03) / fit.scale_px();
   const Matrix5 covariance = spread * spread * correlation_inflation(edges) * fit.inverse_normal();
   result.covariance_px2 = covariance.topLeftCorner<2, 2>();
-  result.sigma_radius_px = std::sqrt(std::max(0.0, 0.5 * (covariance(2, 2) + covariance(4, 4))));
   return result;
 }
 

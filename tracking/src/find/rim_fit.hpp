@@ -36,7 +36,6 @@ struct RimSearch {
 struct RimFit {
   Ellipse ellipse;
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();  ///< of the centre
-  double sigma_radius_px = 0.0;
   double rms_px = 0.0;    ///< of the accepted edges about the ellipse
   double accepted = 0.0;  ///< fraction of the whole rim with an accepted edge
   double contrast = 0.0;  ///< median step across the rim [levels], sign: inside minus outside

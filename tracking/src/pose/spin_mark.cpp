@@ -185,6 +185,54 @@ Peak find_peak(const std::vector<float>& sums, int flank) {
   return peak;
 }
 
+// The mean over `width` spokes about each: what turning while the shutter is open does to a row.
+template <class Row>
+void smear(Row&& row, int width) {
+  if (width < 2) return;
+  std::array<float, kSpokes> mean{};
+  const int before = width / 2;
+  float sum = 0.0F;
+  for (int i = -before; i < width - before; ++i) sum += row[(i + kSpokes) % kSpokes];
+  for (int i = 0; i < kSpokes; ++i) {
+    mean[static_cast<size_t>(i)] = sum / static_cast<float>(width);
+    sum += row[(i + width - before) % kSpokes] - row[(i - before + kSpokes) % kSpokes];
+  }
+  for (int i = 0; i < kSpokes; ++i) row[i] = mean[static_cast<size_t>(i)];
+}
+
+// The marks as they look smeared, and how like them the face is at every angle: likeness to smeared
+// marks is smeared likeness.
+struct Match {
+  Face marks;
+  std::vector<float> sums;
+  int smeared = 0;
+  Peak peak;
+  double likeness = 0.0;
+};
+
+Match match(const Face& marks, const std::vector<float>& sums, double all, int smeared, int flank) {
+  Match found{marks, sums, smeared, {}, 0.0};
+  for (int ring = 0; ring < kRings; ++ring) smear(found.marks.row(ring), smeared);
+  smear(found.sums.data(), smeared);
+  found.peak = find_peak(found.sums, flank + smeared);
+  found.likeness = found.peak.height / std::sqrt(std::max(found.marks.squaredNorm() * all, 1e-12));
+  return found;
+}
+
+// The body turned by so much while the shutter was open as makes its marks likest; by next to
+// nothing unless that is clearly less like them.
+Match likeliest(const Face& marks, const std::vector<float>& sums, double all, int flank) {
+  constexpr double kClearly = 1.2;
+  constexpr int kMost = kSpokes / 3;  // of a turn: beyond that a mark is a ring
+  Match best = match(marks, sums, all, 0, flank);
+  for (int smeared = 6; smeared <= kMost; smeared += smeared / 3) {
+    Match other = match(marks, sums, all, smeared, flank);
+    if (other.likeness > (best.smeared == 0 ? kClearly : 1.0) * best.likeness)
+      best = std::move(other);
+  }
+  return best;
+}
+
 }  // namespace
 
 std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& body,
@@ -204,16 +252,17 @@ std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& bod
     level(band, *f);
     weigh(band, *f);
   }
-  const std::vector<float> sums = correlations(face, marks);
   double widest = 0.0;
   for (const data::SpinMark& mark : band.marks)
     widest = std::max(widest, mark.size_m / std::max(mark.distance_m, mark.size_m));
-  const Peak peak = find_peak(sums, static_cast<int>(2.2 * widest / kSpoke_rad) + 2);
-  const double power = marks.squaredNorm(), all = face.squaredNorm();
-  const double likeness = peak.height / std::sqrt(std::max(power * all, 1e-12));
-  if (peak.height < kStandsOut * peak.second || likeness < kLeastLikeness) return std::nullopt;
+  const double all = face.squaredNorm();
+  const Match best = likeliest(marks, correlations(face, marks), all,
+                               static_cast<int>(2.2 * widest / kSpoke_rad) + 2);
+  const Peak& peak = best.peak;
+  const double power = best.marks.squaredNorm();
+  if (peak.height < kStandsOut * peak.second || best.likeness < kLeastLikeness) return std::nullopt;
   const auto value = [&](int s) {
-    return static_cast<double>(std::abs(sums[static_cast<size_t>((s + kSpokes) % kSpokes)]));
+    return static_cast<double>(std::abs(best.sums[static_cast<size_t>((s + kSpokes) % kSpokes)]));
   };
   const double before = value(peak.at - 1), after = value(peak.at + 1);
   const double bend = before - 2.0 * peak.height + after;
@@ -227,7 +276,7 @@ std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& bod
                           px_per_m * px_per_m * std::abs(facing);
   const double per_pixel = std::max(1.0, kRings * kSpokes / area_px2);
   reading.sigma_rad =
-      std::sqrt((unlike + 0.1) * per_pixel / (contrast * contrast * turn_power(marks)));
+      std::sqrt((unlike + 0.1) * per_pixel / (contrast * contrast * turn_power(best.marks)));
   reading.radius_px = 0.5 * (band.from_m + band.to_m) * px_per_m;
   return reading;
 }

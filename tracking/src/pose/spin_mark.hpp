@@ -17,8 +17,9 @@ struct MarkReading {
 
 /// Reads the spin of a posed body from the known marks of the face towards the camera: the face is
 /// unrolled about its axis with the camera, even light and light that changes across it are taken
-/// out, and the marks, bright or dark, are sought at every angle. Nothing if that face bears no
-/// mark, or if no angle stands out of all others.
+/// out, and the marks, bright or dark, are sought at every angle, smeared as far as the body turned
+/// while the shutter was open: the angle is that in the middle of the exposure. Nothing if that
+/// face bears no mark, or if no angle stands out of all others.
 [[nodiscard]] std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& body,
                                                     const data::Camera& camera,
                                                     const data::Pose<>& pose);
