@@ -126,7 +126,8 @@ void check_tracking(const TableReader& reader, const TrackingSettings& tracking)
                                     tracking.from, tracking.to));
 }
 
-// A group may be free but for some of its components, which have names of their own.
+// A term may be free but for some of its coefficients, which have names of their own; fixed, it is
+// fixed in all.
 void check_fit(const TableReader& reader, const FitSettings& fit) {
   if (reader.has("free") && fit.free.empty())
     reader.fail(
@@ -136,12 +137,15 @@ void check_fit(const TableReader& reader, const FitSettings& fit) {
   const auto refuse = [&](const char* key, const std::string& name) {
     reader.fail(key, fmt::format("{} names {}, which fixed gives a value; keep one", key, name));
   };
+  const auto fixed = [&](const std::string& name) {
+    return fit.fixed.contains(name) || fit.fixed.contains(name.substr(0, name.find('[')));
+  };
   for (const std::string& name : fit.free)
-    if (fit.fixed.contains(name)) refuse("free", name);
+    if (fixed(name)) refuse("free", name);
   for (const auto& [name, prior] : fit.prior)
-    if (fit.fixed.contains(name)) refuse("prior", name);
+    if (fixed(name)) refuse("prior", name);
   for (const auto& [name, bounds] : fit.bounds)
-    if (fit.fixed.contains(name)) refuse("bounds", name);
+    if (fixed(name)) refuse("bounds", name);
 }
 
 Scene scene_of(const toml::table& root, const std::string& where) {

@@ -322,6 +322,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"FreeNothing", "[fit]\nfree = []", ":2:", "names nothing"},
         Refusal{"FreeAndFixed", "[fit]\nfree = ['l_m']\nfixed = { l_m = 1 }",
                 ":2:", "free names l_m, which fixed gives a value"},
+        Refusal{"CoefficientOfAFixedTerm", "[fit]\nfree = ['air[1]']\nfixed = { air = 1 }",
+                ":2:", "keep one"},
         Refusal{"PriorAndFixed", "[fit]\nfixed = { l_m = 1 }\nprior = { l_m = [1, 0.1] }",
                 ":3:", "keep one"},
         Refusal{"BoundedAndFixed", "[fit]\nfixed = { l_m = 1 }\nbounds = { l_m = [0, 2] }",

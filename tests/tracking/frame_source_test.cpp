@@ -298,6 +298,17 @@ TEST_F(FrameSourceTest, APictureNamedUnlikeTheNumberedOnesOfItsFolderIsNoFrame) 
   EXPECT_THAT(open_video(folder_ / "*.png", {.frame_rate_hz = 10.0})->info().left_out, IsEmpty());
 }
 
+TEST_F(FrameSourceTest, APictureThatMayFillAGapOfItsSeriesStays) {
+  const cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(9));
+  for (const char* name : {"b_0001.png", "b_0002.png", "b_0003_COVER.png", "b_0004.png"})
+    cv::imwrite((folder_ / name).string(), picture);
+  EXPECT_EQ(open_video(folder_, {.frame_rate_hz = 10.0})->info().frames, 4);
+  cv::imwrite((folder_ / "b_0003.png").string(), picture);
+  const auto whole = open_video(folder_, {.frame_rate_hz = 10.0});
+  EXPECT_THAT(whole->info().left_out, ElementsAre(folder_ / "b_0003_COVER.png"));
+  EXPECT_EQ(whole->info().missing, 0);
+}
+
 TEST_F(FrameSourceTest, ASeriesCountsByItsOwnNumberAndFoldersFollowEachOther) {
   const cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(9));
   for (int i = 1; i < 13; ++i)

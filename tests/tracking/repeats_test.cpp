@@ -41,6 +41,7 @@ TEST(Repeats, ABodyAtRestRepeatsNothing) {
   rests_between.insert(rests_between.end(), 20, 36.0);
   rests_between.insert(rests_between.end(), {39, 42, 45});
   EXPECT_EQ(repeats_of(rests_between), 0);
+  EXPECT_EQ(repeats_of({30, 33, 36, 36, 33, 30, 27}), 0);                  // turns back
   EXPECT_EQ(repeats_of({30, 31.5, 32.4, 32.7, 32.7, 32.4, 31.5, 30}), 0);  // turns round slowly
 }
 

@@ -497,10 +497,13 @@ class Tracking {
           "{} picture{} of the folder, named unlike the others, {} left out: {}{}", others.size(),
           others.size() == 1 ? "" : "s", others.size() == 1 ? "is" : "are",
           others.front().filename().string(), others.size() == 1 ? "" : ", ..."));
-    if (const std::int64_t repeated = recording_.repeated(); repeated > 0)
+    constexpr std::int64_t kChance = 2;
+    if (const std::int64_t repeated = recording_.repeated(); repeated > kChance)
       result.file.notes.push_back(fmt::format(
-          "{} of {} pictures repeat the one before, though the body moves: their time stamps are "
-          "wrong; was the clip converted from another rate, or did the camera stutter?",
+          "{} of {} pictures repeat the one before: unless the body was out of sight in them, "
+          "their "
+          "time stamps are wrong; was the clip converted from another rate, or did the camera "
+          "stutter?",
           repeated, frames_));
     if (recording_.info().evened)
       result.file.notes.push_back(

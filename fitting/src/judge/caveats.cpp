@@ -8,6 +8,8 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "judge/adequacy.hpp"
@@ -142,8 +144,9 @@ void tell_other_rate(const data::Scene& scene, std::span<const data::Track> trac
 }
 
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
-  constexpr double kMoon_m_s2 = 1.0, kJupiter_m_s2 = 26.0;
-  if (const double g = scene.model.gravity_m_s2; g != 0.0 && (g < kMoon_m_s2 || g > kJupiter_m_s2))
+  constexpr double kWeakest_m_s2 = 1.0, kStrongest_m_s2 = 30.0;
+  if (const double g = scene.model.gravity_m_s2;
+      g != 0.0 && (g < kWeakest_m_s2 || g > kStrongest_m_s2))
     fit.warnings.push_back(
         fmt::format("[model] gravity_m_s2 = {:g}: on earth it is 9.81; is it in m/s^2?", g));
   if (!scene.body || scene.body->kind == data::BodyKind::top || !(scene.body->radius_m > 0.0))
@@ -192,26 +195,26 @@ std::string range_words(const std::pair<double, double>& bounds) {
                                  : fmt::format("in {:g} .. {:g}", lower, upper);
 }
 
-// Bounds are approached and never reached: by a thousandth of what they leave, or of themselves.
-bool stands_at(double value, double bound, double other) {
-  constexpr double kNear = 1e-3;
-  const double size = std::isfinite(other) ? std::abs(bound - other) : std::abs(bound);
-  return std::isfinite(bound) && std::abs(value - bound) <= kNear * size;
+// Bounds are approached and never reached; on the way the error bar shrinks with the distance.
+bool stands_at(double value, double bound, double sigma) {
+  constexpr double kNear_sigmas = 2.0;
+  return std::isfinite(bound) && std::abs(value - bound) <= kNear_sigmas * sigma;
 }
 
 }  // namespace
 
-void tell_bounds(const Problem& problem, const Solution& solution, const data::Scene& scene,
-                 data::Fit& fit) {
+void tell_bounds(const Problem& problem, const Solution& solution, const Uncertainty& error,
+                 const data::Scene& scene, data::Fit& fit) {
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     const FreeParameter& free = problem.free[i];
     const auto* bounds =
         said_of(problem.predictor->parameters()[free.index].name, scene.fit.bounds);
     if (bounds == nullptr) continue;
     const double value = free.transform.value(solution.u[i]);
+    const double sigma = std::sqrt(error.covariance(i, i));
     const auto [lower, upper] = *bounds;
-    const bool low = stands_at(value, lower, upper);
-    if (low || stands_at(value, upper, lower))
+    const bool low = stands_at(value, lower, sigma);
+    if (low || stands_at(value, upper, sigma))
       fit.warnings.push_back(fmt::format(
           "{} stands at the {} bound, {:g}, that [fit] bounds give it: the track may say that it "
           "is {}, and its error bar knows nothing of that",

@@ -39,10 +39,10 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);
 void tell_given_up(const Problem& problem, data::Fit& fit);
 
 /// Values that stand at a bound under [fit].
-void tell_bounds(const Problem& problem, const Solution& solution, const data::Scene& scene,
-                 data::Fit& fit);
+void tell_bounds(const Problem& problem, const Solution& solution, const Uncertainty& error,
+                 const data::Scene& scene, data::Fit& fit);
 
-/// What [fit] holds, for where nothing fits.
+/// What [fit] holds, for where nothing fits well.
 void tell_held(const data::Scene& scene, data::Fit& fit);
 
 /// A pivot is freed in vain where there is none.

@@ -104,7 +104,7 @@ Solution settle_weights(Problem& problem, Solution solution, double fixed_tolera
 
 // Downhill by so many steps, and so many again as long as they gain: a bent valley's floor is found
 // only once the integration's noise no longer covers it.
-Solution seek_while_it_gains(const Problem& problem, const Eigen::VectorXd& u, int steps) {
+Solution minimise_while_it_gains(const Problem& problem, const Eigen::VectorXd& u, int steps) {
   constexpr double kWorth = 0.1;  // of chi-square, a third of an error bar
   constexpr int kMostRounds = 5;
   const SolveOptions options{.iterations = steps, .function_tolerance = 1e-7};
@@ -128,7 +128,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     const double coarse = problem.tolerance;
     problem.tolerance *= 1e-2;
     const int steps = affordable_steps(problem, 2.0, kMostSteps);
-    Solution finer = seek_while_it_gains(problem, solution.u, steps);
+    Solution finer = minimise_while_it_gains(problem, solution.u, steps);
     if (!finer.usable) {  // so fine a run exceeds the step limit
       problem.tolerance = coarse;
       break;
@@ -342,9 +342,10 @@ data::Fit OneFit::described(Bars bars) {
   tell_unlikely_body(scene_, fit);
   tell_other_rate(scene_, tracks_, fit);
   tell_given_up(problem_, fit);
-  tell_bounds(problem_, solution_, scene_, fit);
+  tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);
+  if (fit.verdict == "unexplained" || fit.verdict == "doubtful") tell_held(scene_, fit);
   if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;

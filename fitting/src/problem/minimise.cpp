@@ -38,9 +38,9 @@ bool all_rows(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd&
   return true;
 }
 
-class Seeker {
+class GeodesicDescent {
  public:
-  Seeker(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options)
+  GeodesicDescent(const Problem& problem, const Eigen::VectorXd& u, const SolveOptions& options)
       : problem_(problem), options_(options), damping_(1.0 / options.initial_radius), u_(u) {}
 
   Solution run() {
@@ -211,10 +211,10 @@ Solution minimise(const Problem& problem, const Eigen::VectorXd& u, const SolveO
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   const bool spin_down = problem.predictor->model_name() == "pivot";
   if (problem.arcs.size() > 1 || !(rim || spin_down)) return solve(problem, u, options);
-  if (rim) return Seeker(problem, u, options).run();
+  if (rim) return GeodesicDescent(problem, u, options).run();
   // From afar its bent steps go astray where an angle is off by turns.
   const Solution near = solve(problem, u, options);
-  return Seeker(problem, near.usable ? near.u : u, options).run();
+  return GeodesicDescent(problem, near.usable ? near.u : u, options).run();
 }
 
 }  // namespace trochoid::fitting

@@ -100,7 +100,8 @@ class _Record:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return all(_same(mine, vars(other)[name]) for name, mine in vars(self).items())
+        names = [field.name for field in dataclasses.fields(self)]
+        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
 
 
 def _toml_text(text: str) -> str:
@@ -177,6 +178,9 @@ class Scene:
 
     def __eq__(self, other: object) -> bool:
         return self.toml == other.toml if isinstance(other, Scene) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.toml)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Scene.from_toml, (self.toml,)
@@ -327,8 +331,6 @@ def _all_tracks(given: Tracks) -> tuple[list[Track], dict[str, str]]:
         return list(given.tracks), {}
     if isinstance(given, Trajectory):
         return [Track(given["t_s"], np.column_stack([given["x_m"], given["y_m"]]))], {}
-    if isinstance(given, Iterator):
-        given = list(given)
     if not isinstance(given, Sequence):
         raise InputError(f"tracks: a {type(given).__name__} is no track, track file or path")
     tracks: list[Track] = []
@@ -401,6 +403,9 @@ class Fit:
     def __eq__(self, other: object) -> bool:
         return self._value.text == other._value.text if isinstance(other, Fit) else NotImplemented
 
+    def __hash__(self) -> int:
+        return hash(self._value.text)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _fit_of_text, (self._value.text,)
 
@@ -447,6 +452,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
 
     An unwelcome answer is not an exception: look at ``converged``, ``verdict`` and ``warnings``.
     """
+    tracks = list(tracks) if isinstance(tracks, Iterator) else tracks
     values, inputs = _all_tracks(tracks)
     if scene is None and not model:
         raise InputError("fit: give a scene, or model='top' (the only one that needs no body)")
@@ -461,7 +467,8 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
                "profile": _flag("profile", profile), "bootstrap": _whole("bootstrap", bootstrap),
                "threads": _whole("threads", threads), "seed": _whole("seed", seed, most=2**64 - 1),
                "start": first_guess}
-    files = [tracks, *tracks] if isinstance(tracks, (list, tuple)) else [tracks]
+    one = isinstance(tracks, (str, Track, TrackFile, Trajectory)) or not isinstance(tracks, Sequence)
+    files = [tracks] if one else list(tracks)
     output = _output("output", output, scene, *files)
     result = Fit(_core.fit([_track_dict(t) for t in values], Scene(scene)._value,
                            _flag("compare", compare), options, inputs))

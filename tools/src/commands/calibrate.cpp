@@ -107,27 +107,39 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   }
 }
 
-// Each file once: the same picture under two names tells nothing twice.
-std::vector<fs::path> files_named(const std::vector<fs::path>& inputs) {
+// Pictures and videos, those of folders and patterns one by one.
+std::vector<fs::path> files_of(const std::vector<fs::path>& inputs) {
   std::vector<fs::path> files;
-  std::map<std::string, fs::path> by_checksum;
-  for (const fs::path& input : inputs)
-    for (const fs::path& file : tracking::files_of_recording(input)) {
-      if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-      const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(file), file);
-      if (fresh)
-        files.push_back(file);
-      else
-        note(fmt::format("{}: is the same picture as {} and counts once", file.string(),
-                         same->second.string()));
-    }
+  for (const fs::path& input : inputs) {
+    const std::vector<fs::path> some = fs::is_directory(input)
+                                           ? tracking::pictures_in(input)
+                                           : tracking::files_of_recording(input);
+    files.insert(files.end(), some.begin(), some.end());
+  }
+  for (const fs::path& file : files)
+    if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
   return files;
+}
+
+// The same picture under two names tells nothing twice.
+std::vector<fs::path> each_once(const std::vector<fs::path>& files) {
+  std::vector<fs::path> chosen;
+  std::map<std::string, fs::path> by_checksum;
+  for (const fs::path& file : files) {
+    const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(file), file);
+    if (fresh)
+      chosen.push_back(file);
+    else
+      note(fmt::format("{}: is the same picture as {} and counts once", file.string(),
+                       same->second.string()));
+  }
+  return chosen;
 }
 
 Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
   Views views;
   Progress progress("calibrate", "files");
-  const std::vector<fs::path> files = files_named(options.inputs);
+  const std::vector<fs::path> files = each_once(files_of(options.inputs));
   for (std::size_t i = 0; i < files.size(); ++i) {
     look_into(files[i], pattern, views);
     progress.update(static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(files.size()));
@@ -314,7 +326,7 @@ void check_points(const Options& options) {
 }
 
 void check_names(const Options& options) {
-  std::vector<fs::path> inputs = options.inputs;
+  std::vector<fs::path> inputs = files_of(options.inputs);
   inputs.push_back(options.floor_points);
   inputs.push_back(options.circle_points);
   check_outputs({options.picture, options.output}, inputs);

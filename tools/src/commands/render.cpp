@@ -232,6 +232,9 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
   scene.run.rate_hz *= kPerFrame;
   const model::Trajectory run = in_scene(scene_name, [&] { return model::simulate(scene); });
   tell_idle_keys(scene_name, scene);
+  if (run.values.rows() == 0)
+    throw InputError(fmt::format("{}: the start leaves nothing to draw: {} Start elsewhere",
+                                 scene_name, model::sentence(run.outcome)));
   return {run, scene.run.rate_hz};
 }
 

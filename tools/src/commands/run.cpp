@@ -7,6 +7,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "common/fit_job.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
@@ -117,6 +118,7 @@ void fit(Run& run, const Options& options) {
     return;
   }
   const bool named = run.scene.model.name != "auto";
+  run.scene = with_rows(run.scene);
   Progress progress("fit");
   fitting::FitOptions how = fit_options(options, progress);
   try {

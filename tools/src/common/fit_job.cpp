@@ -1,12 +1,26 @@
 #include "common/fit_job.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/compare.hpp"
 
 namespace trochoid::tools {
 
+data::Scene with_rows(data::Scene scene) {
+  constexpr const char* kReadout = "readout_s";
+  const auto& free = scene.fit.free;
+  const bool fitted = std::find(free.begin(), free.end(), kReadout) != free.end() ||
+                      scene.fit.prior.contains(kReadout);
+  if (fitted && !scene.camera.rows && !scene.camera.file.empty())
+    scene.camera.rows = data::read_camera(scene.camera.file).height_px;
+  return scene;
+}
+
 data::Fit fit_job(std::span<const data::Track> tracks, data::Scene scene,
                   const fitting::FitOptions& options, bool compare) {
+  scene = with_rows(std::move(scene));
   data::Fit fit;
   const bool unnamed = options.model.empty() && scene.model.name == "auto";
   if (compare || unnamed || options.model == "auto") {

@@ -82,11 +82,6 @@ std::vector<double> rows_of(const data::Track& track, const std::vector<double>&
   return rows_px;
 }
 
-double scale_of(const data::Fit& fit) {
-  const data::FitParameter* scale = fit.find("scale");
-  return scale != nullptr ? scale->value : 1.0;
-}
-
 bool models_tilt(const std::string& model) {
   return model != "puck" && model != "pivot";
 }
@@ -133,7 +128,6 @@ PredictedArc replay_arc(const std::string& model, const data::Fit& fit, const da
       run.outcome == model::Outcome::reached_end || run.outcome == model::Outcome::flat;
   if (!goes_on) replayed.ended = sentence(run.outcome);
   const auto columns = static_cast<Eigen::Index>(request.observables.size());
-  const double scale = scale_of(fit);
   for (std::size_t n = 0; n < replayed.t_s.size(); ++n) {
     const auto row = run.values.segment(static_cast<Eigen::Index>(n) * columns, columns);
     data::Pose<> pose;
@@ -142,7 +136,7 @@ PredictedArc replay_arc(const std::string& model, const data::Fit& fit, const da
       pose.phi_rad = row[3];
     }
     pose.psi_rad = row[columns - 1];
-    pose.centre_m = {row[0], row[1], scale * height_m(scene, model, fit, pose.theta_rad)};
+    pose.centre_m = {row[0], row[1], height_m(scene, model, fit, pose.theta_rad)};
     replayed.pose.push_back(pose);
   }
   return replayed;

@@ -228,7 +228,9 @@ double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vect
   }
   double size = 0.0;
   for (const auto& ray : rays) size += (ray - middle).norm() / static_cast<double>(rays.size());
-  if (!(size > 0.0)) throw InputError("the points of the rim are all the same");
+  constexpr double kLeast_px = 1.0;
+  if (!(size * camera.fx > kLeast_px))
+    throw InputError("the points of the rim lie within a pixel of each other");
   Eigen::Matrix<double, 5, 1> x;
   x << middle * (radius_m / size), 0.0, 0.0;
   const auto residuals = [&](const Eigen::Matrix<double, 5, 1>& at) {

@@ -6,16 +6,19 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -51,38 +54,15 @@ std::string pattern_of(const fs::path& picture) {
   return pattern;
 }
 
-Pictures pictures_in(const fs::path& folder) {
+/// Those of the type the folder holds most of.
+Pictures commonest_in(const fs::path& folder) {
   std::map<std::string, Pictures> by_type;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_image(entry.path()) &&
-        !entry.path().filename().string().starts_with('.'))  // a Mac's ._f1.png is none
-      by_type[lower_extension(entry.path())].push_back(entry.path());
-  if (by_type.empty())
-    throw InputError(
-        fmt::format("{}: the folder holds no images; name a video file, or a folder of images",
-                    folder.string()));
+  for (const fs::path& picture : pictures_in(folder))
+    by_type[lower_extension(picture)].push_back(picture);
   return std::max_element(
              by_type.begin(), by_type.end(),
              [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); })
       ->second;
-}
-
-/// Takes the pictures that are no part of the numbered series which most of them are: a cover, a
-/// picture of the empty floor. They would be frames, and hide the gaps of the series.
-Pictures take_strays(Pictures& pictures) {
-  std::map<std::string, std::size_t> count;
-  for (const fs::path& picture : pictures) ++count[pattern_of(picture)];
-  const auto most = std::max_element(
-      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  const std::string& usual = most->first;
-  if (usual.find('#') == std::string::npos || 2 * most->second <= pictures.size()) return {};
-  const auto strays =
-      std::stable_partition(pictures.begin(), pictures.end(),
-                            [&](const fs::path& picture) { return pattern_of(picture) == usual; });
-  Pictures taken(strays, pictures.end());
-  pictures.erase(strays, pictures.end());
-  std::sort(taken.begin(), taken.end());
-  return taken;
 }
 
 /// Those with a printf-style name.
@@ -154,6 +134,48 @@ std::optional<std::vector<std::int64_t>> numbers_of(const Pictures& pictures,
   return numbers;
 }
 
+/// Whether a number in a picture's name is one that the series lacks.
+bool may_fill_a_gap(const fs::path& stray, const Pictures& series) {
+  const std::string name = stray.stem().string();
+  if (std::none_of(name.begin(), name.end(), is_digit)) return false;
+  const auto numbers = numbers_of(series, std::nullopt);
+  if (!numbers) return true;
+  const std::set<std::int64_t> there(numbers->begin(), numbers->end());
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (!is_digit(name[i])) continue;
+    std::int64_t number = 0;
+    const auto [end, error] = std::from_chars(name.data() + i, name.data() + name.size(), number);
+    i = static_cast<std::size_t>(end - name.data());
+    if (error == std::errc() && number >= *there.begin() && number <= *there.rbegin() &&
+        !there.contains(number))
+      return true;
+  }
+  return false;
+}
+
+/// Takes the pictures that are no part of the numbered series which most of them are: a cover, a
+/// copy. They would be frames, and hide the gaps of the series. Not where one may be what a gap of
+/// the series lacks (a burst's "..._0017_COVER"), or its numbers cannot be told.
+Pictures take_strays(Pictures& pictures) {
+  std::map<std::string, std::size_t> count;
+  for (const fs::path& picture : pictures) ++count[pattern_of(picture)];
+  const auto most = std::max_element(
+      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  const std::string& usual = most->first;
+  if (usual.find('#') == std::string::npos || 2 * most->second <= pictures.size()) return {};
+  const auto strays =
+      std::stable_partition(pictures.begin(), pictures.end(),
+                            [&](const fs::path& picture) { return pattern_of(picture) == usual; });
+  Pictures taken(strays, pictures.end());
+  if (std::any_of(taken.begin(), taken.end(), [&](const fs::path& stray) {
+        return may_fill_a_gap(stray, Pictures(pictures.begin(), strays));
+      }))
+    return {};
+  pictures.erase(strays, pictures.end());
+  std::sort(taken.begin(), taken.end());
+  return taken;
+}
+
 ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std::nullopt) {
   // Numbers in names by value, for where names differ by more than one: f9, f10, cover.
   std::sort(pictures.begin(), pictures.end(), [](const fs::path& a, const fs::path& b) {
@@ -188,9 +210,23 @@ ImageSequence in_order(Pictures pictures, std::optional<std::size_t> begin = std
 
 }  // namespace
 
+Pictures pictures_in(const fs::path& folder) {
+  Pictures pictures;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && is_image(entry.path()) &&
+        !entry.path().filename().string().starts_with('.'))  // a Mac's ._f1.png is none
+      pictures.push_back(entry.path());
+  if (pictures.empty())
+    throw InputError(
+        fmt::format("{}: the folder holds no images; name a video file, or a folder of images",
+                    folder.string()));
+  std::sort(pictures.begin(), pictures.end());
+  return pictures;
+}
+
 std::optional<ImageSequence> find_image_sequence(const fs::path& path) {
   if (fs::is_directory(path)) {
-    Pictures pictures = pictures_in(path), strays = take_strays(pictures);
+    Pictures pictures = commonest_in(path), strays = take_strays(pictures);
     ImageSequence sequence = in_order(std::move(pictures));
     sequence.left_out = std::move(strays);
     return sequence;

@@ -1,5 +1,6 @@
 #include "find/repeats.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 namespace trochoid::tracking {
@@ -10,18 +11,25 @@ void Repeats::add(const cv::Mat& luma) {
   constexpr double kMoves_levels = 6.0;
   constexpr int kLongestRun = 8;  // longer, it may have been at rest
   cv::Mat now;
-  cv::resize(luma, now, {}, 1.0 / kReduced, 1.0 / kReduced, cv::INTER_AREA);
-  const double step_levels =
-      last_.size() == now.size() ? cv::norm(now, last_, cv::NORM_INF) : kMoves_levels;
-  last_ = now;
+  const cv::Size size(std::max(1, luma.cols / kReduced), std::max(1, luma.rows / kReduced));
+  cv::resize(luma, now, size, 0, 0, cv::INTER_AREA);
+  const auto differs = [&](const cv::Mat& other) {
+    return other.size() == now.size() ? cv::norm(now, other, cv::NORM_INF) : kMoves_levels;
+  };
+  const double step_levels = differs(last_);
   if (step_levels <= kSame_levels) {
     ++run_;
     return;
   }
-  if (run_ <= kLongestRun && moved_levels_ >= kMoves_levels && step_levels >= kMoves_levels)
+  // A body that turns back looks after the turn as it did before.
+  const bool moved_on = differs(before_run_) >= kMoves_levels;
+  if (run_ <= kLongestRun && moved_levels_ >= kMoves_levels && step_levels >= kMoves_levels &&
+      moved_on)
     count_ += run_;
   moved_levels_ = step_levels;
   run_ = 0;
+  before_run_ = last_;
+  last_ = now;
 }
 
 }  // namespace trochoid::tracking

@@ -13,6 +13,7 @@ class Repeats {
 
  private:
   cv::Mat last_;             ///< the picture before, reduced
+  cv::Mat before_run_;       ///< the one before those that differ by next to nothing
   double moved_levels_ = 0;  ///< how far the last picture that was none differed
   int run_ = 0;              ///< pictures since then that differ by next to nothing
   std::int64_t count_ = 0;

@@ -43,8 +43,7 @@ struct FitOptions {
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
 /// An unwelcome answer (no convergence, not identifiable, too short) is an outcome in the Fit.
 /// @throws InputError if the scene lacks what the model needs, the given start names a parameter
-/// that
-///         the model does not have, or an option is out of its range; TrackError if a track is
+///         that the model does not have, or an option is out of its range; TrackError if a track is
 ///         unusable.
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
                             const FitOptions& options = {});

@@ -73,6 +73,8 @@ class FrameSource {
 /// read and then those of its folder that are left out.  @throws InputError if a sequence has none.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_recording(
     const std::filesystem::path& path);
+/// All pictures of a folder, by name. @throws InputError if there is none.
+[[nodiscard]] std::vector<std::filesystem::path> pictures_in(const std::filesystem::path& folder);
 /// SHA-256 of a video file; of an image sequence, of the list of its pictures' own in the order
 /// they are read, one to a line.  @throws InputError if it is not there.
 [[nodiscard]] std::string sha256_of_recording(const std::filesystem::path& path);
