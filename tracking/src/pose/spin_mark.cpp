@@ -185,17 +185,18 @@ Peak find_peak(const std::vector<float>& sums, int flank) {
   return peak;
 }
 
-// The mean over `width` spokes about each: what turning while the shutter is open does to a row.
+// The mean over `half` spokes to either side of each: what turning while the shutter is open does
+// to a row.
 template <class Row>
-void smear(Row&& row, int width) {
-  if (width < 2) return;
+void smear(Row&& row, int half) {
+  if (half == 0) return;
   std::array<float, kSpokes> mean{};
-  const int before = width / 2;
+  const auto at = [&](int i) { return row[(i + kSpokes) % kSpokes]; };
   float sum = 0.0F;
-  for (int i = -before; i < width - before; ++i) sum += row[(i + kSpokes) % kSpokes];
+  for (int i = -half; i <= half; ++i) sum += at(i);
   for (int i = 0; i < kSpokes; ++i) {
-    mean[static_cast<size_t>(i)] = sum / static_cast<float>(width);
-    sum += row[(i + width - before) % kSpokes] - row[(i - before + kSpokes) % kSpokes];
+    mean[static_cast<size_t>(i)] = sum / static_cast<float>(2 * half + 1);
+    sum += at(i + half + 1) - at(i - half);
   }
   for (int i = 0; i < kSpokes; ++i) row[i] = mean[static_cast<size_t>(i)];
 }
@@ -205,7 +206,7 @@ void smear(Row&& row, int width) {
 struct Match {
   Face marks;
   std::vector<float> sums;
-  int smeared = 0;
+  int smeared = 0;  ///< spokes to either side
   Peak peak;
   double likeness = 0.0;
 };
@@ -214,7 +215,7 @@ Match match(const Face& marks, const std::vector<float>& sums, double all, int s
   Match found{marks, sums, smeared, {}, 0.0};
   for (int ring = 0; ring < kRings; ++ring) smear(found.marks.row(ring), smeared);
   smear(found.sums.data(), smeared);
-  found.peak = find_peak(found.sums, flank + smeared);
+  found.peak = find_peak(found.sums, flank + 2 * smeared);
   found.likeness = found.peak.height / std::sqrt(std::max(found.marks.squaredNorm() * all, 1e-12));
   return found;
 }
@@ -223,9 +224,9 @@ Match match(const Face& marks, const std::vector<float>& sums, double all, int s
 // nothing unless that is clearly less like them.
 Match likeliest(const Face& marks, const std::vector<float>& sums, double all, int flank) {
   constexpr double kClearly = 1.2;
-  constexpr int kMost = kSpokes / 3;  // of a turn: beyond that a mark is a ring
+  constexpr int kLeast = 3, kMost = kSpokes / 6;  // a third of a turn: beyond that a mark is a ring
   Match best = match(marks, sums, all, 0, flank);
-  for (int smeared = 6; smeared <= kMost; smeared += smeared / 3) {
+  for (int smeared = kLeast; smeared <= kMost; smeared += smeared / 3) {
     Match other = match(marks, sums, all, smeared, flank);
     if (other.likeness > (best.smeared == 0 ? kClearly : 1.0) * best.likeness)
       best = std::move(other);
