@@ -195,10 +195,13 @@ std::string range_words(const std::pair<double, double>& bounds) {
                                  : fmt::format("in {:g} .. {:g}", lower, upper);
 }
 
-// Bounds are approached and never reached; on the way the error bar shrinks with the distance.
-bool stands_at(double value, double bound, double sigma) {
-  constexpr double kNear_sigmas = 2.0;
-  return std::isfinite(bound) && std::abs(value - bound) <= kNear_sigmas * sigma;
+// Bounds are approached and never reached: near is what is little of `size` and within the error,
+// which shrinks with the distance. What nothing sees stands nowhere.
+bool stands_at(double value, double bound, double size, double sigma) {
+  constexpr double kLittle = 0.01, kNear_sigmas = 2.0;
+  const double distance = std::abs(value - bound);
+  return std::isfinite(bound) && std::isfinite(sigma) && distance <= kLittle * size &&
+         distance <= kNear_sigmas * sigma;
 }
 
 }  // namespace
@@ -213,8 +216,12 @@ void tell_bounds(const Problem& problem, const Solution& solution, const Uncerta
     const double value = free.transform.value(solution.u[i]);
     const double sigma = std::sqrt(error.covariance(i, i));
     const auto [lower, upper] = *bounds;
-    const bool low = stands_at(value, lower, sigma);
-    if (low || stands_at(value, upper, sigma))
+    const double width = upper - lower;
+    const auto size = [&](double bound) {
+      return std::isfinite(width) ? width : std::max(std::abs(bound), std::abs(free.given));
+    };
+    const bool low = stands_at(value, lower, size(lower), sigma);
+    if (low || stands_at(value, upper, size(upper), sigma))
       fit.warnings.push_back(fmt::format(
           "{} stands at the {} bound, {:g}, that [fit] bounds give it: the track may say that it "
           "is {}, and its error bar knows nothing of that",

@@ -52,7 +52,7 @@ class ArcCost : public ceres::CostFunction {
   int shared_ = 0, own_ = 0;
 };
 
-// What is known from outside, (value - prior)/sigma; or a soft_prior, the same on u itself.
+// What is known from outside, (value - prior)/sigma; or a soft prior, the same on u itself.
 class PriorCost : public ceres::CostFunction {
  public:
   PriorCost(const Transform& transform, const data::Prior& prior, int size, int entry)

@@ -75,7 +75,8 @@ struct Views {
       found.push_back(std::move(*view));
       pictures.push_back(luma);
     } else if (other_board.empty() && !pattern.marker_m) {
-      if (const auto seen = tracking::chessboard_in(luma, pattern))
+      const auto seen = tracking::chessboard_in(luma, pattern);
+      if (seen && *seen != cv::Size(pattern.columns, pattern.rows))
         other_board =
             fmt::format("the board in {} has {}x{} inner corners", name, seen->width, seen->height);
     }
