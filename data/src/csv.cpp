@@ -22,15 +22,11 @@ std::string_view without_quotes(std::string_view cell) {
   return quoted ? trimmed(cell.substr(1, cell.size() - 2)) : cell;
 }
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> cells;
-  while (cells.size() <= kMaxColumns) {
-    const auto comma = line.find(',');
-    cells.push_back(without_quotes(trimmed(line.substr(0, comma))));
-    if (comma == std::string_view::npos) break;
-    line.remove_prefix(comma + 1);
-  }
-  return cells;
+// Names hold none of these: where there is no comma, another one separates them.
+char separator_of(std::string_view names) {
+  for (const char separator : {',', ';', '\t'})
+    if (names.find(separator) != std::string_view::npos) return separator;
+  return ',';
 }
 
 void check_columns(const std::vector<std::string>& columns, const std::string& place) {
@@ -68,6 +64,7 @@ CsvReader::CsvReader(std::string_view text, std::string where)
   if (!next_content_line(line))
     throw InputError(fmt::format("{}: {}", where_,
                                  text_.empty() ? "the file is empty" : "holds no column names"));
+  separator_ = separator_of(trimmed(line));
   for (const std::string_view name : split(line)) columns_.emplace_back(name);
   check_columns(columns_, place());
 }
@@ -75,18 +72,33 @@ CsvReader::CsvReader(std::string_view text, std::string where)
 bool CsvReader::next_content_line(std::string_view& line) {
   while (position_ < text_.size()) {
     const auto end = std::min(text_.find('\n', position_), text_.size());
-    line = trimmed(text_.substr(position_, end - position_));
+    line = text_.substr(position_, end - position_);
     position_ = end + 1;
     ++line_;
-    if (line.empty()) continue;
-    if (line.front() != '#' && !line.starts_with("\"#")) return true;
-    keep_header(line);
+    const std::string_view content = trimmed(line);
+    if (content.empty()) continue;
+    if (content.front() != '#' && !content.starts_with("\"#")) return true;
+    keep_header(content);
   }
   return false;
 }
 
+// Outermost tabs are blanks unless they separate: then there is an empty cell beside them.
+std::vector<std::string_view> CsvReader::split(std::string_view line) const {
+  if (separator_ != '\t') line = trimmed(line);
+  std::vector<std::string_view> cells;
+  while (cells.size() <= kMaxColumns) {
+    const auto end = line.find(separator_);
+    cells.push_back(without_quotes(trimmed(line.substr(0, end))));
+    if (end == std::string_view::npos) break;
+    line.remove_prefix(end + 1);
+  }
+  return cells;
+}
+
 void CsvReader::keep_header(std::string_view line) {
-  while (line.ends_with(',')) line.remove_suffix(1);  // spreadsheets fill up all rows alike
+  // Spreadsheets fill up all rows alike.
+  while (line.ends_with(',') || line.ends_with(';')) line.remove_suffix(1);
   line = without_quotes(line).substr(1);
   const auto colon = line.find(": ");
   const bool has_value = colon != std::string_view::npos;
@@ -107,16 +119,43 @@ bool CsvReader::next() {
     cells_ = split(line);
   } while (cells_.size() == columns_.size() && std::all_of(cells_.begin(), cells_.end(), is_empty));
   if (cells_.size() != columns_.size())
-    throw InputError(fmt::format(
-        "{}: {} cells where the header names {} columns", place(),
-        cells_.size() > kMaxColumns ? "too many" : std::to_string(cells_.size()), columns_.size()));
+    throw InputError(fmt::format("{}: {}", place(), words_for_cells(cells_.size())));
   return true;
 }
 
-double CsvReader::number(int column) const {
+std::string CsvReader::words_for_cells(std::size_t count) const {
+  const bool decimal_commas =
+      separator_ == ',' && count > columns_.size() && count <= 2 * columns_.size();
+  return fmt::format("{} cells where the header names {} columns{}",
+                     count > kMaxColumns ? "too many" : std::to_string(count), columns_.size(),
+                     decimal_commas ? "; if its numbers have decimal commas, separate the cells, "
+                                      "their names too, by semicolons"
+                                    : "");
+}
+
+// A comma beside points would separate thousands: read as a decimal one it is wrong by a thousand.
+void CsvReader::note_decimal_mark(std::string_view cell) {
+  const auto at = cell.find_first_of(".,");
+  if (at == std::string_view::npos) return;
+  if (decimal_mark_ == '\0') decimal_mark_ = cell[at];
+  if (cell[at] != decimal_mark_)
+    throw InputError(fmt::format(
+        "{}: {} has a decimal {} where numbers before it have a {}; write all of them alike",
+        place(), in_quotes(cell), cell[at] == ',' ? "comma" : "point",
+        decimal_mark_ == ',' ? "comma" : "point"));
+}
+
+double CsvReader::number(int column) {
   if (column < 0 || cells_[column].empty()) return std::numeric_limits<double>::quiet_NaN();
   std::string_view cell = cells_[column];
   if (cell.size() > 1 && cell.front() == '+' && cell[1] != '-') cell.remove_prefix(1);
+  std::string with_point;
+  if (separator_ != ',') {
+    note_decimal_mark(cell);
+    with_point = cell;
+    std::replace(with_point.begin(), with_point.end(), ',', '.');
+    cell = with_point;
+  }
   double value = 0.0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   const bool whole = error == std::errc() && end == cell.data() + cell.size();

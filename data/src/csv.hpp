@@ -7,9 +7,12 @@
 
 namespace trochoid::data {
 
-/// Line-wise reader of comma-separated numbers below '#' header lines and one line of column names.
-/// Tolerates CRLF, a byte order mark, blanks around cells, empty lines and '#' lines anywhere,
-/// these with commas at their ends; everything else is refused with file and line.
+/// Line-wise reader of a table of numbers below '#' header lines and one line of column names.
+/// Cells are separated by commas or, where the column names are, by semicolons or tabs; then
+/// numbers may have decimal commas. Tolerates CRLF, a byte order mark, blanks around cells, empty
+/// lines and
+/// '#' lines anywhere, these with separators at their ends; everything else is refused with file
+/// and line.
 class CsvReader {
  public:
   /// Reads up to the column names. `text` must outlive the reader; `where` names the file.
@@ -28,19 +31,25 @@ class CsvReader {
   bool next();
   [[nodiscard]] std::string_view cell(int column) const { return cells_[column]; }
   /// The number in a cell, NaN if the cell is empty or the column is absent (index -1).
-  /// @throws InputError naming line and column if it is no finite number.
-  [[nodiscard]] double number(int column) const;
+  /// @throws InputError naming line and column if it is no finite number, or one with a decimal
+  ///         comma where others have points.
+  [[nodiscard]] double number(int column);
   /// "file:line" of the current row.
   [[nodiscard]] std::string place() const;
 
  private:
   bool next_content_line(std::string_view& line);
   void keep_header(std::string_view line);
+  [[nodiscard]] std::vector<std::string_view> split(std::string_view line) const;
+  void note_decimal_mark(std::string_view cell);
+  [[nodiscard]] std::string words_for_cells(std::size_t count) const;
 
   std::string_view text_;
   std::string where_;
   std::size_t position_ = 0;
   std::size_t line_ = 0;
+  char separator_ = ',';
+  char decimal_mark_ = '\0';  ///< of the numbers so far; none while all were whole
   std::vector<std::pair<std::string, std::string>> header_;
   std::vector<std::string> columns_;
   std::vector<std::string_view> cells_;

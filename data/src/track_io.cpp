@@ -60,7 +60,7 @@ struct TrackColumns {
   }
 };
 
-std::int64_t integer(const CsvReader& csv, int column, double largest) {
+std::int64_t integer(CsvReader& csv, int column, double largest) {
   const double value = csv.number(column);
   if (!(value >= 0.0 && value <= largest && value == std::floor(value)))
     throw InputError(fmt::format("{}: {} = {} must be a whole number in 0..{}", csv.place(),
@@ -68,7 +68,7 @@ std::int64_t integer(const CsvReader& csv, int column, double largest) {
   return static_cast<std::int64_t>(value);
 }
 
-std::optional<MeasuredAngle> read_angle(const CsvReader& csv, std::pair<int, int> columns,
+std::optional<MeasuredAngle> read_angle(CsvReader& csv, std::pair<int, int> columns,
                                         const AngleColumns& names) {
   const double value = csv.number(columns.first), sigma = csv.number(columns.second);
   if (std::isnan(value)) return std::nullopt;
@@ -84,7 +84,7 @@ std::optional<MeasuredAngle> read_angle(const CsvReader& csv, std::pair<int, int
   return MeasuredAngle{value, sigma};
 }
 
-TrackSample read_sample(const CsvReader& csv, const TrackColumns& columns) {
+TrackSample read_sample(CsvReader& csv, const TrackColumns& columns) {
   TrackSample sample;
   constexpr double kMaxFrame = 1e15;
   if (columns.frame >= 0 && !csv.cell(columns.frame).empty())
@@ -235,7 +235,8 @@ TrackFile read_track(const std::filesystem::path& path) {
   const TrackColumns columns(csv);
   if (!columns.sufficient())
     throw InputError(fmt::format(
-        "{}: columns {}; a track needs t_s,x_m,y_m (or t_s,x_px,y_px), separated by commas",
+        "{}: columns {}; a track needs t_s,x_m,y_m (or t_s,x_px,y_px), separated by commas, "
+        "semicolons or tabs",
         csv.place(), in_quotes(join(csv.columns(), ","))));
   std::map<int, Track> tracks;
   while (csv.next()) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <clocale>
 #include <cmath>
 #include <locale>
@@ -168,6 +169,27 @@ TEST(TrackFile, SavedByASpreadsheetMayHaveQuotesRoundItsCellsAndEmptyRows) {
   EXPECT_EQ(file.tracks[0].samples[1].centre_m, Eigen::Vector2d(3, 4));
 }
 
+// Where commas are decimal, spreadsheets separate by semicolons, or by tabs.
+TEST(TrackFile, MayHaveDecimalCommasWhereSemicolonsOrTabsSeparate) {
+  const TestFolder folder;
+  for (const char separator : {';', '\t'}) {
+    std::string text =
+        "# source: made by Anna, by "
+        "hand;;;\n\"t_s\";x_m;y_m;quality\n0;1,5;-2e-1;\n0,5;3;4,25;1\n;;;\n";
+    std::replace(text.begin() + text.find('\n'), text.end(), ';', separator);
+    const TrackFile file = read_track(folder.write("european.csv", text));
+    EXPECT_EQ(file.source, "made by Anna, by hand");
+    const auto& samples = file.tracks.at(0).samples;
+    ASSERT_EQ(samples.size(), 2U);
+    EXPECT_EQ(samples[0].centre_m, Eigen::Vector2d(1.5, -0.2));
+    EXPECT_TRUE(std::isnan(samples[0].quality));
+    EXPECT_EQ(samples[1].t_s, 0.5);
+    EXPECT_EQ(samples[1].centre_m, Eigen::Vector2d(3, 4.25));
+  }
+  const TrackFile points = read_track(folder.write("points.csv", "t_s;x_m;y_m\n0;1.5;2\n"));
+  EXPECT_EQ(points.tracks.at(0).samples[0].centre_m, Eigen::Vector2d(1.5, 2));
+}
+
 TEST(TrackFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
   const TestFolder folder;
   const TrackFile read =
@@ -232,7 +254,10 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"NoRows", "t_s,x_m,y_m\n", ":", "no samples"},
         Refusal{"NoColumnNames", "0,1,2\n1,2,3\n", ":1:", "first line must name the columns"},
         Refusal{"NoPlace", "t_s,z_m\n0,1\n", ":1:", "needs t_s,x_m,y_m"},
-        Refusal{"Semicolons", "t_s;x_m;y_m\n0;1;2\n", ":1:", "separated by commas"},
+        Refusal{"SemicolonsInRowsAlone", "t_s,x_m,y_m\n0;1;2\n", ":2:", "1 cells where the header"},
+        Refusal{"ThousandsComma", "t_s;x_m;y_m\n0;0.5;1,234\n",
+                ":2:", "'1,234' has a decimal comma where numbers before it have a point"},
+        Refusal{"ThousandsPoint", "t_s;x_m;y_m\n0;1;1.234,5\n", ":2:", "not a finite number"},
         Refusal{"DoubledColumn", "t_s,x_m,y_m,x_m\n0,1,2,3\n", ":1:", "twice"},
         Refusal{"NamelessColumn", "t_s,x_m,y_m,\n0,1,2,3\n", ":1:", "no name"},
         Refusal{"Unsorted", "t_s,x_m,y_m\n0.25,1,2\n0.20,1,2\n",
@@ -244,8 +269,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"Words", "t_s,x_m,y_m\n0,1,hello\n", ":2:", "'hello'"},
         Refusal{"HalfNumber", "t_s,x_m,y_m\n0,1,2.5mm\n", ":2:", "'2.5mm'"},
         Refusal{"Hexadecimal", "t_s,x_m,y_m\n0,1,0x10\n", ":2:", "'0x10'"},
-        Refusal{"DecimalComma", "t_s,x_m,y_m\n0,1,2,5\n",
-                ":2:", "4 cells where the header names 3"},
+        Refusal{"DecimalComma", "t_s,x_m,y_m\n0,1,2,5\n", ":2:",
+                "4 cells where the header names 3 columns; if its numbers have decimal commas, "
+                "separate the cells, their names too, by semicolons"},
         Refusal{"ShortRow", "t_s,x_m,y_m\n0,1,2\n1,2\n", ":3:", "2 cells where the header names 3"},
         Refusal{"NoTime", "t_s,x_m,y_m\n,1,2\n", ":2:", "t_s is empty"},
         Refusal{"NoPlaceInRow", "t_s,x_m,y_m\n0,,\n", ":2:", "neither x_m,y_m nor x_px,y_px"},
