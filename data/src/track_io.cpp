@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <map>
 
@@ -60,6 +61,17 @@ struct TrackColumns {
   }
 };
 
+/// Nothing was seen in a row whose places are all empty, or NaN as other tools write it.
+bool gives_no_place(const CsvReader& csv, const TrackColumns& columns) {
+  const auto unknown = [&](int column) {
+    constexpr std::string_view kNaN = "nan";
+    const std::string_view cell = column < 0 ? std::string_view() : csv.cell(column);
+    return cell.empty() || std::equal(cell.begin(), cell.end(), kNaN.begin(), kNaN.end(),
+                                      [](unsigned char a, char b) { return std::tolower(a) == b; });
+  };
+  return unknown(columns.x) && unknown(columns.y) && unknown(columns.x_px) && unknown(columns.y_px);
+}
+
 std::int64_t integer(CsvReader& csv, int column, double largest) {
   const double value = csv.number(column);
   if (!(value >= 0.0 && value <= largest && value == std::floor(value)))
@@ -109,9 +121,6 @@ TrackSample read_sample(CsvReader& csv, const TrackColumns& columns) {
           fmt::format("{}: {} is given without {}; give both or neither", csv.place(),
                       std::isnan(places[i].x()) ? kPlaces[i].second : kPlaces[i].first,
                       std::isnan(places[i].x()) ? kPlaces[i].first : kPlaces[i].second));
-  if (!sample.centre_m.allFinite() && !sample.centre_px.allFinite())
-    throw InputError(fmt::format(
-        "{}: the row gives neither x_m,y_m nor x_px,y_px; leave the row out", csv.place()));
   return sample;
 }
 
@@ -239,9 +248,14 @@ TrackFile read_track(const std::filesystem::path& path) {
         "semicolons or tabs",
         csv.place(), in_quotes(join(csv.columns(), ","))));
   std::map<int, Track> tracks;
-  while (csv.next()) {
+  std::size_t rows = 0, left_out = 0;
+  for (; csv.next(); ++rows) {
     const int object =
         columns.object < 0 ? 0 : static_cast<int>(integer(csv, columns.object, kMaxObject));
+    if (gives_no_place(csv, columns)) {
+      ++left_out;
+      continue;
+    }
     Track& track = tracks[object];
     track.object = object;
     const TrackSample sample = read_sample(csv, columns);
@@ -250,7 +264,12 @@ TrackFile read_track(const std::filesystem::path& path) {
   }
   TrackFile file;
   read_header(csv, where, file);
-  if (tracks.empty()) throw InputError(fmt::format("{}: holds no samples", where));
+  if (tracks.empty())
+    throw InputError(
+        fmt::format("{}: holds no samples{}", where, rows == 0 ? "" : ": no row gives a position"));
+  if (left_out > 0)
+    file.notes.push_back(
+        fmt::format("{} of {} rows give no position and are left out: gaps", left_out, rows));
   for (auto& [object, track] : tracks) file.tracks.push_back(std::move(track));
   return file;
 }

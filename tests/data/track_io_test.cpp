@@ -190,6 +190,16 @@ TEST(TrackFile, MayHaveDecimalCommasWhereSemicolonsOrTabsSeparate) {
   EXPECT_EQ(points.tracks.at(0).samples[0].centre_m, Eigen::Vector2d(1.5, 2));
 }
 
+TEST(TrackFile, LeavesOutAndCountsTheRowsThatGiveNoPosition) {
+  const TestFolder folder;
+  const TrackFile file = read_track(
+      folder.write("seen_late.csv", "t_s,x_m,y_m\n0,nan,NaN\n0.1,,\n0.2,1,2\n0.4,3,4\n"));
+  ASSERT_EQ(file.tracks.at(0).samples.size(), 2U);
+  EXPECT_EQ(file.tracks[0].samples[0].t_s, 0.2);
+  EXPECT_EQ(file.notes,
+            std::vector<std::string>{"2 of 4 rows give no position and are left out: gaps"});
+}
+
 TEST(TrackFile, MayHaveLinesThatEndInCarriageReturnsAlone) {
   const TestFolder folder;
   const TrackFile read =
@@ -274,7 +284,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "separate the cells, their names too, by semicolons"},
         Refusal{"ShortRow", "t_s,x_m,y_m\n0,1,2\n1,2\n", ":3:", "2 cells where the header names 3"},
         Refusal{"NoTime", "t_s,x_m,y_m\n,1,2\n", ":2:", "t_s is empty"},
-        Refusal{"NoPlaceInRow", "t_s,x_m,y_m\n0,,\n", ":2:", "neither x_m,y_m nor x_px,y_px"},
+        Refusal{"NoPlaceInAnyRow", "t_s,x_m,y_m\n0,,\n1,nan,NaN\n", ":", "no row gives a position"},
         Refusal{"HalfPlace", "t_s,x_m,y_m,x_px,y_px\n0,1,,5,6\n",
                 ":2:", "x_m is given without y_m"},
         Refusal{"HalfPlaceAlone", "t_s,x_m,y_m\n0,,2\n", ":2:", "y_m is given without x_m"},

@@ -246,6 +246,24 @@ class Fit(unittest.TestCase):
             with self.assertRaisesRegex(trochoid.InputError, "was not fitted to .*other.csv"):
                 trochoid.predict(fit, other)
 
+    def test_samples_without_a_position_are_gaps_and_counted(self):
+        track, seen = noisy_track(), noisy_track()
+        track.centre_m[:3] = track.centre_m[100:110] = np.nan
+        kept = np.isfinite(track.centre_m[:, 0])
+        for name in ("t_s", "centre_m", "covariance_m2"):
+            setattr(seen, name, getattr(seen, name)[kept])
+        fit, of_seen = trochoid.fit(track, model="top"), trochoid.fit(seen, model="top")
+        self.assertEqual(fit.time_origin_s, seen.t_s[0])
+        self.assertEqual(fit["l_m"].value, of_seen["l_m"].value)
+        self.assertEqual(fit.arcs[0].samples, int(kept.sum()))
+        self.assertIn("13 of 301 samples give no position and are left out: gaps", fit.warnings)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "nan.csv"
+            np.savetxt(path, np.column_stack([track.t_s, track.centre_m]), delimiter=",",
+                       header="t_s,x_m,y_m", comments="")
+            self.assertEqual(trochoid.read_track(path).notes,
+                             ["13 of 301 rows give no position and are left out: gaps"])
+
     def test_a_fit_is_replayed_close_to_its_track(self):
         track = noisy_track()
         arc, = trochoid.predict(trochoid.fit(track, model="top"), track)

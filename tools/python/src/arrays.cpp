@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -73,6 +74,15 @@ void set_angles(const py::dict& arrays, const std::string& where, data::Track& t
         track.samples[static_cast<std::size_t>(i)].*(angle.member) =
             MeasuredAngle{values->at(i), sigmas->at(i)};
   }
+}
+
+/// Rows without a position are gaps, as in a file, unless the track is of angles alone.
+void leave_out_gaps(data::Track& track) {
+  const auto has_place = [](const TrackSample& sample) {
+    return !sample.centre_m.array().isNaN().all() || !sample.centre_px.array().isNaN().all();
+  };
+  if (!std::any_of(track.samples.begin(), track.samples.end(), has_place)) return;
+  std::erase_if(track.samples, [&](const TrackSample& sample) { return !has_place(sample); });
 }
 
 }  // namespace
@@ -155,6 +165,7 @@ data::Track track_of(const py::dict& arrays, const std::string& where) {
   }
   set_angles(arrays, where, track);
   data::check(track, where);
+  leave_out_gaps(track);
   return track;
 }
 

@@ -1,3 +1,4 @@
+#include <fmt/core.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -58,6 +59,16 @@ SceneValue scene_of_tables(const std::string& toml, const std::vector<std::strin
   }
 }
 
+/// A word about samples that were no measurement; empty if all were.
+std::string left_out_words(const py::list& given, const std::vector<data::Track>& tracks) {
+  std::size_t samples = 0, kept = 0;
+  for (const py::handle track : given) samples += py::len(track["t_s"]);
+  for (const data::Track& track : tracks) kept += track.samples.size();
+  if (samples == kept) return {};
+  return fmt::format("{} of {} samples give no position and are left out: gaps", samples - kept,
+                     samples);
+}
+
 data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
               const py::dict& options, const std::map<std::string, std::string>& inputs) {
   const std::vector<data::Track> values = tracks_of(tracks);
@@ -78,6 +89,8 @@ data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
     result = tools::fit_job(values, scene.scene, how, compare);
   });
   result.inputs = inputs;
+  if (std::string words = left_out_words(tracks, values); !words.empty())
+    result.warnings.push_back(std::move(words));
   return result;
 }
 

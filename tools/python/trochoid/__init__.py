@@ -195,7 +195,8 @@ def scenes() -> dict[str, str]:
 class Track(_Record):
     """The path of one body; n samples, strictly increasing in time; frames without the body have none.
 
-    Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN.
+    Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN; samples
+    without a position are gaps, which `fit` leaves out and counts among its ``warnings``.
     """
 
     t_s: np.ndarray                                #: (n,) presentation time [s]

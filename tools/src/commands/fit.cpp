@@ -135,11 +135,14 @@ void tell_odd_units(const std::string& path, const data::Track& track) {
     note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 
-std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance) {
+/// @param remarks what the files note about their tracks.
+std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance,
+                                     std::vector<std::string>& remarks) {
   std::vector<data::Track> tracks;
   std::map<std::string, std::string> by_checksum;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
+    for (const std::string& line : file.notes) remarks.push_back(path + ": " + line);
     const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(path), path);
     if (!fresh)
       throw InputError(
@@ -191,7 +194,8 @@ void run(const FitCommand& command) {
   check_output(command.output, inputs);
   static_cast<void>(data::parse_window(command.options.from, command.options.to));
   data::Fit provenance;
-  const std::vector<data::Track> tracks = read_tracks(command, provenance);
+  std::vector<std::string> remarks;
+  const std::vector<data::Track> tracks = read_tracks(command, provenance, remarks);
   data::Scene scene;
   if (!command.scene.empty()) {
     scene = load_scene(command.scene);
@@ -206,6 +210,7 @@ void run(const FitCommand& command) {
     fmt::print("{}", data::fit_text(fit, "fit"));
   else
     print(fit);
+  for (const std::string& line : remarks) note(line);
   if (!fit.converged)
     throw NotGood(
         fmt::format("the fit is not good: {}{}", fit.reason, advice(fit, scene, command.options)));
