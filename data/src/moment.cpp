@@ -52,4 +52,18 @@ Window parse_window(const std::string& from, const std::string& to) {
   return window;
 }
 
+Window parse_recording_window(const std::string& from, const std::string& to) {
+  const Window window = parse_window(from, to);
+  const auto check = [](const char* name, const std::optional<Moment>& moment) {
+    if (moment && moment->t_s.value_or(0.0) < 0.0)
+      throw InputError(fmt::format(
+          "{} = {:g} lies before the recording: its times are counted from its first picture on, "
+          "at 0 s",
+          name, *moment->t_s));
+  };
+  check("from", window.from);
+  check("to", window.to);
+  return window;
+}
+
 }  // namespace trochoid::data

@@ -180,6 +180,18 @@ TEST_F(FrameSourceTest, AWindowKeepsIndexAndTimeOfTheWholeFile) {
     EXPECT_THAT(error_of(clip, reversed), HasSubstr("exchange them"));
 }
 
+TEST_F(FrameSourceTest, AWindowHoldsSomeOfTheRecordingOrIsRefused) {
+  const fs::path clip = write_clip("clip.mp4", "mp4v", 10.0);
+  EXPECT_THAT(error_of(clip, {.from = "-1"}), HasSubstr("from = -1 lies before the recording"));
+  EXPECT_THAT(error_of(clip, {.to = "-0.1"}), HasSubstr("to = -0.1 lies before the recording"));
+  EXPECT_THAT(error_of(clip, {.from = "99"}),
+              HasSubstr(fmt::format("no picture lies from = 99: frame {}, at {:g} s, is the last",
+                                    kFrames - 1, 0.1 * (kFrames - 1))));
+  EXPECT_THAT(
+      error_of(clip, {.from = "f5", .to = "0.2"}),
+      HasSubstr("no picture lies from = f5 to = 0.2: frame 3, at 0.3 s, lies between them"));
+}
+
 TEST_F(FrameSourceTest, DecodingAheadChangesNothing) {
   const fs::path clip = write_clip("clip.mp4", "avc1", 25.0);
   const auto plain = open_video(clip);

@@ -362,7 +362,7 @@ void check_run(const std::vector<std::string>& words) {
   const bool numbered = options->video.find('%') != std::string::npos;  // img/%04d.png
   if (!numbered && !fs::exists(options->video))
     throw InputError(fmt::format("{}: no such file", options->video));
-  (void)data::parse_window(options->from, options->to);
+  (void)data::parse_recording_window(options->from, options->to);
   (void)prepared(*options);
 }
 

@@ -4,9 +4,21 @@
 #include <utility>
 
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/moment.hpp"
 #include "trochoid/fitting/compare.hpp"
 
 namespace trochoid::tools {
+namespace {
+
+/// Times below 0 are those of a track that counts from an event.
+void check_window(std::span<const data::Track> tracks, const fitting::FitOptions& options) {
+  for (const data::Track& track : tracks)
+    for (const data::TrackSample& sample : track.samples)
+      if (sample.t_s < 0.0) return;
+  (void)data::parse_recording_window(options.from, options.to);
+}
+
+}  // namespace
 
 data::Scene with_rows(data::Scene scene) {
   constexpr const char* kReadout = "readout_s";
@@ -20,6 +32,7 @@ data::Scene with_rows(data::Scene scene) {
 
 data::Fit fit_job(std::span<const data::Track> tracks, data::Scene scene,
                   const fitting::FitOptions& options, bool compare) {
+  check_window(tracks, options);
   scene = with_rows(std::move(scene));
   data::Fit fit;
   const bool unnamed = options.model.empty() && scene.model.name == "auto";

@@ -54,7 +54,8 @@ std::string as_frame(const FrameTimes& times, const std::string& text, bool is_f
   const auto moment = data::parse_moment(text);
   if (!moment || !moment->t_s) return text;
   const auto at = times.frame_at(*moment->t_s);
-  if (!at) return text;
+  // A time below 0 is one of a track that counts from an event, or none at all.
+  if (!at || (*moment->t_s < 0.0 && *at < 0.0)) return text;
   constexpr double kRounding = 1e-4;  // of a frame
   const double frame = is_first ? std::ceil(*at - kRounding) : std::floor(*at + kRounding);
   return fmt::format("f{:.0f}", std::max(0.0, frame));
@@ -250,8 +251,6 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
     written.t_s.push_back(t_s);
     progress.update(static_cast<std::int64_t>(written.frame.size()), info.frames);
   }
-  if (written.frame.empty())
-    throw InputError(fmt::format("{}: no frame between from and to", input.video.string()));
   overlay.finish();
   overlay.commit();
   return written;

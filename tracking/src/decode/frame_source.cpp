@@ -83,7 +83,7 @@ class LibavSource final : public FrameSource {
   LibavSource(const fs::path& path, const SourceOptions& options)
       : name_(path.string()),
         options_(options),
-        window_(data::parse_window(options.from, options.to)) {
+        window_(data::parse_recording_window(options.from, options.to)) {
     av_log_set_level(AV_LOG_QUIET);  // what went wrong is said in our own words
     open_container(path);
     open_decoder();
@@ -102,16 +102,22 @@ class LibavSource final : public FrameSource {
       ++frames_read_;
       const std::int64_t place_before = std::exchange(place_, place(frame.index));
       frame.missing_before = place_ - place_before - 1;
-      frame.t_s = presentation_time_s();
+      last_s_ = frame.t_s = presentation_time_s();
+      last_index_ = frame.index;
       if (after(window_.to, frame)) {
         finished_ = true;
+        check_any_chosen(false);
         return std::nullopt;
       }
       if (before(window_.from, frame)) continue;
       convert(frame);
+      any_chosen_ = true;
       return frame;
     }
-    if (!finished_) check_whole();
+    if (!finished_) {
+      check_whole();
+      check_any_chosen(true);
+    }
     finished_ = true;
     return std::nullopt;
   }
@@ -391,6 +397,17 @@ class LibavSource final : public FrameSource {
           length_s));
   }
 
+  /// Whoever asks for a part of a recording wants some of it.
+  void check_any_chosen(bool at_end) const {
+    if (any_chosen_) return;
+    const auto words = [](const char* name, const std::string& moment) {
+      return moment.empty() ? "" : fmt::format(" {} = {}", name, moment);
+    };
+    fail(fmt::format("no picture lies{}{}: frame {}, at {:.4g} s, {}", words("from", options_.from),
+                     words("to", options_.to), last_index_, last_s_,
+                     at_end ? "is the last" : "lies between them"));
+  }
+
   std::string name_;
   SourceOptions options_;
   data::Window window_;
@@ -407,6 +424,9 @@ class LibavSource final : public FrameSource {
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself
   std::int64_t frames_read_ = 0;
+  std::int64_t last_index_ = 0;  ///< of the picture that was decoded last
+  double last_s_ = 0.0;          ///< its time
+  bool any_chosen_ = false;      ///< of the window
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   double steady_rate_hz_ = 0.0;  ///< 0 = stamps do not tell of a lost picture
   std::int64_t place_ = -1;      ///< in time, of the picture that was decoded last

@@ -1,7 +1,5 @@
 #include "find/recording.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -57,8 +55,6 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
     bytes += bytes_of(*frame);
     window_.push_back(std::move(*frame));
   }
-  if (window_.empty())
-    throw InputError(fmt::format("{}: no frame between from and to", path_.string()));
   return fresh > 0;
 }
 

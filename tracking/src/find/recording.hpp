@@ -29,7 +29,7 @@ class Recording {
   /// Lets all but the last `keep` frames of the window go and reads on until it is full again.
   /// `each`, if given, sees every new frame as it comes.
   /// @return false if nothing followed: the window is then as it was.
-  /// @throws InputError if the first window holds no frame, and as FrameSource::next does.
+  /// @throws InputError as FrameSource::next does.
   bool advance(std::size_t keep, const std::function<void(const Frame&)>& each = {});
   /// Pictures for the background: from the window and, where that is not all, from the windows
   /// before it and the frames of the file that decode alone.

@@ -27,5 +27,7 @@ struct Window {
 /// @throws InputError if one is no moment or they are reversed; it calls them `from` and `to`, as
 /// options, scenes and Python do.
 [[nodiscard]] Window parse_window(const std::string& from, const std::string& to);
+/// The same of a recording, whose times are counted from its first picture on: none is below 0.
+[[nodiscard]] Window parse_recording_window(const std::string& from, const std::string& to);
 
 }  // namespace trochoid::data

@@ -62,11 +62,12 @@ class FrameSource {
   /// Next frame, or nothing at the end. Each returned frame owns its pixels.
   /// @throws InputError if the file breaks off before its promised end, or a picture of a series
   ///         cannot be decoded, has another size or was taken with the camera held another way; the
-  ///         message says where.
+  ///         message says where. Also if no picture lies between from and to.
   [[nodiscard]] virtual std::optional<Frame> next() = 0;
 };
 
-/// @throws InputError (missing, not a video, no picture stream) before any frame is handed out.
+/// @throws InputError (missing, not a video, no picture stream, no moments of a recording) before
+/// any frame is handed out.
 [[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,
                                                       const SourceOptions& options = {});
 /// The files that hold a recording: itself, or the pictures of a sequence in the order they are
