@@ -1,5 +1,6 @@
 #include "trochoid/tracking/frame_source.hpp"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -87,6 +87,20 @@ fs::path filled_in(std::string text, const fs::path& video, const fs::path& base
   return text.empty() ? fs::path() : base / text;
 }
 
+/// A scene's or camera's name holds no words in braces but those that are filled in.
+void check_placeholders(const fs::path& manifest, const toml::node& node, const char* key,
+                        const std::string& text) {
+  for (std::size_t open = text.find('{'); open != std::string::npos;
+       open = text.find('{', open + 1)) {
+    const std::string word = text.substr(open, text.find('}', open) - open + 1);
+    if (word != "{stem}" && word != "{folder}")
+      fail(manifest, node,
+           fmt::format("{} = '{}': {} stands for nothing; {{stem}} and {{folder}} are the "
+                       "recording's",
+                       key, text, word));
+  }
+}
+
 std::string unique_name(const fs::path& video, std::set<std::string>& taken) {
   std::string name = recording_name(video);
   if (taken.contains(name)) name = video.parent_path().filename().string() + "_" + name;
@@ -107,6 +121,8 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
     const toml::node* node = table.get(key);
     return node == nullptr ? std::string() : text_of(campaign.manifest, *node, key);
   };
+  for (const char* key : {"scene", "camera"})
+    if (table.contains(key)) check_placeholders(campaign.manifest, *table.get(key), key, text(key));
   std::string named = text("video");
   while (named.size() > 1 && named.back() == '/') named.pop_back();  // a folder of pictures
   const std::vector<fs::path> videos = expanded(base / named);
