@@ -228,6 +228,13 @@ class Fit(unittest.TestCase):
         with self.assertRaisesRegex(AttributeError, "a Fit has no attribute 'chi'"):
             fit.chi
 
+    def test_a_fit_is_one_object_to_numpy_like_a_dict(self):
+        fit = trochoid.fit(noisy_track(), model="top")
+        self.assertEqual(np.array(fit).shape, ())
+        self.assertIs(np.array([fit, fit], dtype=object)[1], fit)
+        with self.assertRaises((TypeError, ValueError)):
+            np.array(fit, dtype=float)
+
     def test_a_simulated_motion_is_fitted_as_a_track_of_it(self):
         run = trochoid.simulate(TOP)
         of_run = trochoid.fit(run, model="top")

@@ -384,6 +384,12 @@ class Fit:
         except KeyError:
             raise KeyError(f"{name}; there are {', '.join(parameters)}") from None
 
+    def __array__(self, dtype: Any = None, copy: Optional[bool] = None) -> np.ndarray:
+        """One object, as numpy takes a dict; by itself numpy would make a list of the names."""
+        one = np.empty((), dtype=object)
+        one[()] = self
+        return one
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or not hasattr(self._value, name):
             raise AttributeError(f"a Fit has no attribute {name!r}")
