@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <random>
+#include <string>
 
 #include "trochoid/data/error.hpp"
 
@@ -117,6 +118,17 @@ TEST(CameraSize, ThatIsNotTheRecordingsIsRefusedWithBothNames) {
     EXPECT_STREQ(error.what(),
                  "lens.json: the camera is for 640 x 480 pictures, ring.mp4 has 1280 x "
                  "720; calibrate the camera at this size");
+  }
+  try {
+    camera.check_size(1280, 960, "ring.mp4");
+    FAIL() << "it is another size";
+  } catch (const InputError& error) {
+    // Pixel centres are whole numbers: half the old picture's width, 319.5, becomes 639.5.
+    EXPECT_TRUE(std::string(error.what())
+                    .ends_with("has 1280 x 960; calibrate the camera at this size, or if it is the "
+                               "same view scaled, nothing cut off, write a camera file with width "
+                               "1280, height 960, fx 4000, fy 4000, cx 639.5, cy 479.5"))
+        << error.what();
   }
   camera.width_px = 0;  // not known
   EXPECT_NO_THROW(camera.check_size(1280, 720, "ring.mp4"));

@@ -108,10 +108,17 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   }
 }
 
-// Pictures and videos, those of folders and patterns one by one.
-std::vector<fs::path> files_of(const std::vector<fs::path>& inputs) {
+// Whether a picture is called as --floor has it: by its path, or its name alone.
+bool is_called(const std::string& name, const fs::path& wanted) {
+  const fs::path plain = wanted.lexically_normal();
+  return fs::path(name).lexically_normal() == plain || fs::path(name).filename() == plain;
+}
+
+// Pictures and videos, those of folders and patterns one by one; first the picture of the floor, if
+// it is none of them.
+std::vector<fs::path> files_of(const Options& options) {
   std::vector<fs::path> files;
-  for (const fs::path& input : inputs) {
+  for (const fs::path& input : options.inputs) {
     const std::vector<fs::path> some = fs::is_directory(input)
                                            ? tracking::pictures_in(input)
                                            : tracking::files_of_recording(input);
@@ -119,6 +126,12 @@ std::vector<fs::path> files_of(const std::vector<fs::path>& inputs) {
   }
   for (const fs::path& file : files)
     if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
+  const fs::path floor = options.floor;
+  std::error_code ignored;
+  const bool apart = std::none_of(files.begin(), files.end(), [&](const fs::path& file) {
+    return is_called(file.string(), floor) || fs::equivalent(file, floor, ignored);
+  });
+  if (apart && fs::is_regular_file(floor, ignored)) files.insert(files.begin(), floor);
   return files;
 }
 
@@ -140,7 +153,7 @@ std::vector<fs::path> each_once(const std::vector<fs::path>& files) {
 Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
   Views views;
   Progress progress("calibrate", "files");
-  const std::vector<fs::path> files = each_once(files_of(options.inputs));
+  const std::vector<fs::path> files = each_once(files_of(options));
   for (std::size_t i = 0; i < files.size(); ++i) {
     look_into(files[i], pattern, views);
     progress.update(static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(files.size()));
@@ -200,12 +213,8 @@ std::size_t worst_view(const tracking::Calibration& result) {
 
 std::size_t floor_view(const Options& options, const Views& views) {
   if (options.floor.empty()) return 0;
-  for (std::size_t i = 0; i < views.found.size(); ++i) {
-    const std::string& name = views.found[i].name;
-    const fs::path wanted = fs::path(options.floor).lexically_normal();
-    if (fs::path(name).lexically_normal() == wanted || fs::path(name).filename() == wanted)
-      return i;
-  }
+  for (std::size_t i = 0; i < views.found.size(); ++i)
+    if (is_called(views.found[i].name, options.floor)) return i;
   throw InputError(fmt::format(
       "--floor {}: no picture of this name shows the board whole; is it among the pictures?",
       options.floor));
@@ -327,7 +336,7 @@ void check_points(const Options& options) {
 }
 
 void check_names(const Options& options) {
-  std::vector<fs::path> inputs = files_of(options.inputs);
+  std::vector<fs::path> inputs = files_of(options);
   inputs.push_back(options.floor_points);
   inputs.push_back(options.circle_points);
   check_outputs({options.picture, options.output}, inputs);
