@@ -1,6 +1,7 @@
 """The Python package against closed forms, planted parameters and a bundled recording."""
 
 import _thread
+import concurrent.futures
 import inspect
 import json
 import os
@@ -389,10 +390,39 @@ class Recording(unittest.TestCase):
             signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, before)
 
-    def test_control_c_ends_tracking(self):
-        threading.Timer(0.2, _thread.interrupt_main).start()
-        with self.assertRaises(KeyboardInterrupt):
-            trochoid.track(SAMPLE / "video.mp4")
+    def test_control_c_ends_tracking_at_once_wherever_it_is(self):
+        for after_s in (0.2, 0.6, 1.2):  # reading, in the first look, going over it again
+            pressed = []
+
+            def press():
+                pressed.append(time.monotonic())
+                _thread.interrupt_main()
+
+            threading.Timer(after_s, press).start()
+            with self.subTest(after_s), tempfile.TemporaryDirectory() as folder:
+                with self.assertRaises(KeyboardInterrupt):
+                    trochoid.track(SAMPLE / "video.mp4", SAMPLE / "scene.toml", effort="exact",
+                                   edges=os.path.join(folder, "edges.csv"),
+                                   output=os.path.join(folder, "track.csv"))
+                self.assertLess(time.monotonic() - pressed[0], 1.0)  # 0.1 s where nothing else runs
+                self.assertEqual(os.listdir(folder), [])
+
+    def test_control_c_ends_what_an_executor_s_threads_have_begun(self):
+        handler = signal.getsignal(signal.SIGINT)
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            futures = [pool.submit(trochoid.track, SAMPLE / "video.mp4", SAMPLE / "scene.toml",
+                                   effort="exact") for _ in range(2)]
+            with self.assertRaises(KeyboardInterrupt):
+                threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+                futures[0].result()
+            pressed = time.monotonic()
+            for future in futures:
+                self.assertIsInstance(future.exception(), KeyboardInterrupt)
+            self.assertLess(time.monotonic() - pressed, 1.0)
+        self.assertIs(signal.getsignal(signal.SIGINT), handler)
+        with self.assertRaises(KeyboardInterrupt):  # as before
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
 
     def test_what_is_no_recording_is_an_input_error(self):
         with self.assertRaisesRegex(trochoid.InputError, "no_such.mp4"):

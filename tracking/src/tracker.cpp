@@ -8,6 +8,7 @@
 
 #include "find/body_search.hpp"
 #include "find/recording.hpp"
+#include "find/stoppable_finder.hpp"
 #include "geometry/pose_motion.hpp"
 #include "link/attitude_sequence.hpp"
 #include "link/chroma_site.hpp"
@@ -50,7 +51,7 @@ class Tracking {
         scene_(scene),
         options_(options),
         objects_(std::max(options.objects, scene.tracking.objects)),
-        recording_(video, source_options(scene, options), options.held_bytes),
+        recording_(video, source_options(scene, options), options.held_bytes, options.checkpoint),
         camera_(resolve_camera(scene, camera, recording_.info(), video)) {
     if (camera_ && scene.camera.transfer) camera_->transfer = *scene.camera.transfer;
     if (objects_ < 1) throw InputError("the number of objects must be at least 1");
@@ -80,12 +81,15 @@ class Tracking {
   }
 
   void choose_finder() {
-    if (has_shape(scene_) && camera_) {
-      finder_ = make_cylinder_finder(*scene_.body, scene_.support, *camera_, exposure_fraction(),
-                                     options_.effort);
-      return;
-    }
-    finder_ = make_rim_finder();
+    finder_ = has_shape(scene_) && camera_
+                  ? make_stoppable(make_cylinder_finder(*scene_.body, scene_.support, *camera_,
+                                                        exposure_fraction(), options_.effort),
+                                   options_.checkpoint)
+                  : rim_finder();
+  }
+
+  [[nodiscard]] std::unique_ptr<BodyFinder> rim_finder() const {
+    return make_stoppable(make_rim_finder(), options_.checkpoint);
   }
 
   [[nodiscard]] double exposure_fraction() const {
@@ -116,7 +120,7 @@ class Tracking {
   void tell_other_size() {
     constexpr double kClearly = 1.5;  // more than an oblique view makes of a right size
     if (camera_moved_ || !camera_ || !has_shape(scene_)) return;
-    const auto seed = find_seed(recording_.window(), background_, *make_rim_finder(), explained_);
+    const auto seed = find_seed(recording_.window(), background_, *rim_finder(), explained_);
     if (!seed) return;
     const double seen_px = seed->seen.rim.semi_major_px();
     const double expected_px = finder_->expected_major_px(seed->seen.centre_px);
@@ -244,7 +248,7 @@ class Tracking {
   /// A body that turns in place about its own axis, with nothing but a mark that moves.
   bool follow_one_in_plate() {
     constexpr double kMost = 0.6;  // of what changes
-    const auto rim = find_seed_turning(recording_.window(), background_, *make_rim_finder());
+    const auto rim = find_seed_turning(recording_.window(), background_, *rim_finder());
     if (!rim) return false;
     const Background before = background_;
     if (const auto seed = seed_in_plate(rim)) {
@@ -284,7 +288,7 @@ class Tracking {
     // Of a body in its plate no edge is new.
     constexpr double kNew = 0.3;
     if (!seed)
-      seed = seed_in_plate(find_seed_at(window, background_, *make_rim_finder(), at_px));
+      seed = seed_in_plate(find_seed_at(window, background_, *rim_finder(), at_px));
     else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
       seed = seed_in_plate(seed);
     if (!seed)

@@ -24,7 +24,8 @@ class Interrupt {
 /// Runs `work` in a thread of its own without the GIL, while the calling thread looks for signals
 /// several times a second; returns or throws what `work` does. When a signal's handler raises (as
 /// Ctrl-C's does, KeyboardInterrupt) `work` is asked to stop at its next interrupt.check(), and
-/// that exception goes on when it has. Call with the GIL held.
+/// that exception goes on when it has. So it is in a thread other than the main one, as long as
+/// Ctrl-C has Python's own handler. Call with the GIL held.
 void run_interruptibly(const std::function<void(const Interrupt&)>& work);
 
 }  // namespace trochoid::python

@@ -170,7 +170,7 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {
-    how.progress = [&](std::int64_t, std::int64_t) { interrupt.check(); };
+    how.checkpoint = [&] { interrupt.check(); };
     result = tracking::track_video(video, with, camera, how);
   });
   result.file.made_by = "trochoid " TROCHOID_VERSION;

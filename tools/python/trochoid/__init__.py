@@ -13,8 +13,8 @@ z up and the floor at z = 0; pixels have x right, y down, pixel centres at whole
 A scene may be given as the path of a TOML file, the name of a bundled scene (``scenes()``), a dict of
 dicts with the keys of the TOML file, or a ``Scene``. What is wrong with an input raises ``InputError``
 (a ``ValueError``), what cannot be computed ``NumericalError`` (an ``ArithmeticError``), both with one line
-that names the place, the value and the remedy. Work runs without the GIL; Ctrl-C ends it at the next
-frame, picture or minimisation (a simulation: when it is done).
+that names the place, the value and the remedy. Work runs without the GIL; Ctrl-C ends it, in an
+executor's threads too, a fit at its next minimisation and a simulation when it is done.
 """
 
 from __future__ import annotations

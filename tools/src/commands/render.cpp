@@ -10,6 +10,7 @@
 #include "commands.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
+#include "common/pending_folder.hpp"
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
 #include "common/validators.hpp"
@@ -164,21 +165,27 @@ nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& mo
   return json;
 }
 
-// FOLDER/video.mp4 with truth.csv, camera.json, object.json; or clip.mp4 with clip.truth.csv, ...
+bool is_folder(const fs::path& output) {
+  return output.extension().empty();
+}
+
+// clip.mp4 with clip.truth.csv, clip.camera.json, clip.object.json; or in a folder video.mp4,
+// truth.csv, ...
 struct Targets {
   fs::path video, truth, camera, object;
 };
+Targets targets_in(const fs::path& folder, bool lossless) {
+  return {folder / (lossless ? "video.mkv" : "video.mp4"), folder / "truth.csv",
+          folder / "camera.json", folder / "object.json"};
+}
 Targets targets_of(const fs::path& output, bool lossless) {
-  const std::string ending = lossless ? ".mkv" : ".mp4";
   const std::string given = output.extension().string();
   if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
     throw InputError(fmt::format("{}: name {}; a folder with a dot in its name ends in /",
                                  output.string(),
                                  lossless ? "a folder or, as it is to be lossless, a .mkv file"
                                           : "a folder, an .mp4 or an .mkv file"));
-  if (output.extension().empty())
-    return {output / ("video" + ending), output / "truth.csv", output / "camera.json",
-            output / "object.json"};
+  if (is_folder(output)) return targets_in(output, lossless);
   const auto beside = [&](const char* name) {
     fs::path path = output;
     return path.replace_extension(name);
@@ -187,9 +194,8 @@ Targets targets_of(const fs::path& output, bool lossless) {
 }
 
 void check_targets(const Options& options, const Targets& targets) {
-  const bool folder = options.output.extension().empty();
-  if (folder) check_folder(options.output);
-  if (folder && !fs::exists(options.output)) return;
+  if (is_folder(options.output)) check_folder(options.output);
+  if (is_folder(options.output) && !fs::exists(options.output)) return;
   for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
     check_output(file, {options.scene, options.camera});
 }
@@ -311,17 +317,10 @@ void tell(const Options& options, const Targets& targets, const data::Camera& ca
              camera.width_px, camera.height_px, *camera.frame_rate_hz, targets.truth.string());
 }
 
-void run(const Options& options) {
-  const Targets targets = targets_of(options.output, options.lossless);
-  check_targets(options, targets);
-  const data::Scene scene = scene_to_draw(options, targets);
-  const Motion motion = simulated(options.scene, scene);
-  const data::Camera camera = recording_camera(options, scene, motion);
-  const double rate_hz = scene.run.rate_hz;
-  const int frames = std::max(1, static_cast<int>(std::floor(motion.end_s() * rate_hz + 1e-9)) + 1);
-
-  if (options.output.extension().empty()) make_folder(options.output);
-  EncodedFile video(targets.video, {camera.width_px, camera.height_px}, rate_hz,
+// All files of the recording, whole.
+void write(const Options& options, const data::Scene& scene, const Motion& motion,
+           const data::Camera& camera, int frames, const Targets& targets) {
+  EncodedFile video(targets.video, {camera.width_px, camera.height_px}, scene.run.rate_hz,
                     options.lossless ? coding::kLossless : coding::h264(options.quality));
   const std::string truth = draw(motion, scene, camera, style_of(options), frames, video);
   video.finish();
@@ -329,6 +328,42 @@ void run(const Options& options) {
   data::write_camera(camera, targets.camera);
   data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);
   video.commit();
+}
+
+// The outermost folder that is to be made; empty if there is none.
+fs::path folder_to_make(fs::path output) {
+  if (!is_folder(output)) return {};
+  if (!output.has_filename()) output = output.parent_path();
+  if (fs::exists(output)) return {};
+  while (output.has_parent_path() && !fs::exists(output.parent_path()))
+    output = output.parent_path();
+  return output;
+}
+
+// A folder that was not there comes to be with all files in it or not at all.
+void write_with_folder(const Options& options, const data::Scene& scene, const Motion& motion,
+                       const data::Camera& camera, int frames, const Targets& targets) {
+  const fs::path outermost = folder_to_make(options.output);
+  if (outermost.empty()) return write(options, scene, motion, camera, frames, targets);
+  PendingFolder pending(outermost);
+  const fs::path folder =
+      (pending.path() / options.output.lexically_relative(outermost)).lexically_normal();
+  pending.told_by_its_name([&] {
+    make_folder(folder);
+    write(options, scene, motion, camera, frames, targets_in(folder, options.lossless));
+  });
+  pending.commit();
+}
+
+void run(const Options& options) {
+  const Targets targets = targets_of(options.output, options.lossless);
+  check_targets(options, targets);
+  const data::Scene scene = scene_to_draw(options, targets);
+  const Motion motion = simulated(options.scene, scene);
+  const data::Camera camera = recording_camera(options, scene, motion);
+  const int frames =
+      std::max(1, static_cast<int>(std::floor(motion.end_s() * scene.run.rate_hz + 1e-9)) + 1);
+  write_with_folder(options, scene, motion, camera, frames, targets);
   tell_unseen(motion, scene, camera, frames);
   tell(options, targets, camera, frames);
 }

@@ -10,6 +10,7 @@
 #include "common/fit_job.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
+#include "common/pending_folder.hpp"
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
 #include "common/recording_name.hpp"
@@ -299,7 +300,8 @@ Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
 
 void run(const Options& options) {
   Run run = prepared(options);
-  PendingFolder pending(folder_of(options), {options.video, options.scene, options.camera});
+  check_replaceable(folder_of(options), {options.video, options.scene, options.camera});
+  PendingFolder pending(folder_of(options));
   run.timed("track", [&] { track(run, options); });
   run.timed("fit", [&] { in_scene(options.scene, [&] { fit(run, options); }); });
   const Verdict verdict =

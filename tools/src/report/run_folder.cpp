@@ -1,7 +1,6 @@
 #include "report/run_folder.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -106,50 +105,16 @@ void check_holds_none_of(const std::vector<fs::path>& inputs, const fs::path& fo
 
 }  // namespace
 
-PendingFolder::PendingFolder(fs::path target, const std::vector<fs::path>& inputs)
-    : target_(std::move(target)) {
+void check_replaceable(const fs::path& folder, const std::vector<fs::path>& inputs) {
   std::error_code code;
-  if (!target_.has_filename()) target_ = target_.parent_path();
-  const fs::path parent = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  if (!fs::is_directory(parent, code))
-    throw InputError(fmt::format("{}: cannot be made, the folder {} does not exist",
-                                 target_.string(), parent.string()));
-  if (::access(parent.c_str(), W_OK) != 0)
-    throw InputError(fmt::format("{}: cannot be made, the folder {} does not allow it",
-                                 target_.string(), parent.string()));
-  if (fs::exists(target_, code) && !fs::exists(target_ / kRunFile, code) &&
-      !(fs::is_directory(target_, code) && fs::is_empty(target_, code)))
+  if (fs::exists(folder, code) && !fs::exists(folder / kRunFile, code) &&
+      !(fs::is_directory(folder, code) && fs::is_empty(folder, code)))
     throw InputError(
         fmt::format("{}: exists and is not the folder of an earlier run; name another with -o",
-                    target_.string()));
-  if (fs::is_directory(target_, code)) {
-    check_holds_none_of(inputs, target_);
-    check_holds_results_only(target_);
-  }
-  temporary_ = data::pending_neighbour(target_);
-  if (!fs::create_directory(temporary_, code)) {
-    data::discard_pending(temporary_);
-    throw InputError(fmt::format("{}: cannot be made: {}", target_.string(),
-                                 code ? code.message() : "its neighbour exists"));
-  }
-}
-
-PendingFolder::~PendingFolder() {
-  if (!temporary_.empty()) data::discard_pending(temporary_);
-}
-
-std::string PendingFolder::with_own_name(std::string message) const {
-  const std::string temporary = temporary_.string(), own = target_.string();
-  for (std::size_t at = 0; (at = message.find(temporary, at)) != std::string::npos;
-       at += own.size())
-    message.replace(at, temporary.size(), own);
-  return message;
-}
-
-void PendingFolder::commit() {
-  if (const std::error_code code = data::rename_pending(temporary_, target_))
-    throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
-  temporary_.clear();
+                    folder.string()));
+  if (!fs::is_directory(folder, code) || fs::is_empty(folder, code)) return;
+  check_holds_none_of(inputs, folder);
+  check_holds_results_only(folder);
 }
 
 ReportInput read_run_folder(const fs::path& folder) {

@@ -29,11 +29,17 @@ std::vector<Frame> spread(const std::vector<Frame>& frames, std::size_t count) {
 }  // namespace
 
 Recording::Recording(const std::filesystem::path& path, const SourceOptions& options,
-                     std::size_t held_bytes)
+                     std::size_t held_bytes, std::function<void()> checkpoint)
     : path_(path),
       options_(options),
       held_bytes_(held_bytes),
+      checkpoint_(std::move(checkpoint)),
       source_(decode_ahead(open_video(path, options))) {}
+
+std::optional<Frame> Recording::next_of(FrameSource& source) const {
+  if (checkpoint_) checkpoint_();
+  return source.next();
+}
 
 bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)>& each) {
   if (ended_) return false;
@@ -41,7 +47,7 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
   keep = std::min(keep, window_.size());
   for (auto k = window_.size() - keep; k < window_.size(); ++k) bytes += bytes_of(window_[k]);
   while (bytes < held_bytes_ || keep + fresh < kLeastFrames) {
-    auto frame = source_->next();
+    auto frame = next_of(*source_);
     if (!frame) {
       ended_ = true;
       break;
@@ -76,7 +82,7 @@ void Recording::read_ahead() try {
   options.to.clear();
   const auto keys = open_video(path_, options);
   std::size_t stride = 1, count = 0;
-  while (auto frame = keys->next()) {
+  while (auto frame = next_of(*keys)) {
     if (count++ % stride != 0) continue;
     elsewhere_.push_back(std::move(*frame));
     if (elsewhere_.size() < kSamples) continue;

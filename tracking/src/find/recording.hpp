@@ -18,9 +18,11 @@ class Recording {
  public:
   /// Opens the recording; its window is empty until the first advance().
   /// @param held_bytes pictures in a window, but never fewer than twice Background::kSamples.
+  /// @param checkpoint called, if given, with every picture that is read; what it throws is thrown
+  /// on.
   /// @throws InputError as open_video does.
-  Recording(const std::filesystem::path& path, const SourceOptions& options,
-            std::size_t held_bytes);
+  Recording(const std::filesystem::path& path, const SourceOptions& options, std::size_t held_bytes,
+            std::function<void()> checkpoint = {});
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
   /// Pictures so far that repeat the one before.
@@ -40,10 +42,12 @@ class Recording {
  private:
   void remember_window();
   void read_ahead();
+  [[nodiscard]] std::optional<Frame> next_of(FrameSource& source) const;
 
   std::filesystem::path path_;
   SourceOptions options_;
   std::size_t held_bytes_;
+  std::function<void()> checkpoint_;
   std::unique_ptr<FrameSource> source_;
   std::vector<Frame> window_;
   Repeats repeats_;

@@ -23,6 +23,9 @@ struct TrackOptions {
   std::size_t held_bytes = std::size_t{96} << 20;
   /// Called with frames done and frames promised (0 = unknown); may be empty.
   std::function<void(std::int64_t done, std::int64_t total)> progress;
+  /// Called many times a second, from several threads; what it throws ends the work and is thrown
+  /// on. May be empty.
+  std::function<void()> checkpoint{};
 };
 
 /// What happened while tracking, for the report.
