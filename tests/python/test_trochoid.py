@@ -371,6 +371,10 @@ class Recording(unittest.TestCase):
         for wrong in ({"effort": None}, {"objects": 1.5}, {"at_px": 3}, {"rate_hz": "fast"}):
             with self.assertRaisesRegex(trochoid.InputError, next(iter(wrong))):
                 trochoid.track(SAMPLE / "video.mp4", **wrong)
+        for outside in ({"objects": 65}, {"rate_hz": -1.0}, {"from_": -1}):  # as the program's options
+            (name, value), = outside.items()
+            with self.assertRaisesRegex(trochoid.InputError, f"^{name.strip('_')} = {value:g} "):
+                trochoid.track(SAMPLE / "video.mp4", **outside)
         with self.assertRaisesRegex(trochoid.InputError, "quick, normal or exact"):
             trochoid.track(SAMPLE / "video.mp4", effort="hasty")
 

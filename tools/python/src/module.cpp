@@ -152,21 +152,18 @@ py::list predict(const data::Fit& fit, const py::dict& file, int fit_track) {
 #ifdef TROCHOID_HAS_TRACKING
 py::tuple track(const fs::path& video, const SceneValue& scene,
                 const std::optional<fs::path>& camera_file, const py::dict& options) {
-  data::Scene with = scene.scene;
-  if (!options["rate_hz"].is_none()) with.camera.frame_rate_hz = options["rate_hz"].cast<double>();
-  if (!options["objects"].is_none()) with.tracking.objects = options["objects"].cast<int>();
-  if (!options["at_px"].is_none()) {
-    const auto [x, y] = options["at_px"].cast<std::pair<double, double>>();
-    with.tracking.at_px = Eigen::Vector2d(x, y);
-  }
-  with = checked(with);
+  tools::TrackChoices choices;
+  choices.objects = options["objects"].cast<std::optional<int>>();
+  choices.rate_hz = options["rate_hz"].cast<std::optional<double>>();
+  if (const auto at = options["at_px"].cast<std::optional<std::pair<double, double>>>())
+    choices.at_px = Eigen::Vector2d(at->first, at->second);
+  choices.from = options["from"].cast<std::string>();
+  choices.to = options["to"].cast<std::string>();
+  choices.effort = tools::effort_named(options["effort"].cast<std::string>());
+  const data::Scene with = checked(tools::chosen_scene(scene.scene, choices));
   std::optional<data::Camera> camera;
   if (camera_file) camera = data::read_camera(*camera_file);
-  tracking::TrackOptions how;
-  how.objects = with.tracking.objects;
-  how.from = options["from"].cast<std::string>();
-  how.to = options["to"].cast<std::string>();
-  how.effort = tools::effort_named(options["effort"].cast<std::string>());
+  tracking::TrackOptions how = tools::track_options(with, choices);
   if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {

@@ -23,7 +23,6 @@
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/data/moment.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/tracking/tracker.hpp"
@@ -37,10 +36,10 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string video, scene, camera, output, model, from, to, at;
-  tracking::Effort effort = tracking::Effort::normal;
-  int objects = 0;
-  double rate_hz = 0.0, slow = 0.0;
+  TrackInputs inputs;
+  TrackChoices choices;
+  std::string output, model;
+  double slow = 0.0;
   std::uint64_t seed = 1;
   bool free_pivot = false, json = false;
 };
@@ -65,22 +64,21 @@ struct Run {
 
 fs::path folder_of(const Options& options) {
   if (!options.output.empty()) return options.output;
-  return recording_name(options.video) + ".trochoid";
+  return recording_name(options.inputs.video) + ".trochoid";
 }
 
 std::string stem_of(const Options& options) {
-  return recording_name(options.video);
+  return recording_name(options.inputs.video);
 }
 
 Run prepared(const Options& options) {
   Run run;
-  if (!options.scene.empty()) run.scene = data::read_scene(options.scene);
+  const TrackInputs& inputs = options.inputs;
+  if (!inputs.scene.empty()) run.scene = data::read_scene(inputs.scene);
+  run.scene = chosen_scene(std::move(run.scene), options.choices);
   if (!options.model.empty()) run.scene.model.name = options.model;
-  if (options.objects > 0) run.scene.tracking.objects = options.objects;
-  if (!options.at.empty()) run.scene.tracking.at_px = parse_point(options.at);
-  if (options.rate_hz > 0.0) run.scene.camera.frame_rate_hz = options.rate_hz;
-  run.camera = named_camera(options.camera, run.scene, options.scene);
-  if (!options.camera.empty()) {
+  run.camera = named_camera(inputs.camera, run.scene, inputs.scene);
+  if (!inputs.camera.empty()) {
     run.scene.camera.scale_px_per_m.reset();
     run.scene.camera.height_m.reset();
   }
@@ -89,13 +87,9 @@ Run prepared(const Options& options) {
 
 void track(Run& run, const Options& options) {
   Progress progress("track");
-  tracking::TrackOptions how;
-  how.objects = run.scene.tracking.objects;
-  how.from = options.from;
-  how.to = options.to;
-  how.effort = options.effort;
+  tracking::TrackOptions how = track_options(run.scene, options.choices);
   how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
-  run.tracked = tracking::track_video(options.video, run.scene, run.camera, how);
+  run.tracked = tracking::track_video(options.inputs.video, run.scene, run.camera, how);
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
 }
 
@@ -103,7 +97,7 @@ fitting::FitOptions fit_options(const Options& options, Progress& progress) {
   fitting::FitOptions how;
   how.free_pivot = options.free_pivot;
   how.seed = options.seed;
-  if (options.effort == tracking::Effort::exact) {
+  if (options.choices.effort == tracking::Effort::exact) {
     how.profile = true;
     how.bootstrap = 200;
   }
@@ -124,7 +118,7 @@ void fit(Run& run, const Options& options) {
   fitting::FitOptions how = fit_options(options, progress);
   try {
     // The quick way takes the model the support suggests, the others compare what could apply.
-    if (named || options.effort == tracking::Effort::quick) {
+    if (named || options.choices.effort == tracking::Effort::quick) {
       run.fit = fitting::fit(run.tracked.file.tracks, run.scene, how);
       if (!named && !run.fit->converged)
         run.fit->warnings.emplace_back(
@@ -162,7 +156,7 @@ void write_data(Run& run, const Options& options, const fs::path& folder) {
   run.fit->versions["trochoid"] = TROCHOID_VERSION;
   run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(folder / (stem + ".track.csv"));
   run.fit->inputs[run.tracked.file.source] = run.tracked.file.source_sha256;
-  if (!options.scene.empty()) add_checksum(run.fit->inputs, options.scene);
+  if (!options.inputs.scene.empty()) add_checksum(run.fit->inputs, options.inputs.scene);
   if (run.camera) add_checksum(run.fit->inputs, folder / "camera.json");
   data::write_fit(*run.fit, folder / (stem + ".fit.json"));
 }
@@ -172,8 +166,8 @@ OverlayOptions overlay_options(const Run& run, const Options& options) {
   constexpr double kMostlyTracked = 0.7;
   constexpr std::int64_t kLeadFrames = 20;
   const data::TrackingSettings& scene = run.scene.tracking;
-  OverlayOptions how{.from = options.from.empty() ? scene.from : options.from,
-                     .to = options.to.empty() ? scene.to : options.to,
+  OverlayOptions how{.from = options.choices.from.empty() ? scene.from : options.choices.from,
+                     .to = options.choices.to.empty() ? scene.to : options.choices.to,
                      .slow = options.slow};
   std::int64_t first = std::numeric_limits<std::int64_t>::max(), last = 0;
   for (const data::Track& track : run.tracked.file.tracks) {
@@ -191,7 +185,7 @@ OverlayOptions overlay_options(const Run& run, const Options& options) {
 
 void show(Run& run, const Options& options, const fs::path& folder) {
   OverlayInput input;
-  input.video = options.video;
+  input.video = options.inputs.video;
   input.tracks = run.tracked.file;
   input.fit = run.fit;
   input.scene = run.scene;
@@ -204,19 +198,20 @@ void show(Run& run, const Options& options, const fs::path& folder) {
 }
 
 std::string command_line(const Options& options) {
-  std::string line = "trochoid run " + shell_quoted(options.video);
+  std::string line = "trochoid run " + shell_quoted(options.inputs.video);
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) line += fmt::format(" {} {}", name, shell_quoted(value));
   };
-  add("--scene", options.scene);
-  add("--camera", options.camera);
+  const TrackChoices& choices = options.choices;
+  add("--scene", options.inputs.scene);
+  add("--camera", options.inputs.camera);
   add("--model", options.model);
-  add("--at", options.at);
-  add("--from", options.from);
-  add("--to", options.to);
-  if (options.objects > 0) add("--objects", std::to_string(options.objects));
-  if (options.rate_hz > 0.0) add("--rate", fmt::format("{:g}", options.rate_hz));
-  if (options.effort != tracking::Effort::normal) add("--effort", effort_name(options.effort));
+  if (choices.at_px) add("--at", fmt::format("{},{}", choices.at_px->x(), choices.at_px->y()));
+  add("--from", choices.from);
+  add("--to", choices.to);
+  if (choices.objects) add("--objects", std::to_string(*choices.objects));
+  if (choices.rate_hz) add("--rate", fmt::format("{:g}", *choices.rate_hz));
+  if (choices.effort != tracking::Effort::normal) add("--effort", effort_name(choices.effort));
   if (options.free_pivot) line += " --free-pivot";
   if (options.slow > 0.0) add("--slow", fmt::format("{:g}", options.slow));
   if (options.seed != 1) add("--seed", std::to_string(options.seed));
@@ -226,7 +221,7 @@ std::string command_line(const Options& options) {
 void write_run_file(const Run& run, const Options& options, const fs::path& folder) {
   nlohmann::ordered_json file;
   file["trochoid"] = TROCHOID_VERSION;
-  const fs::path video = fs::absolute(options.video).lexically_normal();
+  const fs::path video = fs::absolute(options.inputs.video).lexically_normal();
   file["video"] = (video.parent_path().filename() / video.filename()).string();
   file["stem"] = stem_of(options);  // of the names of track, fit and timing
   file["command"] = command_line(options);
@@ -300,10 +295,11 @@ Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
 
 void run(const Options& options) {
   Run run = prepared(options);
-  check_replaceable(folder_of(options), {options.video, options.scene, options.camera});
+  check_replaceable(folder_of(options),
+                    {options.inputs.video, options.inputs.scene, options.inputs.camera});
   PendingFolder pending(folder_of(options));
   run.timed("track", [&] { track(run, options); });
-  run.timed("fit", [&] { in_scene(options.scene, [&] { fit(run, options); }); });
+  run.timed("fit", [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
   const Verdict verdict =
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();
@@ -315,31 +311,16 @@ void run(const Options& options) {
 
 std::shared_ptr<Options> add_options(CLI::App& command) {
   auto options = std::make_shared<Options>();
-  command.add_option("video", options->video, "Recording")->required()->transform(without_slash());
-  command.add_option("--scene,-s", options->scene,
-                     "Scene TOML: body, camera, model (docs/formats.md)");
-  command.add_option("--camera", options->camera, "Camera JSON; replaces the scene's");
+  add_track_options(
+      command, options->inputs, options->choices,
+      "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
+      "likelihoods and bootstrap");
   command.add_option("-o,--output", options->output,
                      "Folder to make (default: VIDEO's name with .trochoid)");
   command
       .add_option("--model", options->model,
                   "Model to fit, or auto: compare; overrides the scene's")
       ->check(fitted_model());
-  command
-      .add_option("--objects", options->objects,
-                  "Number of moving bodies, all of the size the scene gives")
-      ->check(whole_number_within(1, 64));
-  add_at(command, options->at);
-  command.add_option("--from", options->from, "First moment: seconds (1.5) or a frame (f120)");
-  command.add_option("--to", options->to, "Last moment: seconds or a frame");
-  command
-      .add_option("--rate", options->rate_hz,
-                  "True frame rate [Hz]: of slow motion, or of an image folder or series")
-      ->check(frame_rate());
-  add_effort(
-      command, options->effort,
-      "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
-      "likelihoods and bootstrap");
   command.add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
   command
       .add_option("--slow", options->slow,
@@ -361,10 +342,9 @@ void check_run(const std::vector<std::string>& words) {
   } catch (const CLI::ParseError& error) {
     throw InputError(error.what());
   }
-  const bool numbered = options->video.find('%') != std::string::npos;  // img/%04d.png
-  if (!numbered && !fs::exists(options->video))
-    throw InputError(fmt::format("{}: no such file", options->video));
-  (void)data::parse_recording_window(options->from, options->to);
+  const std::string video = options->inputs.video;
+  const bool numbered = video.find('%') != std::string::npos;  // img/%04d.png
+  if (!numbered && !fs::exists(video)) throw InputError(fmt::format("{}: no such file", video));
   (void)prepared(*options);
 }
 

@@ -12,7 +12,6 @@
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
 #include "common/track_options.hpp"
-#include "common/validators.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/smooth.hpp"
@@ -24,22 +23,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  fs::path video, scene, camera, edges, smooth, output;
-  int objects = 0;
-  std::string from, to, at;
-  double rate_hz = 0.0;
-  tracking::Effort effort = tracking::Effort::normal;
+  TrackInputs inputs;
+  TrackChoices choices;
+  fs::path edges, smooth, output;
   bool json = false;
 };
-
-data::Scene scene_of(const Options& options) {
-  data::Scene scene;
-  if (!options.scene.empty()) scene = data::read_scene(options.scene);
-  if (options.rate_hz > 0.0) scene.camera.frame_rate_hz = options.rate_hz;
-  if (!options.at.empty()) scene.tracking.at_px = parse_point(options.at);
-  if (options.objects > 0) scene.tracking.objects = options.objects;
-  return scene;
-}
 
 /// Run times live beside the track, so that the track itself is the same from run to run.
 fs::path timing_file(fs::path track) {
@@ -110,20 +98,18 @@ void tell(const Options& options, const tracking::TrackResult& result,
 void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   check_outputs({options.output, options.edges, options.smooth, timing_file(options.output)},
-                {options.video, options.scene, options.camera});
-  const data::Scene scene = scene_of(options);
-  const std::optional<data::Camera> camera = named_camera(options.camera, scene, options.scene);
-  tracking::TrackOptions how;
-  how.objects = scene.tracking.objects;
-  how.from = options.from;
-  how.to = options.to;
-  how.effort = options.effort;
+                {options.inputs.video, options.inputs.scene, options.inputs.camera});
+  const TrackInputs& inputs = options.inputs;
+  const data::Scene scene = chosen_scene(
+      inputs.scene.empty() ? data::Scene{} : data::read_scene(inputs.scene), options.choices);
+  const std::optional<data::Camera> camera = named_camera(inputs.camera, scene, inputs.scene);
+  tracking::TrackOptions how = track_options(scene, options.choices);
   if (!options.edges.empty()) how.edges = options.edges;
   tracking::TrackResult result;
   {
     Progress progress("track");
     how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
-    result = tracking::track_video(options.video, scene, camera, how);
+    result = tracking::track_video(inputs.video, scene, camera, how);
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   data::write_track(result.file, options.output);
@@ -144,29 +130,12 @@ void run(const Options& options) {
 void add_track_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
-  track->add_option("video", options->video, "Video file, image folder or series (img/%04d.png)")
-      ->transform(without_slash())
-      ->required();
-  track->add_option("--scene,-s", options->scene,
-                    "Scene file (docs/formats.md); without body and camera a track in pixels");
-  track->add_option("--camera", options->camera, "Camera file; replaces the scene's");
-  track
-      ->add_option("--objects", options->objects,
-                   "Number of moving bodies, all of the size the scene gives")
-      ->check(whole_number_within(1, 64));
-  track->add_option("--from", options->from, "First frame to use: seconds (1.5) or frame (f120)");
-  track->add_option("--to", options->to, "Last frame to use: seconds or frame");
-  add_at(*track, options->at);
+  add_track_options(
+      *track, options->inputs, options->choices,
+      "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
   track->add_option("--edges", options->edges, "Also write the accepted edge points (CSV)");
   track->add_option("--smooth", options->smooth,
                     "Also write smoothed positions and velocities (CSV); never fit these");
-  track
-      ->add_option("--rate", options->rate_hz,
-                   "True frame rate [Hz]: of slow motion, or of an image folder or series")
-      ->check(frame_rate());
-  add_effort(
-      *track, options->effort,
-      "How closely outlines are looked at: quick, normal or exact (study chain shows the cost)");
   track->add_option("-o,--output", options->output, "Track CSV to write")->required();
   add_json_flag(*track, options->json);
   track->footer("Example: trochoid track ring.mp4 --scene ring.toml -o ring.track.csv");

@@ -7,7 +7,9 @@
 #include <map>
 
 #include "common/not_good.hpp"
+#include "common/validators.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/moment.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -16,14 +18,24 @@ const std::map<std::string, tracking::Effort> kEfforts{{"quick", tracking::Effor
                                                        {"normal", tracking::Effort::normal},
                                                        {"exact", tracking::Effort::exact}};
 
-}  // namespace
+constexpr int kMostObjects = 64;
 
-void add_effort(CLI::App& command, tracking::Effort& effort, const std::string& words) {
-  command
-      .add_option_function<std::string>(
-          "--effort", [&effort](const std::string& name) { effort = kEfforts.at(name); }, words)
-      ->check(CLI::IsMember(kEfforts));
+std::optional<Eigen::Vector2d> point_named(const std::string& text) {
+  double x = 0.0, y = 0.0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2) return std::nullopt;
+  return Eigen::Vector2d(x, y);
 }
+
+CLI::Validator point() {
+  return {[](const std::string& text) {
+            return point_named(text) ? std::string()
+                                     : "'" + text + "' is not a point x,y in pixels";
+          },
+          "X,Y"};
+}
+
+}  // namespace
 
 bool is_effort(const std::string& name) {
   return kEfforts.contains(name);
@@ -41,16 +53,59 @@ std::string effort_name(tracking::Effort effort) {
   return {};
 }
 
-void add_at(CLI::App& command, std::string& at) {
-  command.add_option("--at", at, "A point x,y [px] on the body in the first frame used");
+data::Scene chosen_scene(data::Scene scene, const TrackChoices& choices) {
+  const auto check = [](const char* name, const auto& value, auto least, auto most) {
+    if (value && !(*value >= least && *value <= most))
+      throw InputError(
+          fmt::format("{} = {} must be a number from {:g} to {:g}", name, *value, least, most));
+  };
+  check("objects", choices.objects, 1.0, static_cast<double>(kMostObjects));
+  check("rate_hz", choices.rate_hz, kSlowest_Hz, kFastest_Hz);
+  (void)data::parse_recording_window(choices.from, choices.to);
+  if (choices.objects) scene.tracking.objects = *choices.objects;
+  if (choices.at_px) scene.tracking.at_px = choices.at_px;
+  if (choices.rate_hz) scene.camera.frame_rate_hz = choices.rate_hz;
+  return scene;
 }
 
-Eigen::Vector2d parse_point(const std::string& text) {
-  double x = 0.0, y = 0.0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
-    throw InputError(fmt::format("--at {}: give a point in pixels as x,y", text));
-  return {x, y};
+tracking::TrackOptions track_options(const data::Scene& scene, const TrackChoices& choices) {
+  tracking::TrackOptions how;
+  how.objects = scene.tracking.objects;
+  how.from = choices.from;
+  how.to = choices.to;
+  how.effort = choices.effort;
+  return how;
+}
+
+void add_track_options(CLI::App& command, TrackInputs& inputs, TrackChoices& choices,
+                       const std::string& effort_words) {
+  command.add_option("video", inputs.video, "Video file, image folder or series (img/%04d.png)")
+      ->transform(without_slash())
+      ->required();
+  command.add_option("--scene,-s", inputs.scene,
+                     "Scene file: body, camera, model (docs/formats.md); without body and camera a "
+                     "track in pixels");
+  command.add_option("--camera", inputs.camera, "Camera file; replaces the scene's");
+  command
+      .add_option("--objects", choices.objects,
+                  "Number of moving bodies, all of the size the scene gives")
+      ->check(whole_number_within(1, kMostObjects));
+  command
+      .add_option_function<std::string>(
+          "--at", [&choices](const std::string& text) { choices.at_px = point_named(text); },
+          "A point x,y [px] on the body in the first frame used")
+      ->check(point());
+  command.add_option("--from", choices.from, "First frame to use: seconds (1.5) or frame (f120)");
+  command.add_option("--to", choices.to, "Last frame to use: seconds or frame");
+  command
+      .add_option("--rate", choices.rate_hz,
+                  "True frame rate [Hz]: of slow motion, or of an image folder or series")
+      ->check(frame_rate());
+  command
+      .add_option_function<std::string>(
+          "--effort", [&choices](const std::string& name) { choices.effort = kEfforts.at(name); },
+          effort_words)
+      ->check(CLI::IsMember(kEfforts));
 }
 
 void check_found(const data::TrackFile& found, int wanted) {

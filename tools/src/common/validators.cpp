@@ -63,7 +63,6 @@ CLI::Validator whole_number() {
 }
 
 CLI::Validator frame_rate() {
-  constexpr double kSlowest_Hz = 1e-6, kFastest_Hz = 1e9;
   return number_within(kSlowest_Hz, kFastest_Hz);
 }
 

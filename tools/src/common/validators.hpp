@@ -15,6 +15,7 @@ namespace trochoid::tools {
 [[nodiscard]] CLI::Validator whole_number();
 [[nodiscard]] CLI::Validator seed();
 /// Pictures per second, from a time lapse's to more than cameras reach.
+inline constexpr double kSlowest_Hz = 1e-6, kFastest_Hz = 1e9;
 [[nodiscard]] CLI::Validator frame_rate();
 
 /// Takes the slash off the name of a folder, which has a name of its own without it.
