@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -266,6 +267,17 @@ std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double
   return poses;
 }
 
+// What the whole will take, from its first pictures; nothing where that is no time to wait for.
+void tell_cost(int done, int frames, const data::Camera& camera, double elapsed_s) {
+  constexpr double kWorthTelling_s = 5.0;
+  const double left_s = elapsed_s * (frames - done) / done;
+  if (left_s > kWorthTelling_s)
+    note(
+        fmt::format("{} frames of {} x {} px, about {}; lower --rate, --until, --times or "
+                    "--samples make that less",
+                    frames, camera.width_px, camera.height_px, duration_words(left_s)));
+}
+
 // Draws every frame. @returns the table of the truth.
 std::string draw(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
                  const RenderStyle& style, int frames, EncodedFile& video) {
@@ -274,6 +286,9 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
   std::string truth =
       "frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac\n";
   Progress progress("render");
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  constexpr int kFirst = 8;  // they tell what one takes
   for (int frame = 0; frame < frames; ++frame) {
     const double t_s = frame / rate_hz;
     const double brightness = 1.0 + style.flicker * std::sin(2.0 * std::numbers::pi * 100.0 * t_s);
@@ -281,6 +296,9 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
     video.write(renderer.picture(renderer.light(poses), frame, brightness));
     truth += truth_row(frame, t_s, motion.at(t_s), camera);
     progress.update(frame + 1, frames);
+    if (frame + 1 == kFirst)
+      tell_cost(kFirst, frames, camera,
+                std::chrono::duration<double>(Clock::now() - start).count());
   }
   return truth;
 }
