@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace trochoid::tools {
 namespace {
 
@@ -30,11 +32,27 @@ TEST(FrameTimes, FollowTheTrackAndGoOnAtItsRate) {
   EXPECT_FALSE(times.has(13));
 }
 
+// Thirty pictures a second in whole milliseconds, then half as many, and some that were lost.
+TEST(FrameTimes, TellTheRateOfACameraAtItsFastest) {
+  data::TrackFile file;
+  file.tracks.emplace_back();
+  double t_s = 0.0;
+  for (int frame = 0; frame < 60; ++frame) {
+    data::TrackSample sample;
+    sample.frame = frame;
+    sample.t_s = 1e-3 * std::round(1e3 * t_s);
+    file.tracks.front().samples.push_back(sample);
+    t_s += (frame < 30 ? 1.0 : 2.0) / 30.0 + (frame == 10 ? 1.0 : 0.0);
+  }
+  EXPECT_NEAR(1.0 / FrameTimes(file).shortest_step_s(), 30.0, 0.1);
+}
+
 TEST(FrameTimes, AreUnknownWithoutNumbers) {
   data::TrackFile file = slow_motion();
   for (data::TrackSample& sample : file.tracks.front().samples) sample.frame = -1;
   const FrameTimes times(file);
   EXPECT_FALSE(times.numbered());
+  EXPECT_EQ(times.shortest_step_s(), 0.0);
   EXPECT_FALSE(times.time_of(3));
   EXPECT_FALSE(times.frame_at(0.01));
 }

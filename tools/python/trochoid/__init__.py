@@ -505,7 +505,8 @@ def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
 
 @dataclasses.dataclass(eq=False)
 class OverlayFrames(_Record):
-    """Picture k of an overlay shows frame[k] of the recording, at t_s[k]."""
+    """Picture k of an overlay shows frame[k] of the recording, at t_s[k]; frames come again where the
+    recording has lost the next."""
 
     frame_rate_hz: float   #: of the overlay
     slowed: float          #: so many times slower than it happened

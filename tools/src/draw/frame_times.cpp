@@ -1,7 +1,9 @@
 #include "draw/frame_times.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
+#include <numeric>
 
 #include "trochoid/data/quantile.hpp"
 
@@ -17,7 +19,15 @@ FrameTimes::FrameTimes(const data::TrackFile& tracks) {
   for (std::size_t i = 1; i < known_.size(); ++i)
     steps_s.push_back((known_[i].second - known_[i - 1].second) /
                       static_cast<double>(known_[i].first - known_[i - 1].first));
-  if (!steps_s.empty()) frame_s_ = data::median(std::move(steps_s));
+  if (steps_s.empty()) return;
+  // Stamps jitter, by their rounding if by nothing else: the mean of those about as short as most.
+  constexpr double kShort = 0.1, kAboutAsShort = 1.5;
+  const double most_s = kAboutAsShort * data::quantile(steps_s, kShort);
+  const auto longer =
+      std::partition(steps_s.begin(), steps_s.end(), [=](double s) { return s <= most_s; });
+  shortest_s_ = std::accumulate(steps_s.begin(), longer, 0.0) /
+                static_cast<double>(std::distance(steps_s.begin(), longer));
+  frame_s_ = data::median(std::move(steps_s));
 }
 
 std::optional<double> FrameTimes::time_of(std::int64_t frame) const {

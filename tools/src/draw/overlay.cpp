@@ -61,6 +61,22 @@ std::string as_frame(const FrameTimes& times, const std::string& text, bool is_f
   return fmt::format("f{:.0f}", std::max(0.0, frame));
 }
 
+/// Pictures a second that show every frame when it was: the camera's own rate, also where some of
+/// its pictures were lost or it was slower at times.
+double rate_shown_hz(const tracking::VideoInfo& info, const OverlayContent& content) {
+  constexpr double kRounding = 0.02;
+  const double step_s = content.shortest_step_s();
+  if (!(step_s > 0.0) || std::abs(step_s * info.frame_rate_hz - 1.0) < kRounding)
+    return info.frame_rate_hz;
+  return 1.0 / step_s;
+}
+
+/// How often the frame before is to be seen again until the next comes.
+int repeats(double step_s, double rate_hz) {
+  constexpr double kLongest_s = 10.0;
+  return std::max(0, static_cast<int>(std::lround(std::min(step_s, kLongest_s) * rate_hz)) - 1);
+}
+
 /// Draws the pictures of an overlay one after the other; strokes of the past are kept between
 /// calls.
 class OverlayPainter {
@@ -233,23 +249,35 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   const tracking::VideoInfo info = source->info();
   const OverlayContent content(input, info.width_px, info.height_px);
   content.check_pictures(info.width_px, info.height_px, input.video.string());
+  const double rate_hz = rate_shown_hz(info, content);
   OverlayFrames written;
-  written.slowed = options.slow > 0.0
-                       ? options.slow
-                       : std::max(1.0, std::ceil(info.frame_rate_hz / kScreenRateHz - 0.01));
-  written.frame_rate_hz = info.frame_rate_hz / written.slowed;
+  written.slowed =
+      options.slow > 0.0 ? options.slow : std::max(1.0, std::ceil(rate_hz / kScreenRateHz - 0.01));
+  written.frame_rate_hz = rate_hz / written.slowed;
   OverlayPainter painter(content, info, written.slowed);
   written.width_px = painter.size().width;
   written.height_px = painter.size().height;
   EncodedFile overlay(path, painter.size(), written.frame_rate_hz, coding::kForViewing);
   Progress progress("overlay");
-  while (const auto frame = source->next()) {
+  std::int64_t drawn = 0;
+  cv::Mat picture;
+  const auto show = [&](std::int64_t frame, double t_s) {
     if (options.between_pictures) options.between_pictures();
-    const double t_s = content.time_of_frame(frame->index, frame->t_s);
-    overlay.write(painter.paint(*frame, t_s));
-    written.frame.push_back(frame->index);
+    overlay.write(picture);
+    written.frame.push_back(frame);
     written.t_s.push_back(t_s);
-    progress.update(static_cast<std::int64_t>(written.frame.size()), info.frames);
+  };
+  while (const auto frame = source->next()) {
+    const double t_s = content.time_of_frame(frame->index, frame->t_s);
+    if (drawn > 0) {
+      const std::int64_t before = written.frame.back();
+      const double from_s = written.t_s.back();
+      const int again = repeats(t_s - from_s, rate_hz);
+      for (int k = 1; k <= again; ++k) show(before, from_s + (t_s - from_s) * k / (again + 1));
+    }
+    picture = painter.paint(*frame, t_s);
+    show(frame->index, t_s);
+    progress.update(++drawn, info.frames);
   }
   overlay.finish();
   overlay.commit();
