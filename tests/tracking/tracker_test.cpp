@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <limits>
 #include <numbers>
 
 #include "drawn_clip.hpp"
@@ -295,6 +297,57 @@ TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
       track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 160, kScale_px_m));
   EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kFrames));
   EXPECT_LT(largest_error_px(result.file.tracks[0], [&](int) { return centre_px; }), 0.5);
+}
+
+/// A disc that wobbles about on its rim, seen from above, 16 px in radius.
+data::Scene write_wobbling(const std::filesystem::path& clip, double radius_m) {
+  write_clip(clip, drawn_floor(220, 130, 150.0), 60, 2.0, [](cv::Mat& picture, int i) {
+    draw_disc(picture, 40.0 + 2.0 * i, 65.0, 16.0, 13.0, 0.2 * i, 60.0);
+  });
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = radius_m;
+  body.thickness_m = 1e-4;
+  scene.support.kind = data::SupportKind::floor;
+  return scene;
+}
+
+TEST(TrackVideo, EndsWhereverItIsWhenItsCheckpointThrows) {
+  const ScratchFolder folder("checkpoint");
+  const data::Scene scene = write_wobbling(folder / "clip.mkv", 0.016);
+  struct Stop {};
+  std::atomic<int> calls{0};
+  int most = std::numeric_limits<int>::max();
+  TrackOptions options;
+  options.checkpoint = [&] {
+    if (++calls > most) throw Stop{};
+  };
+  const auto track = [&] {
+    calls = 0;
+    (void)track_video(folder / "clip.mkv", scene, data::Camera::from_scale(220, 130, 1000.0),
+                      options);
+  };
+  track();
+  const int all = calls;
+  EXPECT_GT(all, 3 * 60) << "every picture is read, followed and gone over again";
+  for (const int share : {0, 1, 2, 3}) {
+    most = share * all / 4;
+    EXPECT_THROW(track(), Stop) << share;
+  }
+}
+
+TEST(TrackVideo, ABodyOfAnotherSizeAtThePointIsSaidToBe) {
+  const ScratchFolder folder("other_size");
+  data::Scene scene = write_wobbling(folder / "clip.mkv", 0.040);
+  scene.tracking.at_px = {40.0, 65.0};
+  try {
+    (void)track_video(folder / "clip.mkv", scene, data::Camera::from_scale(220, 130, 1000.0));
+    FAIL() << "tracked what is not of this size";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(),
+                testing::ContainsRegex("no body of the given size is at the point: .* about 40 px, "
+                                       "and what is at the point one of about 1[5-7] px"));
+  }
 }
 
 // Seen face on, precession and spin are one angle.

@@ -103,7 +103,9 @@ class Tracking {
   }
 
   [[noreturn]] void nothing_found() {
-    tell_other_size();
+    if (!camera_moved_)
+      tell_other_size(find_seed(recording_.window(), background_, *rim_finder(), explained_),
+                      "moves", ", or point at the body: at x,y");
     if (camera_moved_)
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
@@ -116,21 +118,21 @@ class Tracking {
                     video_.string()));
   }
 
-  /// A wrong scale or radius hides a body that is plain to see.
-  void tell_other_size() {
+  /// A wrong scale or radius hides a body that is plain to see: its rim alone is.
+  /// @param where which body it is.  @param or_else what else may help.
+  void tell_other_size(const std::optional<Seed>& by_rim, const char* where,
+                       const char* or_else) const {
     constexpr double kClearly = 1.5;  // more than an oblique view makes of a right size
-    if (camera_moved_ || !camera_ || !has_shape(scene_)) return;
-    const auto seed = find_seed(recording_.window(), background_, *rim_finder(), explained_);
-    if (!seed) return;
-    const double seen_px = seed->seen.rim.semi_major_px();
-    const double expected_px = finder_->expected_major_px(seed->seen.centre_px);
+    if (!by_rim || !camera_ || !has_shape(scene_)) return;
+    const double seen_px = by_rim->seen.rim.semi_major_px();
+    const double expected_px = finder_->expected_major_px(by_rim->seen.centre_px);
     if (!(expected_px > 0.0) || std::max(seen_px / expected_px, expected_px / seen_px) < kClearly)
       return;
     throw InputError(
-        fmt::format("{}: no body of the given size moves: by radius_m and the camera or scale its "
-                    "rim has a radius of about {:.0f} px, and what moves one of about {:.0f} px; "
-                    "check radius_m and the camera's scale, or point at the body: at x,y",
-                    video_.string(), expected_px, seen_px));
+        fmt::format("{}: no body of the given size {}: by radius_m and the camera or scale its rim "
+                    "has a radius of about {:.0f} px, and what {} one of about {:.0f} px; check "
+                    "radius_m and the camera's scale{}",
+                    video_.string(), where, expected_px, where, seen_px, or_else));
   }
 
   /// Reads on, the bodies known so far followed as the frames come. False at the end.
@@ -285,12 +287,14 @@ class Tracking {
                       "{} x {} pixels",
                       video_.string(), at_px.x(), at_px.y(), video.width_px, video.height_px));
     auto seed = find_seed_at(window, background_, *finder_, at_px);
+    std::optional<Seed> by_rim;
     // Of a body in its plate no edge is new.
     constexpr double kNew = 0.3;
     if (!seed)
-      seed = seed_in_plate(find_seed_at(window, background_, *rim_finder(), at_px));
+      seed = seed_in_plate(by_rim = find_seed_at(window, background_, *rim_finder(), at_px));
     else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
       seed = seed_in_plate(seed);
+    if (!seed) tell_other_size(by_rim, "is at the point", "");
     if (!seed)
       throw InputError(fmt::format("{}: no rim found around the point at {:g},{:g} px",
                                    video_.string(), at_px.x(), at_px.y()));
@@ -452,6 +456,21 @@ class Tracking {
         std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear")};
   }
 
+  /// Of an outline of a few pixels any tilt looks much like another.
+  [[nodiscard]] std::optional<std::string> doubt_about_tilt(const BodyPath& path,
+                                                            const data::Track& track) const {
+    constexpr double kFew_px = 6.0;
+    const bool tilted = std::any_of(track.samples.begin(), track.samples.end(),
+                                    [](const auto& sample) { return sample.theta.has_value(); });
+    const double radius_px = usual_radius_px(path);
+    if (!tilted || radius_px >= kFew_px) return std::nullopt;
+    return fmt::format(
+        "{} only {:.1f} px in radius: too few for its tilt and precession to mean anything; film "
+        "it "
+        "larger, 30 px at least",
+        paths_.size() > 1 ? fmt::format("object {} is", track.object) : "the body is", radius_px);
+  }
+
   /// In most of the frames that tell.
   [[nodiscard]] bool stays_on_a_pin(const BodyPath& path) const {
     int on = 0, off = 0;
@@ -487,6 +506,9 @@ class Tracking {
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
     result.file.notes = doubts_about_edges();
+    for (std::size_t k = 0; k < paths_.size(); ++k)
+      if (auto doubt = doubt_about_tilt(paths_[k], result.file.tracks[k]))
+        result.file.notes.push_back(std::move(*doubt));
     if (const std::int64_t missing = recording_.info().missing; missing > 0)
       result.file.notes.push_back(fmt::format(
           "by their numbers {} of {} pictures are missing; the others keep the times of "
