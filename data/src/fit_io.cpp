@@ -177,8 +177,9 @@ Json to_json(std::uint64_t value) {
 Json to_json(const std::string& value) {
   return value;
 }
-Json to_json(ParameterStatus value) {
-  return kParameterStatuses[static_cast<std::size_t>(value)];
+template <Spelled Enum>
+Json to_json(Enum value) {
+  return name(value);
 }
 Json to_json(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
@@ -215,7 +216,7 @@ Json to_json(const std::vector<T>& values) {
 // --- reading -----------------------------------------------------------------------------------
 
 // `place` is "file: key" for messages.
-[[noreturn]] void refuse(const std::string& place, const char* wanted) {
+[[noreturn]] void refuse(const std::string& place, std::string_view wanted) {
   throw InputError(fmt::format("{} must be {}", place, wanted));
 }
 
@@ -250,11 +251,17 @@ void from_json(const nlohmann::json& json, std::string& value, const std::string
   if (!json.is_string()) refuse(place, "text");
   value = json.get<std::string>();
 }
-void from_json(const nlohmann::json& json, ParameterStatus& value, const std::string& place) {
-  const auto found = std::find(kParameterStatuses.begin(), kParameterStatuses.end(),
-                               json.is_string() ? json.get<std::string>() : std::string());
-  if (found == kParameterStatuses.end()) refuse(place, "free, fixed, derived or prior");
-  value = static_cast<ParameterStatus>(found - kParameterStatuses.begin());
+template <Spelled Enum>
+void from_json(const nlohmann::json& json, Enum& value, const std::string& place) {
+  const auto words = spellings(value);
+  const auto found = json.is_string()
+                         ? std::find(words.begin(), words.end(), json.get<std::string>())
+                         : words.end();
+  if (found == words.end()) {
+    const auto first = words.begin() + (words.front().empty() ? 1 : 0), last = words.end() - 1;
+    refuse(place, fmt::format("{} or {}", fmt::join(first, last, ", "), *last));
+  }
+  value = static_cast<Enum>(found - words.begin());
 }
 void from_json(const nlohmann::json& json, Eigen::MatrixXd& matrix, const std::string& place) {
   if (!json.is_array()) refuse(place, "a list of rows");

@@ -12,7 +12,7 @@ Fit full_fit() {
   Fit fit;
   fit.model = "top";
   fit.converged = true;
-  fit.outcome = "converged";
+  fit.outcome = FitOutcome::converged;
   fit.reason = "chi2 stopped falling";
   fit.start_path = "integral_matching";
   fit.parameters = {
@@ -37,7 +37,8 @@ Fit full_fit() {
   fit.arcs = {{0, 1, 0.5, 2.5, 200}};
   fit.comparison = {{"top", 1.0, 2.0, 3.0, 0.5, 1.1, 6, true, "why"}};
   fit.recommendation = "top suffices";
-  fit.profiles = {{"a_1_s2", "one-sided", 0.0, 2.5, {1.0, 2.0, 3.0}, {0.5, 0.0, 7.0}}};
+  fit.profiles = {
+      {"a_1_s2", ProfileVerdict::one_sided, 0.0, 2.5, {1.0, 2.0, 3.0}, {0.5, 0.0, 7.0}}};
   fit.bootstrap = {200, 1, 0.25, {{"a_1_s2", 0.5, 1.5, 2.5}}};
   fit.warnings = {"scale not given"};
   fit.inputs = {{"top.track.csv", std::string(64, 'b')}};
@@ -84,7 +85,7 @@ TEST(FitFile, IsWrittenEvenIfAFileNameIsNoUtf8) {
   Fit fit = full_fit();
   fit.reason = "from \xff\xfe.csv";
   write_fit(fit, folder / "a.json");
-  EXPECT_EQ(read_fit(folder / "a.json").outcome, "converged");
+  EXPECT_EQ(read_fit(folder / "a.json").outcome, FitOutcome::converged);
 }
 
 TEST(FitFile, WithACovarianceThatDoesNotFitItsNamesIsRefused) {
@@ -125,7 +126,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"WordValue", kBegin + R"("parameters": [{"name": "a", "value": "x"}]})",
                 "\"parameters\"[0]: \"value\" must be a number"},
         Refusal{"OddStatus", kBegin + R"("parameters": [{"name": "a", "status": "x"}]})",
-                "free, fixed, derived or prior"},
+                "\"status\" must be free, fixed, derived or prior"},
+        Refusal{"OddVerdict", kBegin + R"("parameters": [], "verdict": "x"})",
+                "\"verdict\" must be good, good_correlated, weak"},
         Refusal{
             "RaggedCovariance",
             kBegin +

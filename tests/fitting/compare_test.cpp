@@ -92,7 +92,7 @@ TEST(Compare, FindsTheWeightBesideTheAxisAndFrictionThatWeakens) {
   truth.model.spin_down_imbalance_cos_rad_s2 = -0.02;
   const data::Track track = track_of(truth, {{"w3_rad_s", 3.0}}, 35.0, 1000, 1e-3, 5);
   const Comparison found = compare_one(track, spin_down());
-  EXPECT_EQ(found.fit.verdict, "good");
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good);
   for (const auto& [name, value] : Values{{"spin_down_dry_rad_s2", 0.12},
                                           {"spin_down_weakening_s_rad", 0.2},
                                           {"spin_down_imbalance_sin_rad_s2", 0.03},
@@ -255,7 +255,7 @@ TEST(Compare, TakesABodyThatStraysFromItsPivotForATop) {
     sample.psi = data::MeasuredAngle{20.0 * sample.t_s, 0.01};
   scene.model.name = "pivot";
   const data::Fit turning = fit(std::span(&track, 1), scene);
-  EXPECT_EQ(turning.verdict, "unexplained") << turning.verdict_words;
+  EXPECT_EQ(turning.verdict, data::FitVerdict::unexplained) << turning.verdict_words;
   EXPECT_THAT(turning.verdict_words, testing::HasSubstr("strays"));
 }
 

@@ -50,7 +50,7 @@ void expect_found(const data::Fit& fit, const std::map<std::string, double>& tru
 // good.
 TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
   const Comparison found = comparison_of("air_force");
-  EXPECT_EQ(found.fit.verdict, "good");
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good);
   expect_found(found.fit, {{"air_force_N_s_m", 0.003979246288779953},
                            {"pivoting_friction_m", 2.5386966524556133e-05}});
 }
@@ -58,7 +58,7 @@ TEST(Independent, AirThatSlowsTheCentreIsNotTakenForCouples) {
 // Neither alone explains the track, and the search went on to bodies that slide, for minutes.
 TEST(Independent, TwoLossesThatOnlyTogetherExplainTheTrackAreFound) {
   const Comparison found = comparison_of("two_further_losses");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_EQ(found.fit.model, "rolling");
   expect_found(found.fit, {{"air_force_N_s_m", 0.0035190430141933318},
                            {"contour_friction_m", 7.747631453212088e-05}});
@@ -75,7 +75,7 @@ TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
     if (line.find("+ sliding: ") != line.npos) sliding.push_back(line);
   };
   const Comparison found = compare(std::span(&track, 1), scene_of("slides_later"), options);
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_EQ(found.fit.model, "sliding");
   expect_found(found.fit, {{"rolling_friction_m", 0.00012716222321787647},
                            {"contour_friction_m", 1.835468557226672e-05},
@@ -122,7 +122,7 @@ TEST_P(GlitchOf, ABodyThatSlidesLaterChangesNothing) {
   data::Track track = track_of("slides_later");
   for (const std::size_t i : GetParam().samples) track.samples[i].centre_m.x() = GetParam().x_m;
   const data::Fit fit = compare(std::span(&track, 1), scene_of("slides_later")).fit;
-  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
   EXPECT_EQ(fit.covariance_names.size(), 10U);
   expect_found(fit, {{"rolling_friction_m", 0.00012716222321787647},
                      {"contour_friction_m", 1.835468557226672e-05},
@@ -142,7 +142,7 @@ TEST(Independent, AGlitchIsNoReasonForOtherLosses) {
   track.samples[track.samples.size() / 2].centre_m.x() = 1000.0;
   const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
   const data::Fit clean = comparison_of("unneeded_loss").fit;
-  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
   constexpr double kOfASigma = 0.3;  // one sample of 124
   for (const char* name : {"pivoting_friction_m", "air_linear_N_m_s[1]", "w3_rad_s"}) {
     const data::FitParameter *found = fit.find(name), *known = clean.find(name);
@@ -156,7 +156,7 @@ TEST(Independent, AGlitchIsNoReasonForOtherLosses) {
 // record begins 2000 error bars off.
 TEST(Independent, ABodyThatSlipsForItsFirstSamplesIsNotTakenForOneThatOnlyRolls) {
   const data::Fit fit = comparison_of("slips_at_first").fit;
-  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("does not explain its beginning"));
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("the body may slip before it rolls"));
 }
@@ -169,7 +169,7 @@ TEST(Independent, ABodyWhoseFirstPositionsAreClumsyIsFoundAllTheSame) {
     track.samples[i].centre_m +=
         12.0 * Eigen::Vector2d(std::sqrt(track.samples[i].covariance_m2(0, 0)), 0.0);
   const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
-  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
   EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")));
 }
 
@@ -177,7 +177,7 @@ TEST(Independent, ABodyWhoseFirstPositionsAreClumsyIsFoundAllTheSame) {
 // linear one that stood for it too was 4 of its error bars off.
 TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
   const Comparison found = comparison_of("unneeded_loss");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   const data::FitParameter* couple = found.fit.find("air_linear_N_m_s[1]");
   ASSERT_NE(couple, nullptr);
   constexpr double kTruth_N_m_s = 1.2930124047767674e-07, kThree = 3.0;
@@ -188,7 +188,7 @@ TEST(Independent, ErrorBarsHoldWhatALossThatNothingAsksForWouldChange) {
 // stated noise in chi-square, and went on to bodies that slide, for more than a minute.
 TEST(Independent, APathFollowedToAPerCentMayLieInAnotherValley) {
   const Comparison found = comparison_of("another_valley");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_EQ(found.fit.model, "rolling");
   expect_found(found.fit, {{"theta_rad", 1.412934434613085}, {"w2_rad_s", 86.1398486432354}});
 }
@@ -198,7 +198,7 @@ TEST(Independent, APathFollowedToAPerCentMayLieInAnotherValley) {
 // act, was reported at 11 of its error bars.
 TEST(Independent, ErrorBarsHoldWhatLossesExchangedTogetherWouldChange) {
   const Comparison found = comparison_of("exchanged_together");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   expect_found(found.fit, {{"pivoting_friction_m", 7.185640918268124e-05}});
   const data::FitParameter* rolling = found.fit.find("rolling_friction_m");
   EXPECT_TRUE(rolling == nullptr || rolling->value < kSigmas * rolling->sigma)
@@ -209,7 +209,7 @@ TEST(Independent, ErrorBarsHoldWhatLossesExchangedTogetherWouldChange) {
 // alone it is exchanged for the other, and was reported as good at 6 of its error bars.
 TEST(Independent, ALossThatStandsForTwoIsExchangedForBoth) {
   const Comparison found = comparison_of("stands_for_two");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_EQ(found.fit.model, "smooth");
   EXPECT_FALSE(found.scene.model.air_quadratic_N_m_s2) << found.fit.recommendation;
   // Contour friction does as well as rolling friction, and their error bars say so.
@@ -245,14 +245,14 @@ TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
   FitOptions options;
   options.from = "19.99";
   const Comparison found = compare(std::span(&track, 1), scene_of("slides_later"), options);
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_EQ(found.fit.model, "sliding");
 }
 
 // Where only linear drag was known most of the motion had been left unexplained.
 TEST(Independent, ADryDragThatUsesUpATopsSpinIsTold) {
   const Comparison found = comparison_of("top_dry_spin");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_FALSE(found.scene.model.drag_spin_N_m_s) << found.fit.recommendation;
   expect_found(found.fit, {{"gamma3_dry_1_s2", 6.312679954436458},
                            {"gamma1_1_s", 0.02462786212773269},
@@ -264,7 +264,7 @@ TEST(Independent, ADryDragThatUsesUpATopsSpinIsTold) {
 // Likewise, with residuals 16 times their noise.
 TEST(Independent, AQuadraticDragOnATopsSpinIsTold) {
   const Comparison found = comparison_of("top_quadratic_spin");
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   EXPECT_FALSE(found.scene.model.drag_spin_N_m_s) << found.fit.recommendation;
   expect_found(found.fit, {{"gamma3_quadratic", 0.011676987613126974},
                            {"gamma1_1_s", 0.04700435256861841},
@@ -291,7 +291,7 @@ TEST(Independent, LossesAreComparedOnAFloorThatIsNamedSmooth) {
   data::Scene scene = scene_of("smooth_floor");
   scene.model.name = "smooth";
   const Comparison found = compare(std::span(&track, 1), scene);
-  EXPECT_EQ(found.fit.verdict, "good") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
   expect_found(found.fit, {{"air_force_N_s_m", 0.0002313339421224178}});
   for (const data::ModelScore& score : found.fit.comparison)
     EXPECT_THAT(score.model, testing::StartsWith("smooth"));

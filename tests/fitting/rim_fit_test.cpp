@@ -321,7 +321,7 @@ TEST(RimFit, WhatIsHeldIsToldWhereNothingFits) {
   Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   c.scene.fit.bounds["theta_rad"] = {0.1, 0.3};
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
-  EXPECT_NE(fit.verdict, "good");
+  EXPECT_NE(fit.verdict, data::FitVerdict::good);
   EXPECT_THAT(all_warnings(fit), testing::HasSubstr("[fit] holds theta_rad in 0.1 .. 0.3"));
 }
 
@@ -739,7 +739,7 @@ data::Fit fit_of(const Fallen& made) {
 TEST(FlatEnd, IsPartOfTheTrack) {
   const data::Fit fit = fit_of(fallen_disc(0.6, 18.0, 1.5, 1e-3, 5.0, 9));
   ASSERT_TRUE(fit.converged) << fit.reason;
-  EXPECT_EQ(fit.verdict, "good");
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good);
   EXPECT_LT(pull(fit, "rolling_friction_m", 1e-3), kFar);
   EXPECT_LT(pull(fit, "theta_rad", 0.6), kFar);
 }
@@ -755,7 +755,7 @@ TEST(FlatEnd, TheDipInWhichItCameToLieIsFound) {
   for (const Fallen& disc : discs) {
     const data::Fit fit = fit_of(disc);
     ASSERT_TRUE(fit.converged) << fit.reason;
-    EXPECT_THAT(fit.verdict, testing::StartsWith("good")) << fit.verdict_words;
+    EXPECT_THAT(name(fit.verdict), testing::StartsWith("good")) << fit.verdict_words;
     EXPECT_LT(fit.chi2 / fit.dof, 1.2);
     for (const auto& [name, truth] :
          {std::pair("rolling_friction_m", *disc.scene.model.rolling_friction_m),

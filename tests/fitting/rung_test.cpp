@@ -813,7 +813,7 @@ TEST_F(Promised, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
   astray.start["w2_rad_s"] *= -1.0;
   const Rung rung = rung_with({"air", "pivoting"});
   const data::Fit found = fit(tracks_, rung.scene, astray);
-  ASSERT_EQ(found.verdict, "unexplained");
+  ASSERT_EQ(found.verdict, data::FitVerdict::unexplained);
   const auto weighing = std::find(lines.begin(), lines.end(), "weighing the samples");
   ASSERT_NE(weighing, lines.end());
   EXPECT_EQ(std::count_if(weighing, lines.end(),

@@ -64,7 +64,7 @@ TEST(ProfileLikelihood, AgreesWithTheCovarianceWhereTheModelIsNearlyLinear) {
   for (const char* name : {"a_1_s2", "b_1_s", "l_m"}) {
     const data::Profile& profile = profile_of(result, name);
     const data::FitParameter& parameter = *result.find(name);
-    EXPECT_EQ(profile.verdict, "bounded");
+    EXPECT_EQ(profile.verdict, data::ProfileVerdict::bounded);
     // 0.2 % noise over 2.5 nutations: curvature changes the interval by a few per cent.
     const double half = 1.96 * parameter.sigma;
     EXPECT_NEAR(profile.upper_95 - parameter.value, half, 0.1 * half) << name;
@@ -79,7 +79,8 @@ TEST(ProfileLikelihood, IsNotBoundedOnBothSidesByAFractionOfANutation) {
   options.profile = true;
   const data::Fit result = fit_top(thesis_track(2.0, 1e-3, 2), options);
   // A fifth of a nutation does not tell an infinite length from a long one.
-  EXPECT_THAT(profile_of(result, "l_m").verdict, testing::AnyOf("one-sided", "flat"));
+  EXPECT_THAT(profile_of(result, "l_m").verdict,
+              testing::AnyOf(data::ProfileVerdict::one_sided, data::ProfileVerdict::flat));
 }
 
 TEST(Bootstrap, AgreesWithTheCovarianceOfWhiteNoiseAndRepeatsItself) {

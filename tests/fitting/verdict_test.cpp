@@ -88,7 +88,7 @@ Path nutating_top(const std::map<std::string, double>& given = kNutating,
 TEST(Verdict, IsGoodForATopInWhiteNoise) {
   const data::Fit fit = fit_of(track_of(nutating_top(), white(kSigma_m, 1)), top());
   EXPECT_TRUE(fit.converged);
-  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
 }
 
 TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
@@ -98,7 +98,7 @@ TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
   };
   const data::Fit fit = fit_of(track_of(nutating_top(), noise), top());
   EXPECT_TRUE(fit.converged);
-  EXPECT_EQ(fit.verdict, "good_correlated") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good_correlated) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("widened"));
 }
 
@@ -112,7 +112,7 @@ TEST(Verdict, DoesNotTakeAWobbleForNoise) {
   const data::Fit fit = fit_of(track_of(wobbling, white(kSigma_m, 7)), top());
   EXPECT_TRUE(fit.converged);
   EXPECT_LT(fit.whiteness_p, 1e-3);
-  EXPECT_EQ(fit.verdict, "good_correlated") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good_correlated) << fit.verdict_words;
 }
 
 // Linear drag in the place of a quadratic one leaves hardly more than the noise, and was called
@@ -127,9 +127,9 @@ TEST(Verdict, IsDoubtfulWhereHalvesOfTheRecordAskForOtherParameters) {
   const data::Track track =
       track_of(nutating_top(truth, quadratic, kLong), white(kSigma_m, 13), kLong);
   const data::Fit right = fit_of(track, quadratic), wrong = fit_of(track, linear);
-  EXPECT_EQ(right.verdict, "good") << right.verdict_words;
+  EXPECT_EQ(right.verdict, data::FitVerdict::good) << right.verdict_words;
   EXPECT_LT(wrong.noise_scale, 1.5);
-  EXPECT_EQ(wrong.verdict, "doubtful") << wrong.verdict_words;
+  EXPECT_EQ(wrong.verdict, data::FitVerdict::doubtful) << wrong.verdict_words;
   EXPECT_THAT(wrong.verdict_words, testing::HasSubstr("second half"));
 }
 
@@ -139,7 +139,7 @@ TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
     return path(t) + 5.0 * kSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
   };
   const data::Fit fit = fit_of(track_of(drifting, white(kSigma_m, 8)), top());
-  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("does not explain it"));
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
 }
@@ -166,8 +166,8 @@ data::Fit fit_at(const data::Track& track, const std::map<std::string, double>& 
   return fit;
 }
 
-std::string verdict_at(const data::Track& track, const std::map<std::string, double>& found,
-                       bool cut_short, const std::set<int>& given_up = {}) {
+data::FitVerdict verdict_at(const data::Track& track, const std::map<std::string, double>& found,
+                            bool cut_short, const std::set<int>& given_up = {}) {
   return fit_at(track, found, cut_short, given_up).verdict;
 }
 
@@ -179,9 +179,9 @@ TEST(Verdict, IsUnexplainedWhereACutShortSearchLeavesMoreThanTheNoise) {
     };
     return verdict_at(track_of(drifting, white(kSigma_m, 8)), kNutating, cut_short);
   };
-  EXPECT_EQ(verdict(2.0 * kSigma_m, true), "unexplained");
-  EXPECT_EQ(verdict(2.0 * kSigma_m, false), "good");
-  EXPECT_EQ(verdict(0.0, true), "good");
+  EXPECT_EQ(verdict(2.0 * kSigma_m, true), data::FitVerdict::unexplained);
+  EXPECT_EQ(verdict(2.0 * kSigma_m, false), data::FitVerdict::good);
+  EXPECT_EQ(verdict(0.0, true), data::FitVerdict::good);
 }
 
 // A top that touches something in the last part of the film and is pushed along.
@@ -195,13 +195,13 @@ Path pushed(double from_s) {
 
 TEST(Verdict, IsUnexplainedWhereTheModelGivesUpAPartOfThePath) {
   const data::Fit fit = fit_of(track_of(pushed(2.4), white(kSigma_m, 10)), top());
-  EXPECT_EQ(fit.verdict, "unexplained") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::unexplained) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("left out of the fit"));
 }
 
 TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
   const data::Fit fit = fit_of(track_of(pushed(2.75), white(kSigma_m, 10)), top());
-  EXPECT_EQ(fit.verdict, "doubtful") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
 }
 
 // What integrating leaves is no noise: of a simulated track nothing stands out.
@@ -210,7 +210,7 @@ TEST(Verdict, IsGoodForASimulatedTrackWithoutNoise) {
   for (data::TrackSample& sample : track.samples) sample.covariance_m2.setConstant(NAN);
   std::set<int> many;
   for (int i = 0; i < kSamples; i += 4) many.insert(i);
-  EXPECT_EQ(verdict_at(track, kNutating, false, many), "good");
+  EXPECT_EQ(verdict_at(track, kNutating, false, many), data::FitVerdict::good);
 }
 
 // Of a short track one or two are soon a tenth.
@@ -219,8 +219,8 @@ TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
   std::vector<data::TrackSample> few;
   for (std::size_t i = 0; i < track.samples.size(); i += 10) few.push_back(track.samples[i]);
   track.samples = few;
-  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 11}), "good");
-  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 5, 11}), "unexplained");
+  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 11}), data::FitVerdict::good);
+  EXPECT_EQ(verdict_at(track, kNutating, false, {4, 5, 11}), data::FitVerdict::unexplained);
 }
 
 // Samples [from, to) that stand out, and what is said of that.
@@ -234,13 +234,13 @@ data::Fit with_samples_off(int from, int to) {
 // What a body does there that the model does not let it costs little, as it is given up.
 TEST(Verdict, IsDoubtfulWhereTheModelMissesWhereTheRecordBeginsOrEnds) {
   const data::Fit first = with_samples_off(0, 12);
-  EXPECT_EQ(first.verdict, "doubtful");
+  EXPECT_EQ(first.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(first.verdict_words, testing::HasSubstr("12 of the 12 first positions"));
   EXPECT_THAT(first.verdict_words, testing::HasSubstr("the state given for 0 s"));
   const data::Fit last = with_samples_off(kSamples - 12, kSamples);
-  EXPECT_EQ(last.verdict, "doubtful");
+  EXPECT_EQ(last.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(last.verdict_words, testing::HasSubstr("12 of the 12 last positions"));
-  EXPECT_EQ(with_samples_off(90, 102).verdict, "good");
+  EXPECT_EQ(with_samples_off(90, 102).verdict, data::FitVerdict::good);
 }
 
 // Those that noise hides do not make the others the tracker's.
@@ -248,14 +248,15 @@ TEST(Verdict, IsDoubtfulWhereHalfOfTheFirstPositionsAreMissed) {
   std::set<int> every_other;
   for (int i = 0; i < 20; i += 2) every_other.insert(i);
   const data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
-  EXPECT_EQ(fit_at(track, kNutating, false, every_other, kStandsOut).verdict, "doubtful");
+  EXPECT_EQ(fit_at(track, kNutating, false, every_other, kStandsOut).verdict,
+            data::FitVerdict::doubtful);
 }
 
 TEST(Verdict, StandsAndIsRemarkedOnWhereATrackerMayHaveMissedTheFirstFewPositions) {
   const data::Fit few = with_samples_off(0, 4), fewer = with_samples_off(0, 2);
-  EXPECT_EQ(few.verdict, "good");
+  EXPECT_EQ(few.verdict, data::FitVerdict::good);
   EXPECT_THAT(few.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")));
-  EXPECT_EQ(fewer.verdict, "good");
+  EXPECT_EQ(fewer.verdict, data::FitVerdict::good);
   EXPECT_THAT(fewer.warnings, testing::IsEmpty());
 }
 
@@ -265,7 +266,7 @@ TEST(Verdict, IsGoodWhereTheTrackerTookOtherThingsForTheBody) {
   for (std::size_t i = 5; i < track.samples.size(); i += 8)
     track.samples[i].centre_m = Eigen::Vector2d(0.3, -0.2 + 0.002 * static_cast<double>(i % 7));
   const data::Fit fit = fit_of(track, top());
-  EXPECT_EQ(fit.verdict, "good") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
 }
 
 // A top that nutates once in 2.3 frames, fitted in the wrong phase. A smooth curve knows nothing of
@@ -277,18 +278,18 @@ TEST(Verdict, DoesNotTakeMotionBetweenTooFewFramesForNoise) {
   const auto verdict = [&](const std::map<std::string, double>& found) {
     return verdict_at(track, found, false);
   };
-  EXPECT_EQ(verdict(fast), "good");
+  EXPECT_EQ(verdict(fast), data::FitVerdict::good);
   std::map<std::string, double> shifted = fast;
   shifted["dtheta_rad_s"] = 8.0, shifted["dphi_rad_s"] = 12.0;
-  EXPECT_EQ(verdict(shifted), "unexplained");
+  EXPECT_EQ(verdict(shifted), data::FitVerdict::unexplained);
 }
 
 TEST(Verdict, FindsNothingOfATopInAStraightLine) {
   const auto line = [](double t) { return Eigen::Vector2d(0.05 * t, 0.01 - 0.02 * t); };
   const data::Fit fit = fit_of(track_of(line, white(kSigma_m, 3)), top());
   EXPECT_FALSE(fit.converged);
-  EXPECT_EQ(fit.outcome, "not_identifiable");
-  EXPECT_EQ(fit.verdict, "no_feature");
+  EXPECT_EQ(fit.outcome, data::FitOutcome::not_identifiable);
+  EXPECT_EQ(fit.verdict, data::FitVerdict::no_feature);
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("a straight line in time"));
 }
 
@@ -303,7 +304,7 @@ TEST(Verdict, FindsNothingInABodyThatStandsStill) {
   }
   const data::Fit fit = fit_of(track, rolling_disc());
   EXPECT_FALSE(fit.converged);
-  EXPECT_EQ(fit.verdict, "no_feature") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::no_feature) << fit.verdict_words;
 }
 
 TEST(Verdict, FindsNothingInWhiteNoise) {
@@ -312,7 +313,7 @@ TEST(Verdict, FindsNothingInWhiteNoise) {
   for (const data::Scene& scene : {top(), rolling_disc()}) {
     const data::Fit fit = fit_of(track, scene);
     EXPECT_FALSE(fit.converged) << fit.model;
-    EXPECT_NE(fit.outcome, "converged") << fit.model;
+    EXPECT_NE(fit.outcome, data::FitOutcome::converged) << fit.model;
   }
 }
 
@@ -325,7 +326,7 @@ TEST(Verdict, DoesNotTakeAFigureOfAnotherOriginForAMotionItKnows) {
   for (const data::Scene& scene : {top(), rolling_disc()}) {
     const data::Fit fit = fit_of(track, scene);
     EXPECT_FALSE(fit.converged) << fit.model;
-    EXPECT_EQ(fit.verdict, "unexplained") << fit.model;
+    EXPECT_EQ(fit.verdict, data::FitVerdict::unexplained) << fit.model;
   }
 }
 
@@ -334,7 +335,7 @@ TEST(Verdict, IsWeakWhereParametersAreNotDetermined) {
     return Eigen::Vector2d(0.03 * std::cos(2.0 * t), 0.03 * std::sin(2.0 * t));
   };
   const data::Fit fit = fit_of(track_of(circle, white(kSigma_m, 6)), top());
-  EXPECT_EQ(fit.verdict, "weak") << fit.verdict_words;
+  EXPECT_EQ(fit.verdict, data::FitVerdict::weak) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("not determined: a_1_s2"));
 }
 

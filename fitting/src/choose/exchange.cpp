@@ -37,7 +37,8 @@ bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
                  const Promise::Change& change, const Difference& by) {
   constexpr double kGoodPart = 0.25;
   const double gained = gain(promise, change), paid = price(promise, change);
-  if (known.fit.verdict == "doubtful" || known.fit.verdict == "unexplained")
+  if (known.fit.verdict == data::FitVerdict::doubtful ||
+      known.fit.verdict == data::FitVerdict::unexplained)
     return gained > kGoodPart * promise.before;
   if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
   if (by.larger() && counts_in_error_bars(change, gained / dilution)) return true;
@@ -147,7 +148,7 @@ const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs) {
   for (std::size_t round = 0; round < kMostRounds && chosen != nullptr && chosen->fit.converged;
        ++round) {
     // A term found that way asks for the others anew, unless even then the model lacks something.
-    if (round > 0 && chosen->fit.verdict == "unexplained") break;
+    if (round > 0 && chosen->fit.verdict == data::FitVerdict::unexplained) break;
     const Rung* from = exchanged.contains(chosen) ? as_good(rungs, *chosen, exchanged) : chosen;
     if (from == nullptr) break;
     exchanged.insert(from);

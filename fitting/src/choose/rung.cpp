@@ -32,8 +32,9 @@ bool usable(const data::Fit& fit) {
 
 bool explains(const Rung& rung) {
   constexpr double kTrackersOwn = 1.3;
-  const std::string& verdict = rung.fit.verdict;
-  return rung.fitted && verdict != "doubtful" && verdict != "unexplained" &&
+  const data::FitVerdict verdict = rung.fit.verdict;
+  return rung.fitted && verdict != data::FitVerdict::doubtful &&
+         verdict != data::FitVerdict::unexplained &&
          (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
 }
 

@@ -13,6 +13,8 @@
 
 namespace trochoid::fitting {
 
+using data::FitOutcome, data::FitVerdict;
+
 namespace {
 
 // Whitened by the track's own sigmas, none weighed down; empty where the model has no prediction.
@@ -327,7 +329,7 @@ void warn_unexplained(const Squares& sum, data::Fit& fit) {
                   std::sqrt(sum.residual / sum.scatter)));
 }
 
-void refuse(const char* outcome, const char* verdict, std::string words, data::Fit& fit) {
+void refuse(FitOutcome outcome, FitVerdict verdict, std::string words, data::Fit& fit) {
   fit.converged = false;
   fit.outcome = outcome;
   fit.verdict = verdict;
@@ -339,7 +341,7 @@ void accept(const Problem& problem, const Solution& solution, const Uncertainty&
             const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
   constexpr double kMany = 0.01;
   fit.converged = true;
-  fit.outcome = "converged";
+  fit.outcome = FitOutcome::converged;
   fit.reason = fmt::format("{} iterations from {}", solution.iterations, fit.start_path);
   const double widened = error.widened;
   const bool correlated = error.whiteness.inflation > 1.0;
@@ -366,10 +368,10 @@ void accept(const Problem& problem, const Solution& solution, const Uncertainty&
     words += fmt::format(", and what is left looks like noise{}",
                          stated ? fmt::format(" ({:.2g} times the stated)", fit.noise_scale) : "");
   const std::vector<std::string> open = undetermined(fit);
-  fit.verdict = doubtful        ? "doubtful"
-                : !open.empty() ? "weak"
-                : correlated    ? "good_correlated"
-                                : "good";
+  fit.verdict = doubtful        ? FitVerdict::doubtful
+                : !open.empty() ? FitVerdict::weak
+                : correlated    ? FitVerdict::good_correlated
+                                : FitVerdict::good;
   if (!open.empty()) words += "; not determined: " + listed(open);
   fit.verdict_words = words;
 }
@@ -382,19 +384,20 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   warn_unexplained(sum, fit);
   const Misfit worst = misfit(problem, sum);
   const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
-  if (!solution.converged) return refuse("no_convergence", "unexplained", solution.message, fit);
+  if (!solution.converged)
+    return refuse(FitOutcome::no_convergence, FitVerdict::unexplained, solution.message, fit);
   if (!explains_path(sum))
-    return refuse("unexplained", "unexplained",
+    return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
                   "the best path found leaves most of the motion unexplained", fit);
   if (worst.times > kHopeless)
-    return refuse("unexplained", "unexplained",
+    return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
                   fmt::format("the model does not explain the track: the residuals of its {} are "
                               "{:.2g} times their noise",
                               kChannelWords[static_cast<int>(worst.channel)], worst.times),
                   fit);
   // Where there are many valleys another one may explain what this one does not.
   if (cut_short && !is_tracked(problem) && worst.times * worst.times > chi2_gate(problem.rows()))
-    return refuse("unexplained", "unexplained",
+    return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
                   fmt::format("the search ended at its limit, and the best path it found does not "
                               "explain the track: the residuals of its {} are {:.2g} times their "
                               "noise",
@@ -403,10 +406,10 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   constexpr double kTooMany = 0.1;
   const GivenUp lost = given_up(problem, solution);
   if (lost.more_than(kTooMany))
-    return refuse("unexplained", "unexplained",
+    return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
                   "the model does not explain the track: " + lost.words(), fit);
   if (const int degree = sufficient_polynomial(problem, solution.u); degree >= 0)
-    return refuse("not_identifiable", "no_feature",
+    return refuse(FitOutcome::not_identifiable, FitVerdict::no_feature,
                   fmt::format("{} in time explains the path as well: nothing in it asks for the "
                               "model '{}', whose parameters mean nothing here",
                               kPolynomials[degree], fit.model),
@@ -417,7 +420,8 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
 namespace {
 
 bool passed(const data::Fit& fit) {
-  return fit.verdict == "good" || fit.verdict == "good_correlated" || fit.verdict == "weak";
+  return fit.verdict == FitVerdict::good || fit.verdict == FitVerdict::good_correlated ||
+         fit.verdict == FitVerdict::weak;
 }
 
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
@@ -428,7 +432,7 @@ void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::F
   if (!passed(fit) || error.whiteness.p_value > kNotWhite) return;
   if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
   if (is_tracked(problem) && drift.gain < kOfATracker) return;
-  fit.verdict = "doubtful";
+  fit.verdict = FitVerdict::doubtful;
   fit.verdict_words = fmt::format(
       "the model follows the track, but does not explain it: the second half asks for other "
       "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
@@ -486,7 +490,7 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
         "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
     return;
   }
-  fit.verdict = "doubtful";
+  fit.verdict = FitVerdict::doubtful;
   fit.verdict_words = fmt::format(
       "the model follows the track, but does not explain {} {}: {}, more than a "
       "tracker misses in a row, and count for less: {}",

@@ -19,7 +19,7 @@ struct Squares {
 };
 [[nodiscard]] Squares squares(const Problem& problem, const Solution& solution);
 
-/// What a fit is worth. Words of data::Fit::verdict:
+/// What a fit is worth, data::FitVerdict:
 ///   unexplained      not a minimum; or residuals beyond 4 times the track's sigmas, the samples'
 ///                    scatter about a smooth curve and 1 % of the motion (angles: 0.2 rad), or
 ///                    beyond 8 times; or a 30th of the motion's variance left; or a tenth of the

@@ -198,8 +198,8 @@ bool leads_nowhere(const Problem& problem, const Found& found) {
 }
 
 void refuse(const Problem& problem, const std::string& reason, data::Fit& fit) {
-  fit.outcome = "no_convergence";
-  fit.verdict = "unexplained";
+  fit.outcome = data::FitOutcome::no_convergence;
+  fit.verdict = data::FitVerdict::unexplained;
   fit.reason = fit.verdict_words = reason;
   describe_arcs(problem, fit);
 }
@@ -345,11 +345,13 @@ data::Fit OneFit::described(Bars bars) {
   tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
   judge(problem_, solution_, error, cut_short_, fit);
-  if (fit.verdict == "unexplained" || fit.verdict == "doubtful") tell_held(scene_, fit);
+  if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
+    tell_held(scene_, fit);
   if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;
-    fit.outcome = fit.verdict = "unexplained";
+    fit.outcome = data::FitOutcome::unexplained;
+    fit.verdict = data::FitVerdict::unexplained;
     fit.reason = fit.verdict_words = fmt::format(
         "the body's centre strays by {:.2g} m rms: a disc that only turns on its pivot stays where "
         "it is; is it a top?",

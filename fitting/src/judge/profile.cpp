@@ -161,7 +161,9 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
   profile.upper_95 = above.bounded ? transform.value(solution.u[index] + above.bound) : info.upper;
   if (profile.lower_95 > profile.upper_95) std::swap(profile.lower_95, profile.upper_95);
   const int bounds = below.bounded + above.bounded;
-  profile.verdict = bounds == 2 ? "bounded" : bounds == 1 ? "one-sided" : "flat";
+  profile.verdict = bounds == 2   ? data::ProfileVerdict::bounded
+                    : bounds == 1 ? data::ProfileVerdict::one_sided
+                                  : data::ProfileVerdict::flat;
   return profile;
 }
 

@@ -238,10 +238,7 @@ void add_fit_parts(py::module_& module) {
       .def_readonly("identifiable", &FitParameter::identifiable)
       .def_readonly("note", &FitParameter::note)
       .def_property_readonly(
-          "status",
-          [](const FitParameter& p) {
-            return data::kParameterStatuses[static_cast<std::size_t>(p.status)];
-          },
+          "status", [](const FitParameter& p) { return name(p.status); },
           "free, fixed, derived or prior")
       .def("__repr__", [](const FitParameter& p) {
         return py::str("{} = {:.8g} +- {:.2g} {}").format(p.name, p.value, p.sigma, p.unit);
@@ -272,7 +269,8 @@ void add_error_bars(py::module_& module) {
   using data::Bootstrap, data::BootstrapSpread, data::Profile;
   py::class_<Profile>(module, "Profile", "How well the fit holds at fixed values of a parameter.")
       .def_readonly("parameter", &Profile::parameter)
-      .def_readonly("verdict", &Profile::verdict, "bounded, one-sided or flat")
+      .def_property_readonly(
+          "verdict", [](const Profile& p) { return name(p.verdict); }, "bounded, one-sided or flat")
       .def_readonly("lower_95", &Profile::lower_95)
       .def_readonly("upper_95", &Profile::upper_95)
       .def_property_readonly("values", [](const Profile& p) { return array_of(p.values); })
@@ -296,9 +294,9 @@ void add_fit_values(py::module_& module) {
   py::class_<Fit>(module, "FitValue")
       .def_readonly("model", &Fit::model)
       .def_readonly("converged", &Fit::converged)
-      .def_readonly("outcome", &Fit::outcome)
+      .def_property_readonly("outcome", [](const Fit& f) { return name(f.outcome); })
       .def_readonly("reason", &Fit::reason)
-      .def_readonly("verdict", &Fit::verdict)
+      .def_property_readonly("verdict", [](const Fit& f) { return name(f.verdict); })
       .def_readonly("verdict_words", &Fit::verdict_words)
       .def_readonly("start_path", &Fit::start_path)
       .def_readonly("parameters", &Fit::parameters)

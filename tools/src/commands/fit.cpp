@@ -43,17 +43,8 @@ std::string with_error(double value, double sigma) {
   return fmt::format("{:.{}g} +- {:.2g}", value, std::min(digits, 15), sigma);
 }
 
-const char* word(data::ParameterStatus status) {
-  switch (status) {
-    case data::ParameterStatus::fixed:
-      return "fixed";
-    case data::ParameterStatus::derived:
-      return "derived";
-    case data::ParameterStatus::prior:
-      return "prior";
-    default:
-      return "fitted";
-  }
+std::string_view word(data::ParameterStatus status) {
+  return status == data::ParameterStatus::free ? "fitted" : name(status);
 }
 
 void print_notes(const data::Fit& fit) {
@@ -78,10 +69,11 @@ void print_comparison(const std::vector<data::ModelScore>& models) {
 }
 
 void print(const data::Fit& fit) {
-  fmt::print("model {}: {} ({}), start {}\n", fit.model, fit.outcome, fit.reason, fit.start_path);
+  fmt::print("model {}: {} ({}), start {}\n", fit.model, name(fit.outcome), fit.reason,
+             fit.start_path);
   // Where no start led anywhere, there is nothing to count.
   if (fit.parameters.empty()) return print_notes(fit);
-  if (fit.converged) fmt::print("  {}: {}\n", fit.verdict, fit.verdict_words);
+  if (fit.converged) fmt::print("  {}: {}\n", name(fit.verdict), fit.verdict_words);
   for (const data::FitParameter& p : fit.parameters)
     fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
                word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
@@ -90,7 +82,7 @@ void print(const data::Fit& fit) {
   fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
              fit.covariance_names.size(), fit.integration_error_sigma);
   for (const data::Profile& p : fit.profiles)
-    fmt::print("  profile of {:<22} {:<9} 95 % {:.6g} .. {:.6g}\n", p.parameter, p.verdict,
+    fmt::print("  profile of {:<22} {:<9} 95 % {:.6g} .. {:.6g}\n", p.parameter, name(p.verdict),
                p.lower_95, p.upper_95);
   for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
     fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
@@ -179,7 +171,7 @@ data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& trac
 /// What could explain a track that the fit does not.
 std::string advice(const data::Fit& fit, const data::Scene& scene,
                    const fitting::FitOptions& options) {
-  if (fit.outcome != "unexplained") return "";
+  if (fit.outcome != data::FitOutcome::unexplained) return "";
   std::string words;
   const bool pivot_assumed = fit.model.starts_with("top") && !scene.support.pivot_m &&
                              !scene.fit.free_pivot && !options.free_pivot;

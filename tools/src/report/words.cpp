@@ -34,21 +34,22 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                 std::isfinite(facts.rms_axis_sigma)
                     ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
                     : "");
-  const bool weak = fit.verdict == "weak";
+  const bool weak = fit.verdict == data::FitVerdict::weak;
   const bool wide = facts.rms_axis_sigma > kTooWide;
   if (!fit.converged) {
     const std::string& why = fit.verdict_words.empty() ? fit.reason : fit.verdict_words;
     return {"bad",
-            fit.verdict == "no_feature" ? "nothing to fit" : "not trustworthy",
+            fit.verdict == data::FitVerdict::no_feature ? "nothing to fit" : "not trustworthy",
             fmt::format("The model “{}” was tried: {}{} Do not use its numbers.", fit.model, why,
                         why.ends_with('?') ? "" : "."),
             {}};
   }
-  const bool followed = fit.verdict == "doubtful";
-  const char* word = followed                           ? "followed, not explained"
-                     : weak                             ? "explained, not all determined"
-                     : fit.verdict == "good_correlated" ? "explained, residuals correlated"
-                                                        : "explained";
+  const bool followed = fit.verdict == data::FitVerdict::doubtful;
+  const bool correlated = fit.verdict == data::FitVerdict::good_correlated;
+  const char* word = followed     ? "followed, not explained"
+                     : weak       ? "explained, not all determined"
+                     : correlated ? "explained, residuals correlated"
+                                  : "explained";
   verdict = {
       weak || followed || wide ? "fair" : "good",
       word,

@@ -12,9 +12,46 @@ namespace trochoid::data {
 /// free: estimated; fixed: given; derived: computed from free ones and priors (with propagated
 /// sigma); prior: free but carried by its prior, the recording says nothing.
 enum class ParameterStatus { free, fixed, derived, prior };
-/// How a fit file spells them, in their order.
-inline constexpr std::array<std::string_view, 4> kParameterStatuses{"free", "fixed", "derived",
-                                                                    "prior"};
+
+/// How the search for a fit ended. unexplained: the best minimum does not follow the track to its
+/// noise; not_identifiable: nothing in the track asks for the model; none: not said.
+enum class FitOutcome { none, converged, no_convergence, unexplained, not_identifiable };
+
+/// What a fit is worth. good_correlated: residuals hang together and error bars are widened for
+/// that; weak: explained but parameters are not determined; doubtful: followed but residuals beyond
+/// twice their noise; no_feature: nothing in the track asks for the model; none: not said.
+enum class FitVerdict { none, good, good_correlated, weak, doubtful, no_feature, unexplained };
+
+/// Whether chi-square bounds a parameter on both sides, on one, or on none (flat).
+enum class ProfileVerdict { none, bounded, one_sided, flat };
+
+/// How files and tables spell the values of each of them, in their order.
+constexpr auto spellings(ParameterStatus) {
+  return std::to_array<std::string_view>({"free", "fixed", "derived", "prior"});
+}
+constexpr auto spellings(FitOutcome) {
+  return std::to_array<std::string_view>(
+      {"", "converged", "no_convergence", "unexplained", "not_identifiable"});
+}
+constexpr auto spellings(FitVerdict) {
+  return std::to_array<std::string_view>(
+      {"", "good", "good_correlated", "weak", "doubtful", "no_feature", "unexplained"});
+}
+constexpr auto spellings(ProfileVerdict) {
+  return std::to_array<std::string_view>({"", "bounded", "one-sided", "flat"});
+}
+
+/// An enumeration with spellings.
+template <class Enum>
+concept Spelled = requires(Enum value) {
+  spellings(value);
+};
+
+/// @returns the value's spelling, e.g. "good_correlated".
+template <Spelled Enum>
+[[nodiscard]] constexpr std::string_view name(Enum value) {
+  return spellings(value)[static_cast<std::size_t>(value)];
+}
 
 /// One parameter as the fit leaves it.
 struct FitParameter {
@@ -59,7 +96,7 @@ struct ModelScore {
 /// How well the best fit of everything else holds at fixed values of one parameter.
 struct Profile {
   std::string parameter;  ///< its name
-  std::string verdict;    ///< bounded; one-sided; flat: the data bound it on no side
+  ProfileVerdict verdict = ProfileVerdict::none;
   /// Where chi-square has risen by the 95 % quantile; the end of the parameter's range (0,
   /// -+infinity) on a side without a bound.
   double lower_95 = 0.0, upper_95 = 0.0;
@@ -87,14 +124,9 @@ struct Bootstrap {
 struct Fit {
   std::string model;       ///< as [model] name in the scene: top, rolling ...
   bool converged = false;  ///< whether the outcome is "converged"
-  /// One word: converged; no_convergence; unexplained, the best minimum does not follow the track
-  /// to its noise; not_identifiable, nothing in the track asks for the model.
-  std::string outcome;
+  FitOutcome outcome = FitOutcome::none;
   std::string reason;  ///< one sentence
-  /// What the fit is worth: good; good_correlated, residuals hang together and error bars are
-  /// widened for that; weak, explained but parameters are not determined; doubtful, followed but
-  /// residuals beyond twice their noise; no_feature; unexplained.
-  std::string verdict;
+  FitVerdict verdict = FitVerdict::none;
   std::string verdict_words;  ///< the same as a sentence
   /// Which start won: integral_matching, integrals (the motion of a pin), windows, spectrum (a fast
   /// top), spin (a rim in steady rolling), slip (one that slips at first), rolls_first (one that
