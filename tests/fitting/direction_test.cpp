@@ -183,7 +183,7 @@ TEST_F(NearlyFlatCoin, IsNotGivenALossByDirectionsThatItsTrackerMadeUp) {
   for (const unsigned seed : {1U, 2U, 3U, 4U, 5U}) {
     const data::Track made_up = track(seed);
     FitOptions options;
-    options.strategy = "single";
+    options.strategy = Strategy::single;
     options.start = kTruth;
     const data::Fit found = fit(std::span(&made_up, 1), scene_, options);
     const data::Fit larger = fit(std::span(&made_up, 1), with_gap, options);

@@ -274,7 +274,7 @@ TEST(Fit, GoesOnDownAValleyThatOnlyFineIntegrationShows) {
   const Long bent(100.0);
   const data::Track track = track_of(60, kSigma, 1.0);
   FitOptions options;
-  options.strategy = "single";
+  options.strategy = Strategy::single;
   options.start = {{"w1_rad_s", 0.0}, {"w2_rad_s", 0.0}};
   const data::Fit found = fit(std::span(&track, 1), bent, {}, options);
   EXPECT_NEAR(found.find("w1_rad_s")->value, 1.0, 0.05 * kSigma);

@@ -429,7 +429,7 @@ Rung softly_from_near(Case c) {
   Rung rung;
   rung.scene = c.scene;
   FitOptions near;
-  near.strategy = "single";
+  near.strategy = Strategy::single;
   near.start = {{"slip_regularisation_m_s", 2e-4},
                 {"friction", 0.3},
                 {"theta_rad", 0.96},
@@ -550,7 +550,7 @@ TEST(BuriedRimFit, FindsTheBestMotionNotTheFirstThatPasses) {
   for (int i = 0; i < 200; ++i) t_s.push_back(i / 200.0);
   const Eigen::VectorXd path = path_of(scene, truth, t_s);
   FitOptions from_truth;
-  from_truth.strategy = "single";
+  from_truth.strategy = Strategy::single;
   from_truth.start = truth;
   for (int seed = 1; seed <= 5; ++seed) {
     const data::Track track = buried_in_noise(path, t_s, seed);
@@ -578,7 +578,7 @@ class SlidingRimFit : public testing::Test {
     scene_.model.friction = 0.2;
     scene_.model.rolling_friction_m = 5e-5;
     scene_.model.pivoting_friction_m = 2.6e-4;
-    from_truth_.strategy = "single";
+    from_truth_.strategy = Strategy::single;
     from_truth_.start = truth_;
   }
   [[nodiscard]] data::Track track(int seed) const {
@@ -640,7 +640,7 @@ TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
   const Case c = noisy("s06_roll_disc", 1.0, 2e-4);
   FitOptions options;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
-  options.strategy = "single";
+  options.strategy = Strategy::single;
   for (const char* same : {"x_m", "y_m", "w2_rad_s"}) options.start[same] = fit.find(same)->value;
   for (const char* turned : {"w1_rad_s", "w3_rad_s"})
     options.start[turned] = -fit.find(turned)->value;

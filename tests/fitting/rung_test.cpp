@@ -808,7 +808,7 @@ TEST_F(Promised, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
   std::vector<std::string> lines;
   FitOptions astray;
   astray.log = [&](const std::string& line) { lines.push_back(line); };
-  astray.strategy = "single";
+  astray.strategy = Strategy::single;
   astray.start = values_of(fitted({"air"}).fit);
   astray.start["w2_rad_s"] *= -1.0;
   const Rung rung = rung_with({"air", "pivoting"});
@@ -827,7 +827,7 @@ TEST_F(Promised, ALossThatWasGoneIsLetActWithoutLosingThePath) {
   std::vector<std::string> lines;
   FitOptions from;
   from.log = [&](const std::string& line) { lines.push_back(line); };
-  from.strategy = "single";
+  from.strategy = Strategy::single;
   from.start = values_of(fitted({"air"}).fit);
   from.start["pivoting_friction_m"] = 1e-12;
   Rung rung = rung_with({"air", "pivoting"});

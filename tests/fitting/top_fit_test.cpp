@@ -444,7 +444,7 @@ TEST(TopFit, StepsAcrossThePole) {
                         .seed = 3,
                         .drag = scene.model};
   FitOptions beside;
-  beside.strategy = "single";
+  beside.strategy = Strategy::single;
   beside.start = planted.values;
   beside.start["theta_rad"] = 0.004;
   beside.start["phi_rad"] = 1.94;

@@ -219,7 +219,7 @@ class BlurredFirstPictures : public testing::Test {
 
 TEST_F(BlurredFirstPictures, DoNotTellTheStartBetterThanTheOthersDoWithoutOneOfThem) {
   FitOptions options;
-  options.strategy = "single";
+  options.strategy = Strategy::single;
   options.start = kSliding;
   const data::Track blurred = track();
   const data::Fit result = fit(std::span(&blurred, 1), scene_, options);

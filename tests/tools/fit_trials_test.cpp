@@ -46,8 +46,8 @@ class FitTrials : public testing::Test {
 
 TEST_F(FitTrials, FindTheTopWithoutAGuess) {
   for (const double noise : {0.01, 0.05}) {
-    const std::vector<FitTrial> trials =
-        fit_trials({.model = "top", .noise = noise}, {{"no guess", "auto"}}, 25, 3, 0);
+    const std::vector<FitTrial> trials = fit_trials(
+        {.model = "top", .noise = noise}, {{"no guess", fitting::Strategy::automatic}}, 25, 3, 0);
     for (const FitTrial& trial : trials)
       EXPECT_TRUE(trial.optimum) << "seed 3, scene " << trial.scene << ", noise " << noise;
   }

@@ -137,7 +137,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     again.model.clear();
     again.rolls_at_first = chosen->rolls_at_first;
     again.start = values_of(chosen->fit);
-    if (!again.start.empty()) again.strategy = "single";
+    if (!again.start.empty()) again.strategy = Strategy::single;
     try {
       result.fit = fit_one_of_several(tracks, chosen->scene, again);
     } catch (const NumericalError& error) {

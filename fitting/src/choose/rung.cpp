@@ -136,7 +136,7 @@ Squares squares_of(const data::Track& track, int first, int last, int track_inde
 double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptions options) {
   options.rolls_at_first = rung.rolls_at_first;
   options.start = values_of(rung.fit);
-  if (!options.start.empty()) options.strategy = "single";
+  if (!options.start.empty()) options.strategy = Strategy::single;
   options.hold_back = kHeldBack;
   if (options.progress)
     options.progress = [say = options.progress](const std::string& stage) {
@@ -295,8 +295,8 @@ bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung
   return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
 }
 
-void fit_from(std::span<const data::Track> tracks, const Values& values,
-              const std::string& strategy, const FitOptions& options, Rung& rung) {
+void fit_from(std::span<const data::Track> tracks, const Values& values, Strategy strategy,
+              const FitOptions& options, Rung& rung) {
   FitOptions own = options;
   own.start = values;
   own.strategy = strategy;
@@ -330,7 +330,7 @@ Rung rolling_at_first(Rung rung) {
 // Where its end is all that is known of the first samples, they have to be followed anew.
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
   if (!slips_unseen_at_first(tracks, rung)) return;
-  for (const char* strategy : {"single", "growing"}) {
+  for (const Strategy strategy : {Strategy::single, Strategy::growing}) {
     Rung rolls = rolling_at_first(rung);
     fit_from(tracks, values_of(rung.fit), strategy, options, rolls);
     if (!rolls.fitted || !rolls.fit.converged) continue;
@@ -348,7 +348,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
     if (extends) {
       own.start = extended_start(*below, rung);
-      own.strategy = "single";
+      own.strategy = Strategy::single;
       go_on_beside(tracks, *below, own, rung);
     }
     // Near a solution that explains nothing there is nothing to be found.
@@ -361,7 +361,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (extends)
         hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
                             parameters_of(rung.scene));
-      own.strategy = "auto";
+      own.strategy = Strategy::automatic;
       // A search may find another law of friction than what it goes on from.
       Rung searched = rung;
       searched.scene = asked;
@@ -389,7 +389,7 @@ void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitO
         info.role == model::ParameterInfo::Role::initial && begins != nullptr)
       start[info.name] = begins->value;
   Rung rolls = rolling_at_first(rung);
-  fit_from(tracks, start, "single", options, rolls);
+  fit_from(tracks, start, Strategy::single, options, rolls);
   if (rolls.fitted && rolls.fit.converged) rung = std::move(rolls);
 }
 
@@ -441,7 +441,7 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
   FitOptions own = options;
   own.start = first_part.values;
   const bool slides = rung.scene.model.name == "sliding";
-  own.strategy = slides ? kRollsFirst : "growing";
+  own.strategy = slides ? Strategy::rolls_first : Strategy::growing;
   own.rolls_at_first = rung.rolls_at_first = slides;
   try_rung(rung, [&] {
     take(draft_one_of_several(tracks, rung.scene, own, &rung.first_part), rung);
@@ -452,7 +452,7 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung) {
-  fit_from(tracks, values, "single", options, rung);
+  fit_from(tracks, values, Strategy::single, options, rung);
 }
 
 void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
@@ -506,7 +506,7 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
   FitOptions own = options;
   own.rolls_at_first = rung.rolls_at_first = known.rolls_at_first;
   if (known.fit.arcs.size() != 1) return fit_beside(tracks, known, own, rung);
-  own.strategy = "single";
+  own.strategy = Strategy::single;
   const Rung blank = rung;
   const Values from_known = extended_start(known, rung);
   if (!near.values.empty()) {

@@ -30,7 +30,7 @@ std::optional<Draft> fit_named(std::span<const data::Track> tracks, const data::
 FitOptions going_on_from(const data::Fit& fit, FitOptions options) {
   if (auto values = values_of(fit); !values.empty()) {
     options.start = std::move(values);
-    options.strategy = "single";
+    options.strategy = Strategy::single;
   }
   return options;
 }
@@ -45,7 +45,7 @@ std::optional<Draft> fit_gently(std::span<const data::Track> tracks, const FitOp
   const data::Scene held = scene;
   scene.fit.free.emplace_back(kSlipScale);
   auto fit = fit_named(tracks, scene, options, law);
-  if (options.strategy == "auto" && (!fit || !fit->fit.converged))
+  if (options.strategy == Strategy::automatic && (!fit || !fit->fit.converged))
     if (const auto near = fit_named(tracks, held, options, law); near && near->fit.converged)
       fit = fit_named(tracks, scene, going_on_from(near->fit, options), law);
   if (const data::FitParameter* found = fit ? fit->fit.find(kSlipScale) : nullptr)
@@ -93,7 +93,7 @@ bool softness_is_open(const Rung& rung) {
 void fit_softly(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
   FitOptions exact = options;
   exact.start.erase(kSlipScale);
-  const bool from_nothing = options.strategy == "auto";
+  const bool from_nothing = options.strategy == Strategy::automatic;
   const bool rolls_first = !rung.first_part.empty();
   data::Scene soft = rung.scene;
   std::optional<Draft> gentle, sharp;

@@ -41,7 +41,7 @@ Problem without_outliers(Problem problem) {
 // the path has to be looked for, angles are compared each by itself.
 Found search_without_outliers(Problem& problem, const SearchRequest& asked) {
   Problem search = without_outliers(problem);
-  for (ArcData& arc : search.arcs) arc.angles_apart = asked.options->strategy != "single";
+  for (ArcData& arc : search.arcs) arc.angles_apart = asked.options->strategy != Strategy::single;
   Found found = find(search, asked);
   problem.base = search.base;
   return found;

@@ -1,12 +1,9 @@
 #include "start/find.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 
 namespace trochoid::fitting {
@@ -330,15 +327,20 @@ Found find_arc(Problem problem, const SearchRequest& asked) {
   const FitOptions& options = *asked.options;
   const Start given{"given", options.start};
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  if (options.strategy == "single") return grow(problem, given, all);
-  if (options.strategy == "growing") return grow(problem, given, std::max(24, all / 16));
-  if (options.strategy == kRollsFirst) return rolls_first(problem, asked);
-  if (options.strategy == "integral") return from_best_start(problem, asked.starter);
-  if (options.strategy == "multiple") return shoot_top(problem, given);
-  if (options.strategy != "auto")
-    throw InputError(
-        fmt::format("strategy '{}' is unknown; it is auto, single, growing, multiple or integral",
-                    options.strategy));
+  switch (options.strategy) {
+    case Strategy::single:
+      return grow(problem, given, all);
+    case Strategy::growing:
+      return grow(problem, given, std::max(24, all / 16));
+    case Strategy::rolls_first:
+      return rolls_first(problem, asked);
+    case Strategy::integral:
+      return from_best_start(problem, asked.starter);
+    case Strategy::multiple:
+      return shoot_top(problem, given);
+    case Strategy::automatic:
+      break;
+  }
   Found best = with_other_losses(problem, asked, search_path(problem, asked));
   best.cut_short = !best.passed && exhausted(problem, best);
   if (best.passed || !asked.start_given) return best;

@@ -7,9 +7,6 @@
 
 namespace trochoid::fitting {
 
-/// Strategy of a sliding model whose given start is that of a body that rolls at first.
-inline constexpr const char* kRollsFirst = "rolls_first";
-
 /// Gives starts for a window of an arc, best first; may be empty.
 using Starter = std::function<std::vector<Start>(const ArcData& window)>;
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "commands.hpp"
 #include "common/outputs.hpp"
@@ -57,6 +58,7 @@ double thread_ms() {
 }
 
 std::vector<FitSetting> fit_settings() {
+  using fitting::Strategy;
   const MadeTrackOptions ten_seconds{
       .model = "thesis", .noise = 0.01, .duration_s = 10.0, .rate_hz = 100.0};
   std::vector<FitSetting> list;
@@ -65,12 +67,16 @@ std::vector<FitSetting> fit_settings() {
     fitting::FitOptions how;
     how.threads = 1;
     change(how);
-    const bool off =
-        how.strategy == "single" || how.strategy == "growing" || how.strategy == "multiple";
+    const bool off = how.strategy != Strategy::automatic && how.strategy != Strategy::integral;
     list.push_back({axis, std::move(name), tracks, std::move(how), off});
   };
-  for (const char* strategy : {"auto", "integral", "multiple", "growing", "single"})
-    add("strategy", strategy, ten_seconds, [&](auto& how) { how.strategy = strategy; });
+  constexpr std::pair<const char*, Strategy> kStrategies[] = {{"auto", Strategy::automatic},
+                                                              {"integral", Strategy::integral},
+                                                              {"multiple", Strategy::multiple},
+                                                              {"growing", Strategy::growing},
+                                                              {"single", Strategy::single}};
+  for (const auto& one : kStrategies)
+    add("strategy", one.first, ten_seconds, [&](auto& how) { how.strategy = one.second; });
   add("tolerance", "chosen", ten_seconds, [](auto&) {});
   for (const double tolerance : {1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12})
     add("tolerance", fmt::format("{:.0e}", tolerance), ten_seconds,

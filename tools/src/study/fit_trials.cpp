@@ -66,7 +66,7 @@ struct Attempt {
   double time_ms = 0.0;
 };
 
-Attempt attempt(const MadeTrack& made, const std::string& strategy,
+Attempt attempt(const MadeTrack& made, fitting::Strategy strategy,
                 std::map<std::string, double> start) {
   fitting::FitOptions options;
   options.strategy = strategy;
@@ -106,7 +106,7 @@ std::vector<FitTrial> trials_of_scene(const MadeTrackOptions& tracks,
   const MadeTrack made = make_track(tracks, generator);
   const std::map<std::string, double> off = start_off(made, generator);
   // From the truth the minimiser falls into the nearest minimum, which is nearly always the best.
-  const Attempt from_truth = attempt(made, "single", made.truth);
+  const Attempt from_truth = attempt(made, fitting::Strategy::single, made.truth);
   double best = answered(from_truth.fit) ? from_truth.fit.chi2 : kInfinity;
   std::vector<FitTrial> trials;
   for (int s = 0; s < static_cast<int>(strategies.size()); ++s) {
@@ -181,8 +181,8 @@ struct Draw {
 Draw draw(const MadeTrackOptions& tracks, std::uint64_t seed, int index) {
   std::mt19937_64 generator = generator_of(seed, index);
   const MadeTrack made = make_track(tracks, generator);
-  const Attempt from_truth = attempt(made, "single", made.truth);
-  const Attempt tried = attempt(made, "auto", {});
+  const Attempt from_truth = attempt(made, fitting::Strategy::single, made.truth);
+  const Attempt tried = attempt(made, fitting::Strategy::automatic, {});
   Draw result;
   result.refused = tried.refused;
   // A track taken for two throws has states the truth does not know.
@@ -206,13 +206,14 @@ Draw draw(const MadeTrackOptions& tracks, std::uint64_t seed, int index) {
 }  // namespace
 
 std::vector<FitStrategy> fit_strategies() {
+  using fitting::Strategy;
   using Start = FitStrategy::Start;
-  return {{"no guess", "auto", Start::none},
-          {"integral matching only", "integral", Start::none},
-          {"multiple shooting", "multiple", Start::off, true},
-          {"growing window", "growing", Start::off},
-          {"single shooting", "single", Start::off},
-          {"single, blind start", "single", Start::blind}};
+  return {{"no guess", Strategy::automatic, Start::none},
+          {"integral matching only", Strategy::integral, Start::none},
+          {"multiple shooting", Strategy::multiple, Start::off, true},
+          {"growing window", Strategy::growing, Start::off},
+          {"single shooting", Strategy::single, Start::off},
+          {"single, blind start", Strategy::single, Start::blind}};
 }
 
 std::vector<FitTrial> fit_trials(const MadeTrackOptions& tracks,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "study/made_tracks.hpp"
+#include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::tools {
 
@@ -13,7 +14,7 @@ namespace trochoid::tools {
 struct FitStrategy {
   enum class Start { none, off, blind };  ///< off: 30-50 % wrong; blind: what anyone would write
   std::string name;
-  std::string strategy;
+  fitting::Strategy strategy = fitting::Strategy::automatic;
   Start start = Start::none;
   bool tops_only = false;
 };

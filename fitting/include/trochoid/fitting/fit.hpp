@@ -13,6 +13,17 @@
 
 namespace trochoid::fitting {
 
+/// Where a search starts and how it goes on from there. `automatic` is what a fit is for; the
+/// others are for comparisons, and all but `integral` go on from the given start alone.
+enum class Strategy {
+  automatic,    ///< data-driven starts, then the given one, then multiple shooting
+  integral,     ///< the data-driven start and nothing after it
+  single,       ///< single shooting
+  growing,      ///< on windows that grow
+  multiple,     ///< multiple shooting, of a top
+  rolls_first,  ///< of a sliding body: rolling for a while, then into sliding
+};
+
 struct FitOptions {
   std::string model;  ///< overrides the scene's
   bool free_pivot = false;
@@ -24,10 +35,7 @@ struct FitOptions {
   std::uint64_t seed = 1;
   int threads = 0;         ///< 0 = all cores; the result does not depend on it
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
-  /// auto: data-driven starts, then the given one, then multiple shooting. For comparisons:
-  /// integral, the data-driven start and nothing after it; and from the given start alone single
-  /// (single shooting), growing (windows), multiple (multiple shooting).
-  std::string strategy = "auto";
+  Strategy strategy = Strategy::automatic;
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   /// A sliding body rolls when the record begins: its velocity there follows from its spin. What a
   /// slip that friction has ended by the second sample was is not seen, and what goes with it is
@@ -43,8 +51,8 @@ struct FitOptions {
 /// Fits the scene's model to the tracks (several: shared dynamics, own initial states).
 /// An unwelcome answer (no convergence, not identifiable, too short) is an outcome in the Fit.
 /// @throws InputError if the scene lacks what the model needs, the given start names a parameter
-///         that the model does not have, or an option is out of its range; TrackError if a track is
-///         unusable.
+///         that the model does not have, the strategy is not for the model, or an option is out of
+///         its range; TrackError if a track is unusable.
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const data::Scene& scene,
                             const FitOptions& options = {});
 
