@@ -124,15 +124,6 @@ SteadyMotion flat_motion(const RimBody& body, Floor floor) {
   return result;
 }
 
-// Spin of the steady rolling motion.                                                            (2)
-double rolling_spin(const RimBody& b, double theta, double W) {
-  const double s = std::sin(theta), c = std::cos(theta);
-  const double reach = b.R * s + b.h * c;  // height of the centre of mass
-  const double numerator =
-      b.A * W * W * s * c + b.m * W * W * reach * b.h * s + b.m * b.g * (b.h * s - b.R * c);
-  return numerator / (W * (b.C * s + b.m * b.R * reach));
-}
-
 std::optional<SteadyMotion> on_circle(const RimBody& b, double theta, double radius) {
   const double s = std::sin(theta), c = std::cos(theta);
   const double reach = b.R * s + b.h * c;
@@ -189,6 +180,26 @@ std::string_view name(Floor floor) {
   return floor == Floor::rough ? "rough" : "smooth";
 }
 
+double steady_rolling_spin(const RimBody& body, double theta_rad, double precession_rad_s) {
+  const auto [s, c, z, slope] = tilt(body, theta_rad);
+  const double W = precession_rad_s;
+  const double pull = W * W * s * (body.A * c + body.m * z * body.h) - body.m * body.g * slope;
+  return pull / (W * (body.C * s + body.m * body.R * z));  // (2)
+}
+
+std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
+                                               double along_m_s) {
+  const auto [s, c, z, slope] = tilt(body, theta_rad);
+  // (1) with h W s - R w3 = v: two W^2 + one W + zero = 0.
+  const double two = body.A * s * c - body.C * s * s * body.h / body.R;
+  const double one = (body.C * s / body.R + body.m * body.R * s + body.m * body.h * c) * along_m_s;
+  const double zero = -body.m * body.g * slope;
+  const double discriminant = one * one - 4.0 * two * zero;
+  if (discriminant < 0.0 || std::abs(two) < 1e-300) return {};
+  const double root = std::sqrt(discriminant);
+  return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
+}
+
 SteadyMotion steady_rolling(const data::Body& body, double gravity_m_s2, double theta_rad,
                             double precession_rad_s) {
   require_tilt(theta_rad);
@@ -197,7 +208,7 @@ SteadyMotion steady_rolling(const data::Body& body, double gravity_m_s2, double 
         fmt::format("precession_rad_s = {} must be finite and not 0", precession_rad_s));
   const RimBody rim = rim_body(body, gravity_m_s2);
   return rolling_motion(rim, theta_rad, precession_rad_s,
-                        rolling_spin(rim, theta_rad, precession_rad_s));
+                        steady_rolling_spin(rim, theta_rad, precession_rad_s));
 }
 
 std::optional<SteadyMotion> steady_rolling_on_circle(const data::Body& body, double gravity_m_s2,

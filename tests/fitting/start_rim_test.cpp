@@ -28,24 +28,23 @@ data::Scene sliding_disc() {
   return scene;
 }
 
-RimShape shape_of(const data::Scene& scene) {
+model::RimBody per_mass(const data::Scene& scene) {
   const model::CentralInertia inertia = model::central_inertia(*scene.body);
-  return {scene.body->radius_m,
-          scene.body->half_thickness_m(),
-          inertia.transverse_kg_m2 / inertia.mass_kg,
-          inertia.axial_kg_m2 / inertia.mass_kg,
-          scene.model.gravity_m_s2,
-          true};
+  return {.A = inertia.transverse_kg_m2 / inertia.mass_kg,
+          .C = inertia.axial_kg_m2 / inertia.mass_kg,
+          .R = scene.body->radius_m,
+          .h = scene.body->half_thickness_m(),
+          .g = scene.model.gravity_m_s2};
 }
 
 // Velocity of the point of contact in the table's frame: n along the node line, m across it,
 // u_n = v_n + R w3 - h w2, u_m = v_m + (R sin theta + h cos theta) w1.
-Eigen::Vector2d slip_of(const std::map<std::string, double>& state, const RimShape& shape) {
+Eigen::Vector2d slip_of(const std::map<std::string, double>& state, const model::RimBody& body) {
   const double theta = state.at("theta_rad"), phi = state.at("phi_rad");
   const Eigen::Vector2d n(std::cos(phi), std::sin(phi)), m(-n.y(), n.x());
   const Eigen::Vector2d v(state.at("vx_m_s"), state.at("vy_m_s"));
-  const double z = shape.R * std::sin(theta) + shape.h * std::cos(theta);
-  return (v.dot(n) + shape.R * state.at("w3_rad_s") - shape.h * state.at("w2_rad_s")) * n +
+  const double z = model::tilt(body, theta).z;
+  return (v.dot(n) + body.R * state.at("w3_rad_s") - body.h * state.at("w2_rad_s")) * n +
          (v.dot(m) + z * state.at("w1_rad_s")) * m;
 }
 
@@ -78,19 +77,19 @@ data::Track path_of(const data::Scene& scene, const std::map<std::string, double
 // speed. The friction is that of a body that weighs what it weighs at rest.
 TEST(RimStarts, OneOfASlidingBodySlipsAsItDoes) {
   const data::Scene scene = sliding_disc();
-  const RimShape shape = shape_of(scene);
+  const model::RimBody body = per_mass(scene);
   const std::map<std::string, double> truth{
       {"theta_rad", 0.96}, {"phi_rad", 0.4},   {"w1_rad_s", 0.0},
       {"w2_rad_s", 19.7},  {"w3_rad_s", -0.3}, {"x_m", 0.01},
       {"y_m", -0.02},      {"vx_m_s", 0.165},  {"vy_m_s", 0.124}};
   constexpr int kSamples = 16;
   const data::Track track = path_of(scene, truth, kSamples, 240.0);
-  const std::vector<Start> starts = rim_starts(make_arc(track, 0, kSamples, {}, true), shape);
-  const Eigen::Vector2d slip = slip_of(truth, shape);
+  const std::vector<Start> starts = rim_starts(make_arc(track, 0, kSamples, {}, true), body, true);
+  const Eigen::Vector2d slip = slip_of(truth, body);
   ASSERT_NEAR(slip.norm(), 0.15, 0.01);
   const auto is_it = [&](const Start& start) {
     const auto off = [&](const char* name) { return start.values.at(name) - truth.at(name); };
-    const Eigen::Vector2d its = slip_of(start.values, shape);
+    const Eigen::Vector2d its = slip_of(start.values, body);
     constexpr double kHalfTwelfth = std::numbers::pi / 12.0;
     return std::abs(off("theta_rad")) <= 0.076 &&
            std::abs(std::remainder(off("phi_rad"), 2.0 * std::numbers::pi)) <= kHalfTwelfth &&
@@ -117,7 +116,7 @@ TEST(RimStarts, OneSpinsAsFastAsTheTurningOfTheSeenAxisAsks) {
   const ArcData seen =
       make_arc(track, 0, kSamples, {.position = true, .theta = true, .phi = true}, false);
   const double spin = kSpinsInPlace.at("w3_rad_s");
-  const std::vector<Start> starts = rim_starts(seen, shape_of(scene));
+  const std::vector<Start> starts = rim_starts(seen, per_mass(scene), true);
   EXPECT_TRUE(std::any_of(starts.begin(), starts.end(), [&](const Start& start) {
     return std::abs(start.values.at("w3_rad_s") / spin - 1.0) < 0.1;
   }));
@@ -129,7 +128,7 @@ TEST(RimStarts, OneSpinsAsFastAsTheVeeringOfThePathAsks) {
   constexpr int kSamples = 24;
   const data::Track track = path_of(scene, kSpinsInPlace, kSamples, 240.0);
   const std::vector<Start> starts =
-      rim_starts(make_arc(track, 0, kSamples, {}, true), shape_of(scene));
+      rim_starts(make_arc(track, 0, kSamples, {}, true), per_mass(scene), true);
   EXPECT_TRUE(std::any_of(starts.begin(), starts.end(), [&](const Start& start) {
     const auto off = [&](const char* name) {
       return start.values.at(name) - kSpinsInPlace.at(name);

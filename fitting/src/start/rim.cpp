@@ -7,6 +7,7 @@
 #include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
+#include "trochoid/model/steady.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -77,9 +78,9 @@ Motion motion_of(const ArcData& arc) {
 }
 
 // Spin of a body that rolls without slip with the measured velocity.
-double spin_by_velocity(const Motion& motion, const RimShape& shape, double phi, double w2) {
+double spin_by_velocity(const Motion& motion, const model::RimBody& body, double phi, double w2) {
   const Eigen::Vector2d n(std::cos(phi), std::sin(phi));
-  return (shape.h * w2 - motion.velocity_m_s.dot(n)) / shape.R;
+  return (body.h * w2 - motion.velocity_m_s.dot(n)) / body.R;
 }
 
 Start state(const Motion& motion, double theta, double phi, double w1, double w2, double w3,
@@ -96,32 +97,11 @@ Start state(const Motion& motion, double theta, double phi, double w1, double w2
            {"vy_m_s", motion.velocity_m_s.y()}}};
 }
 
-// Steady rolling at this tilt with CoM speed vn along the node line: the quadratic in W of
-// A W^2 s c - C W s w3 + W (R s + h c) vn + g (h s - R c) = 0 (per mass), w3 = (h W s - vn)/R.
-std::vector<double> steady_rates(const RimShape& q, double theta, double vn) {
-  const double s = std::sin(theta), c = std::cos(theta);
-  const double two = q.A * s * c - q.C * s * s * q.h / q.R;
-  const double one = (q.C * s / q.R + q.R * s + q.h * c) * vn;
-  const double zero = q.g * (q.h * s - q.R * c);
-  const double discriminant = one * one - 4.0 * two * zero;
-  if (discriminant < 0.0 || std::abs(two) < 1e-300) return {};
-  const double root = std::sqrt(discriminant);
-  return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
-}
-
-// Spin of steady rolling at this tilt and precession rate W:
-// A W^2 s c - C W s w3 + W (R s + h c) (h W s - R w3) + g (h s - R c) = 0 (per mass).
-double steady_spin(const RimShape& q, double theta, double W) {
-  const double s = std::sin(theta), c = std::cos(theta), z = q.R * s + q.h * c;
-  const double pull = W * W * s * (q.A * c + z * q.h) + q.g * (q.h * s - q.R * c);
-  return pull / (W * (q.C * s + q.R * z));
-}
-
 // Spin at the window's first sample, whatever the rim does on the floor: the couples about the node
 // line balance when (per mass)
 //   A ddtheta = A w2 O3 - C w2 w3 - z' N + z Ft,  O3 = w2 cot theta,  N = g + d2z/dt2,
 // and the force along the line, Fn, is what changes the spin: C dw3 = R Fn. Median over the window.
-double spin_by_couples(const RimShape& q, const ArcData& arc, const SmoothAngle& tilts,
+double spin_by_couples(const model::RimBody& q, const ArcData& arc, const SmoothAngle& tilts,
                        const SmoothAngle& turns, const Motion& motion) {
   std::vector<double> spins;
   double gained = 0.0, before = 0.0;  // spin since the first sample, and its rate at the last one
@@ -190,7 +170,8 @@ double readings_a_turn(const AngleSeries& series) {
   return 2.0 * kPi / std::max(median(std::move(steps)), 1e-9);
 }
 
-std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const Motion& motion) {
+std::vector<Start> from_angles(const ArcData& arc, const model::RimBody& body, bool slides,
+                               const Motion& motion) {
   const SmoothAngle theta = series_of(arc, Channel::theta), phi = series_of(arc, Channel::phi);
   const int fewest = static_cast<int>(std::min(theta.t_s.size(), phi.t_s.size()));
   if (fewest < 8) return {};
@@ -199,14 +180,15 @@ std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const 
   // the other guess of the spin. Where it is not, bodies that slide would be led astray by it.
   constexpr double kFew = 20.0;
   const bool slow = readings_a_turn(phi) < kFew;
-  const double balanced = spin_by_couples(shape, arc, theta, phi, motion);
+  const double balanced = spin_by_couples(body, arc, theta, phi, motion);
   const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
                        double share) {
     const double leaning = std::clamp(tilt.first, 0.03, kPi - 0.03), azimuth = turn.first;
     const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
-    std::vector<double> spins{spin_by_velocity(motion, shape, azimuth, w2)};
-    if (slow && turn.second != 0.0) spins.push_back(steady_spin(shape, leaning, turn.second));
-    if (shape.slides && std::isfinite(balanced)) spins.push_back(balanced);
+    std::vector<double> spins{spin_by_velocity(motion, body, azimuth, w2)};
+    if (slow && turn.second != 0.0)
+      spins.push_back(model::steady_rolling_spin(body, leaning, turn.second));
+    if (slides && std::isfinite(balanced)) spins.push_back(balanced);
     for (const double w3 : spins)
       starts.push_back(state(motion, leaning, azimuth, w1, w2, w3, "windows"));
   };
@@ -218,7 +200,7 @@ std::vector<Start> from_angles(const ArcData& arc, const RimShape& shape, const 
   return starts;
 }
 
-std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
+std::vector<Start> from_positions(const model::RimBody& body, const Motion& motion) {
   std::vector<Start> starts;
   const double speed = motion.velocity_m_s.norm();
   const double heading = std::atan2(motion.velocity_m_s.y(), motion.velocity_m_s.x());
@@ -226,14 +208,15 @@ std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
     for (int direction = 0; direction < 12; ++direction) {
       const double delta = 2.0 * kPi * direction / 12;
       const double vn = speed * std::cos(delta), vt = speed * std::sin(delta);
-      const double z = shape.R * std::sin(theta) + shape.h * std::cos(theta);
+      const double z = model::tilt(body, theta).z;
       std::vector<double> rates{0.8 * motion.turning_rad_s, motion.turning_rad_s,
                                 1.25 * motion.turning_rad_s};
-      for (const double rate : steady_rates(shape, theta, vn)) rates.push_back(rate);
+      for (const double rate : model::steady_rolling_precessions(body, theta, vn))
+        rates.push_back(rate);
       for (const double rate : rates) {
         const double phi = heading - delta, w2 = rate * std::sin(theta);
         starts.push_back(state(motion, theta, phi, -vt / z, w2,
-                               spin_by_velocity(motion, shape, phi, w2), "multistart"));
+                               spin_by_velocity(motion, body, phi, w2), "multistart"));
       }
     }
   return starts;
@@ -242,12 +225,12 @@ std::vector<Start> from_positions(const RimShape& shape, const Motion& motion) {
 // A rim that slips is braked against its slip, by friction times gravity: the acceleration at the
 // window's first sample gives the slip's direction and the friction, a grid its speed. The spin and
 // the tilting rate are those that let the contact point slip so.
-std::vector<Start> from_slip(const RimShape& shape, const Motion& motion) {
+std::vector<Start> from_slip(const model::RimBody& body, const Motion& motion) {
   constexpr double kSteepest = 0.5;  // tilting over turning: what spins does not fall over
   const double brake_m_s2 = motion.acceleration_m_s2.norm();
   if (!(brake_m_s2 > 0.0)) return {};
   const double heading = std::atan2(motion.acceleration_m_s2.y(), motion.acceleration_m_s2.x());
-  const double friction = std::clamp(brake_m_s2 / shape.g, 0.03, 0.9);
+  const double friction = std::clamp(brake_m_s2 / body.g, 0.03, 0.9);
   std::vector<Start> starts;
   for (double theta = 0.15; theta < 1.5; theta += 0.15)
     for (int direction = 0; direction < 12; ++direction)
@@ -255,17 +238,17 @@ std::vector<Start> from_slip(const RimShape& shape, const Motion& motion) {
         const double phi = heading - 2.0 * kPi * direction / 12;
         const Eigen::Vector2d along(std::cos(phi), std::sin(phi)), across(-along.y(), along.x());
         const Eigen::Vector2d slip =
-            -share * std::sqrt(shape.g * shape.R) / brake_m_s2 * motion.acceleration_m_s2;
+            -share * std::sqrt(body.g * body.R) / brake_m_s2 * motion.acceleration_m_s2;
         const Eigen::Vector2d rolled = motion.velocity_m_s - slip;
-        const double z = shape.R * std::sin(theta) + shape.h * std::cos(theta);
+        const double z = model::tilt(body, theta).z;
         const double w1 = -rolled.dot(across) / z;
         std::vector<double> rates{motion.turning_rad_s, motion.veering_rad_s};
-        for (const double rate : steady_rates(shape, theta, rolled.dot(along)))
+        for (const double rate : model::steady_rolling_precessions(body, theta, rolled.dot(along)))
           rates.push_back(rate);
         for (const double rate : rates) {
           const double w2 = rate * std::sin(theta);
           if (std::abs(w1) > kSteepest * std::abs(w2)) continue;
-          const double w3 = (shape.h * w2 - rolled.dot(along)) / shape.R;
+          const double w3 = (body.h * w2 - rolled.dot(along)) / body.R;
           starts.push_back(state(motion, theta, phi, w1, w2, w3, "slip"));
           starts.back().values["friction"] = friction;
         }
@@ -275,41 +258,41 @@ std::vector<Start> from_slip(const RimShape& shape, const Motion& motion) {
 
 // A rim that slips because the body spins fast pulls its centre along the node line, and the pull
 // veers as fast as the line turns. The spin is that at which gravity makes it turn so.
-std::vector<Start> from_spin(const RimShape& shape, const Motion& motion) {
+std::vector<Start> from_spin(const model::RimBody& body, const Motion& motion) {
   const double brake_m_s2 = motion.acceleration_m_s2.norm();
   const double heading = std::atan2(motion.acceleration_m_s2.y(), motion.acceleration_m_s2.x());
   std::vector<Start> starts;
   for (double theta = 0.15; theta < 1.5; theta += 0.15)
     for (const double share : {0.5, 0.7, 1.0, 1.4, 2.0}) {
       const double s = std::sin(theta), c = std::cos(theta), W = share * motion.veering_rad_s;
-      const double pull = shape.A * W * W * s * c + shape.g * (shape.h * s - shape.R * c);
-      const double w2 = W * s, w3 = pull / (shape.C * w2);
+      const double pull = body.A * W * W * s * c + body.g * (body.h * s - body.R * c);
+      const double w2 = W * s, w3 = pull / (body.C * w2);
       if (!std::isfinite(w3)) continue;
-      const double phi = shape.R * w3 < shape.h * w2 ? heading : heading + kPi;
+      const double phi = body.R * w3 < body.h * w2 ? heading : heading + kPi;
       starts.push_back(state(motion, theta, phi, 0.0, w2, w3, "spin"));
-      starts.back().values["friction"] = std::clamp(brake_m_s2 / shape.g, 0.03, 0.9);
+      starts.back().values["friction"] = std::clamp(brake_m_s2 / body.g, 0.03, 0.9);
     }
   return starts;
 }
 
 }  // namespace
 
-std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape) {
+std::vector<Start> rim_starts(const ArcData& window, const model::RimBody& body, bool slides) {
   if (window.t_s.size() < 12) return {};
   const Motion motion = motion_of(window);
-  std::vector<Start> starts = from_angles(window, shape, motion);
+  std::vector<Start> starts = from_angles(window, body, slides, motion);
   const bool seen = !starts.empty();
-  if (!seen) starts = from_positions(shape, motion);
-  if (!shape.slides) return starts;
+  if (!seen) starts = from_positions(body, motion);
+  if (!slides) return starts;
   // Friction is what accelerates the centre, so it is at least that strong; the scene's own value
   // is the other guess.
   const std::size_t plain = starts.size();
   for (std::size_t i = 0; i < plain; ++i) {
     starts.push_back(starts[i]);
-    starts.back().values["friction"] = std::clamp(1.1 * motion.strongest_m_s2 / shape.g, 0.05, 0.9);
+    starts.back().values["friction"] = std::clamp(1.1 * motion.strongest_m_s2 / body.g, 0.05, 0.9);
   }
   if (seen) return starts;
-  for (const auto& slipping : {from_slip(shape, motion), from_spin(shape, motion)})
+  for (const auto& slipping : {from_slip(body, motion), from_spin(body, motion)})
     starts.insert(starts.end(), slipping.begin(), slipping.end());
   return starts;
 }

@@ -25,15 +25,15 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
 }
 
 Starter rim_starter(const data::Scene& scene) {
-  data::Body body = *scene.body;
+  const data::Body& body = *scene.body;
   const model::CentralInertia inertia = model::central_inertia(body);
-  const RimShape shape{body.radius_m,
-                       body.half_thickness_m(),
-                       inertia.transverse_kg_m2 / inertia.mass_kg,
-                       inertia.axial_kg_m2 / inertia.mass_kg,
-                       scene.model.gravity_m_s2,
-                       scene.model.name == "sliding"};
-  return [shape](const ArcData& window) { return rim_starts(window, shape); };
+  const model::RimBody per_mass{.A = inertia.transverse_kg_m2 / inertia.mass_kg,
+                                .C = inertia.axial_kg_m2 / inertia.mass_kg,
+                                .R = body.radius_m,
+                                .h = body.half_thickness_m(),
+                                .g = scene.model.gravity_m_s2};
+  const bool slides = scene.model.name == "sliding";
+  return [=](const ArcData& window) { return rim_starts(window, per_mass, slides); };
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "observe/observations.hpp"
+#include "trochoid/model/rim_body.hpp"
 
 namespace trochoid::fitting {
 
@@ -35,12 +36,6 @@ struct Start {
 /// least of the path, of all places within the path's extent about its mean.
 [[nodiscard]] std::vector<Eigen::Vector2d> pivot_guesses(const ArcData& arc);
 
-/// A disc or ring on its rim, for starts: lengths [m], moments per mass [m^2].
-struct RimShape {
-  double R = 0.0, h = 0.0, A = 0.0, C = 0.0, g = 9.81;
-  bool slides = false;  ///< friction is a parameter
-};
-
 /// Starts for a body that rolls (or slides) on its rim, state at the window's first sample.
 /// With tilt and precession in the track: w1 = dtheta, w2 = dphi sin(theta); no slip, v_n = h w2 -
 /// R w3, gives the spin, and so does steady rolling where a turn has few readings. From positions
@@ -48,7 +43,10 @@ struct RimShape {
 /// rate (the path's turning rate, and the two roots of steady rolling). A body that slides may also
 /// slip at its start, against its acceleration: a grid over the slip's speed, and the spin at which
 /// the couples balance, from the angles or from how fast the acceleration veers.
-[[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const RimShape& shape);
+/// @param body    of unit mass: moments are per mass [m^2].
+/// @param slides  friction is a parameter.
+[[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const model::RimBody& body,
+                                            bool slides);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
 [[nodiscard]] std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "trochoid/data/body.hpp"
+#include "trochoid/model/rim_body.hpp"
 
 /// Steady motions of a disc or ring of finite thickness on a horizontal floor: tilt, precession and
 /// spin rates constant. Equation numbers of model/theory/steady.md.
@@ -38,6 +39,14 @@ struct SteadyMotion {
   double nutation2_1_s2 = 0.0;
   [[nodiscard]] bool stable() const { return !(nutation2_1_s2 < 0.0); }
 };
+
+/// Spin of steady rolling at a tilt and precession rate, (2); any tilt at which the rim touches.
+[[nodiscard]] double steady_rolling_spin(const RimBody& body, double theta_rad,
+                                         double precession_rad_s);
+/// Precession rates of steady rolling at a tilt whose centre of mass moves at `along_m_s` along the
+/// node line: the two roots of (1), its spin being that of rolling; empty where there are none.
+[[nodiscard]] std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
+                                                             double along_m_s);
 
 /// The steady rolling motion of given tilt and precession rate, (2): its spin is unique.
 /// @param theta_rad in (0, pi/2).  @param precession_rad_s not 0.
