@@ -21,4 +21,11 @@ Eigen::VectorXd Table::column(const std::string& name) const {
   return values.col(found - columns.begin());
 }
 
+void Table::set_rows(const std::vector<double>& cells) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto width = static_cast<Eigen::Index>(columns.size());
+  values = Eigen::Map<const RowMajor>(cells.data(), static_cast<Eigen::Index>(cells.size()) / width,
+                                      width);
+}
+
 }  // namespace trochoid::data

@@ -14,16 +14,13 @@ Table read_table(const std::filesystem::path& path) {
   CsvReader csv(text, path.string());
   Table table;
   table.columns = csv.columns();
-  std::vector<double> values;
+  std::vector<double> cells;
   while (csv.next())
     for (int i = 0; i < static_cast<int>(table.columns.size()); ++i)
-      values.push_back(csv.cell(i) == "nan" ? std::numeric_limits<double>::quiet_NaN()
-                                            : csv.number(i));
+      cells.push_back(csv.cell(i) == "nan" ? std::numeric_limits<double>::quiet_NaN()
+                                           : csv.number(i));
   table.header = csv.header();
-  const auto columns = static_cast<Eigen::Index>(table.columns.size());
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  table.values = Eigen::Map<const RowMajor>(
-      values.data(), static_cast<Eigen::Index>(values.size()) / columns, columns);
+  table.set_rows(cells);
   return table;
 }
 

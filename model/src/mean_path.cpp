@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/interpolate.hpp"
 
 namespace trochoid::model {
 namespace {
@@ -33,14 +34,7 @@ class Interpolator {
                                   Eigen::Index& hint) const {
     const double sign = phi_[phi_.size() - 1] < phi_[0] ? -1.0 : 1.0;
     while (hint + 4 < phi_.size() && sign * (at - phi_[hint + 2]) > 0.0) ++hint;
-    double sum = 0.0;
-    for (int i = 0; i < 4; ++i) {
-      double weight = 1.0;
-      for (int j = 0; j < 4; ++j)
-        if (j != i) weight *= (at - phi_[hint + j]) / (phi_[hint + i] - phi_[hint + j]);
-      sum += weight * column[hint + i];
-    }
-    return sum;
+    return data::through<double>({phi_.data() + hint, 4}, {column.data() + hint, 4}, at);
   }
 
  private:

@@ -8,6 +8,7 @@
 
 #include "observe/smoothing.hpp"
 #include "trochoid/data/quantile.hpp"
+#include "trochoid/data/white_jerk.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -65,15 +66,11 @@ double gain_of(const Path& path, const Motion& before, double tau, int at, doubl
 }
 
 Motion advanced(const Path& path, const Motion& before, double tau, int at, double jerk2_s) {
-  Eigen::Matrix3d move = Eigen::Matrix3d::Identity(), shake;
-  move(0, 1) = move(1, 2) = tau;
-  move(0, 2) = 0.5 * tau * tau;
-  const double t2 = tau * tau, t3 = t2 * tau;
-  shake << t2 * t3 / 20.0, t2 * t2 / 8.0, t3 / 6.0, t2 * t2 / 8.0, t3 / 3.0, t2 / 2.0, t3 / 6.0,
-      t2 / 2.0, tau;
+  const Eigen::Matrix3d move = data::white_jerk_transition(tau);
   Motion motion;
   motion.state = move * before.state;
-  motion.covariance = move * before.covariance * move.transpose() + jerk2_s * shake;
+  motion.covariance =
+      move * before.covariance * move.transpose() + jerk2_s * data::white_jerk_covariance(tau);
   const double noise = path.sigma_m[at] * path.sigma_m[at];
   const Eigen::Vector3d kalman = motion.covariance.col(0) / (motion.covariance(0, 0) + noise);
   motion.state += kalman * (path.xy_m.row(at) - motion.state.row(0));

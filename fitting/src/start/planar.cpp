@@ -7,6 +7,7 @@
 #include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
+#include "trochoid/data/integral.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -46,18 +47,8 @@ Eigen::VectorXd non_negative(const Eigen::MatrixXd& m, const Eigen::VectorXd& ri
   return best;
 }
 
-// Twice the integral from the first time, by trapezoids.
-Eigen::VectorXd twice_integrated(const std::vector<double>& t_s, Eigen::VectorXd y) {
-  for (int round = 0; round < 2; ++round) {
-    double sum = 0.0, before = y[0];
-    y[0] = 0.0;
-    for (Eigen::Index i = 1; i < y.size(); ++i) {
-      const auto n = static_cast<std::size_t>(i);
-      sum += 0.5 * (t_s[n] - t_s[n - 1]) * (before + y[i]);
-      before = std::exchange(y[i], sum);
-    }
-  }
-  return y;
+Eigen::VectorXd twice_integrated(const std::vector<double>& t_s, const Eigen::VectorXd& y) {
+  return data::running_integral(t_s, data::running_integral(t_s, y));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
+#include "trochoid/data/integral.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -34,15 +35,6 @@ Start start_of(const TopState& top, const Eigen::Vector2d& pivot_m, const char* 
   return start;
 }
 
-// Running integral by the trapezoidal rule.
-Eigen::VectorXd integral(const std::vector<double>& t_s, const Eigen::VectorXd& f) {
-  Eigen::VectorXd sum(f.size());
-  sum[0] = 0.0;
-  for (Eigen::Index i = 1; i < f.size(); ++i)
-    sum[i] = sum[i - 1] + 0.5 * (t_s[i] - t_s[i - 1]) * (f[i] + f[i - 1]);
-  return sum;
-}
-
 // Everything about the window that does not depend on l.
 struct Window {
   std::vector<double> t_s;
@@ -67,8 +59,8 @@ Window window_of(const ArcData& arc, const SmoothCurve& curve, const Eigen::Vect
   w.r2 = w.smooth.rowwise().squaredNorm();
   w.h = w.smooth.col(0).cwiseProduct(w.velocity.col(1)) -
         w.smooth.col(1).cwiseProduct(w.velocity.col(0));
-  w.int_x = integral(w.t_s, w.x);
-  w.int_y = integral(w.t_s, w.y);
+  w.int_x = data::running_integral(w.t_s, w.x);
+  w.int_y = data::running_integral(w.t_s, w.y);
   w.r_max = std::sqrt(w.r2.maxCoeff());
   return w;
 }
@@ -90,9 +82,9 @@ void make_weight_pull_down(TopState& top) {
 // The linear problem for one l and given heights Z above the pivot.
 Match match(const Window& w, double l, const Eigen::VectorXd& z) {
   const Eigen::Index n = w.x.size();
-  const Eigen::VectorXd int_z = integral(w.t_s, z);
-  const Eigen::VectorXd jx = integral(w.t_s, z.cwiseProduct(w.int_x));
-  const Eigen::VectorXd jy = integral(w.t_s, z.cwiseProduct(w.int_y));
+  const Eigen::VectorXd int_z = data::running_integral(w.t_s, z);
+  const Eigen::VectorXd jx = data::running_integral(w.t_s, z.cwiseProduct(w.int_x));
+  const Eigen::VectorXd jy = data::running_integral(w.t_s, z.cwiseProduct(w.int_y));
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 right = Vector6::Zero();

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <optional>
 
+#include "trochoid/data/integral.hpp"
+
 namespace trochoid::tools {
 namespace {
 
@@ -20,14 +22,6 @@ void append(data::Table& table, const std::string& name, const Array& values) {
 Array wrapped(const Array& angle) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return angle.unaryExpr([](double a) { return std::remainder(a, kTurn); });
-}
-
-// Running trapezoidal integral over t, 0 at the first row.
-Array integral(const Array& t, const Array& rate) {
-  Array sum = Array::Zero(t.size());
-  for (Eigen::Index i = 1; i < t.size(); ++i)
-    sum[i] = sum[i - 1] + 0.5 * (rate[i] + rate[i - 1]) * (t[i] - t[i - 1]);
-  return sum;
 }
 
 std::optional<Eigen::Vector3d> principal_moments(const data::Scene& scene) {
@@ -53,7 +47,8 @@ void add_thesis_quantities(const data::Scene& scene, data::Table& table) {
     append(table, "w" + axis + "_rad_s", w[i]);
     if (moments)
       append(table, "L" + axis + "_kg_m2_s", (*moments)[static_cast<Eigen::Index>(i)] * w[i]);
-    append(table, "integral_w" + axis + "_rad", integral(t, w[i]));
+    append(table, "integral_w" + axis + "_rad",
+           data::running_integral({t.data(), t.data() + t.size()}, w[i].matrix()).array());
   }
   for (const char* angle : {"phi", "theta", "psi"})
     append(table, std::string(angle) + "_wrapped_rad",

@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "link/polynomial.hpp"
+#include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -98,7 +98,8 @@ class Path {
       m.emplace_back(glimpses_[at].pose().centre_m.head<2>());
     }
     const double t_s = glimpses_[posed_[k]].frame->t_s;
-    return Place{through(times, px, t_s), through(times, m, t_s)};
+    return Place{data::through<Eigen::Vector2d>(times, px, t_s),
+                 data::through<Eigen::Vector2d>(times, m, t_s)};
   }
 
   const std::vector<Glimpse>& glimpses_;

@@ -8,6 +8,7 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
+#include "trochoid/data/white_jerk.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -15,23 +16,6 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 using State = Eigen::Vector3d;  // value, rate, acceleration
 using Square = Eigen::Matrix3d;
-
-Square transition(double dt) {
-  Square F = Square::Identity();
-  F(0, 1) = F(1, 2) = dt;
-  F(0, 2) = 0.5 * dt * dt;
-  return F;
-}
-
-/// White jerk of spectral density q, integrated over dt.
-Square wandering(double dt, double q) {
-  const double dt2 = dt * dt, dt3 = dt2 * dt;
-  Square Q;
-  Q << dt3 * dt2 / 20.0, dt2 * dt2 / 8.0, dt3 / 6.0,  //
-      dt2 * dt2 / 8.0, dt3 / 3.0, dt2 / 2.0,          //
-      dt3 / 6.0, dt2 / 2.0, dt;
-  return q * Q;
-}
 
 /// A series in units of the median step in time and of the median sigma.
 struct Series {
@@ -72,9 +56,9 @@ Filtered filter(const Series& s, double q) {
     Moment m;
     if (i > 0) {
       const double dt = s.t[i] - s.t[i - 1];
-      const Square F = transition(dt);
+      const Square F = data::white_jerk_transition(dt);
       x = F * x;
-      P = F * P * F.transpose() + wandering(dt, q);
+      P = F * P * F.transpose() + q * data::white_jerk_covariance(dt);
     }
     m.predicted = x;
     m.predicted_cov = P;
@@ -136,7 +120,7 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
       P = m.filtered_cov;
     } else {
       const Moment& next = f.moments[i + 1];
-      const Square F = transition(s.t[i + 1] - s.t[i]);
+      const Square F = data::white_jerk_transition(s.t[i + 1] - s.t[i]);
       const Square back = next.predicted_cov.ldlt().solve(F * m.filtered_cov).transpose();
       x = m.filtered + back * (x - next.predicted);
       P = m.filtered_cov + back * (P - next.predicted_cov) * back.transpose();
@@ -239,10 +223,7 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
       }
     }
   }
-  const auto columns = static_cast<Eigen::Index>(table.columns.size());
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  table.values = Eigen::Map<const RowMajor>(
-      cells.data(), static_cast<Eigen::Index>(cells.size()) / columns, columns);
+  table.set_rows(cells);
   return result;
 }
 

@@ -6,8 +6,8 @@
 
 namespace trochoid::data {
 
-/// Named numeric columns with '#' header lines: trajectories, studies, truth files. Units are in the
-/// column names.
+/// Named numeric columns with '#' header lines: trajectories, studies, truth files. Units are in
+/// the column names.
 struct Table {
   std::vector<std::pair<std::string, std::string>> header;  ///< key, value lines
   std::vector<std::string> columns;
@@ -16,6 +16,8 @@ struct Table {
   [[nodiscard]] bool has(const std::string& column) const;
   /// @throws InputError naming the column and those there are.
   [[nodiscard]] Eigen::VectorXd column(const std::string& name) const;
+  /// Makes `values` of cells, row after row; their number is a multiple of that of the columns.
+  void set_rows(const std::vector<double>& cells);
 };
 
 }  // namespace trochoid::data
