@@ -113,6 +113,22 @@ TEST(RollingEquations, GiveTheReferenceForcesOfARingInAir) {
   check_rolling(file, system);
 }
 
+/// Horizontal velocity of the contact point [m/s] (rolling.md, (3)).
+Horizontal<double> slip_velocity(const RimBody& body, const NodeMotion<double>& q) {
+  const Horizontal<double> v = horizontal_velocity(q);
+  return {v.along_n + body.R * q.w3 - body.signed_h() * q.w2, v.along_mh + q.at.z * q.w1};
+}
+
+/// Power of all losses but sliding [W]: what they add to dE/dt, never positive (rolling.md, (11)).
+template <class Losses>
+double loss_power_W(const RimBody& body, const Losses& losses, const NodeMotion<double>& q,
+                    double normal_N) {
+  const Load<double> load = losses.load(body, q);
+  const ContactCouple<double> couple = losses.contact_couple(q);
+  return load.t1 * q.w1 + load.t2 * q.w2 + load.t3 * q.w3 + load.d1 * q.v1 + load.d2 * q.v2 +
+         load.d3 * q.v3 + normal_N * (couple.k1 * q.w1 + couple.k2 * q.w2 + couple.k3 * q.w3);
+}
+
 /// Of a body that slides as fast as its velocities say.
 template <class System>
 auto force_at(const System& system, const NodeMotion<double>& q) {

@@ -153,15 +153,5 @@ struct Losses : Terms<S>... {
   }
 };
 
-/// Power of all losses but sliding [W]: what they add to dE/dt, never positive (rolling.md, (11)).
-template <class S, template <class> class... Terms>
-[[nodiscard]] S loss_power_W(const RimBody& body, const Losses<S, Terms...>& losses,
-                             const NodeMotion<S>& q, const S& normal) {
-  const Load<S> load = losses.load(body, q);
-  const ContactCouple<S> couple = losses.contact_couple(q);
-  return load.t1 * q.w1 + load.t2 * q.w2 + load.t3 * q.w3 + load.d1 * q.v1 + load.d2 * q.v2 +
-         load.d3 * q.v3 + normal * (couple.k1 * q.w1 + couple.k2 * q.w2 + couple.k3 * q.w3);
-}
-
 }  // namespace TROCHOID_ISA
 }  // namespace trochoid::model

@@ -106,13 +106,6 @@ template <class S>
 [[nodiscard]] TROCHOID_INLINE Horizontal<S> horizontal_velocity(const NodeMotion<S>& q) {
   return {q.v1, q.v2 * q.at.c - q.v3 * q.at.s};
 }
-/// Horizontal velocity of the contact point [m/s], (3).
-template <class S>
-[[nodiscard]] TROCHOID_INLINE Horizontal<S> slip_velocity(const RimBody& body,
-                                                          const NodeMotion<S>& q) {
-  const Horizontal<S> v = horizontal_velocity(q);
-  return {v.along_n + body.R * q.w3 - body.signed_h() * q.w2, v.along_mh + q.at.z * q.w1};
-}
 
 }  // namespace TROCHOID_ISA
 }  // namespace trochoid::model
