@@ -113,11 +113,10 @@ void check_start(const TableReader& reader) {
 }
 
 void check_run(const TableReader& reader, const RunSettings& run) {
-  constexpr double kMaxRows = 1e7;  // a few GB of trajectory: surely a slip of the pen
-  if (run.until_s * run.rate_hz > kMaxRows)
+  if (run.until_s * run.rate_hz > Table::kMostRows)
     reader.fail(reader.has("until_s") ? "until_s" : "rate_hz",
                 fmt::format("until_s = {} at rate_hz = {} makes more than {} rows", run.until_s,
-                            run.rate_hz, kMaxRows));
+                            run.rate_hz, Table::kMostRows));
 }
 
 void check_tracking(const TableReader& reader, const TrackingSettings& tracking) {

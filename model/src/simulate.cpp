@@ -7,6 +7,7 @@
 
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/table.hpp"
 
 namespace trochoid::model {
 
@@ -15,10 +16,9 @@ std::vector<double> output_times_s(const data::RunSettings& run) {
     throw InputError(fmt::format("run.until_s = {} must be greater than 0", run.until_s));
   if (!(run.rate_hz > 0.0) || !std::isfinite(run.rate_hz))
     throw InputError(fmt::format("run.rate_hz = {} must be greater than 0", run.rate_hz));
-  constexpr double kMostRows = 5e7;  // some GB of numbers
   // A grid whose last point misses until_s by rounding still has that point.
   const double last = std::floor(run.until_s * run.rate_hz * (1.0 + 1e-12) + 1e-9);
-  if (last > kMostRows) {
+  if (last > data::Table::kMostRows) {
     throw InputError(
         fmt::format("run.until_s = {} at run.rate_hz = {} asks for {:.3g} rows; lower one",
                     run.until_s, run.rate_hz, last + 1.0));

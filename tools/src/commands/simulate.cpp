@@ -21,6 +21,7 @@
 #include "draw/trajectory_plots.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/table.hpp"
 #include "trochoid/model/simulate.hpp"
 #include "trochoid/model/steady.hpp"
 
@@ -129,8 +130,7 @@ bool broke_off(const model::Trajectory& run) {
 }
 
 void check_rows(const std::string& scene, const data::RunSettings& run) {
-  constexpr double kMost = 1e7;  // a few GB
-  check_length(scene, run.until_s, run.rate_hz, kMost, "rows");
+  check_length(scene, run.until_s, run.rate_hz, data::Table::kMostRows, "rows");
   constexpr double kRounding = 1e-9;
   if (run.until_s * run.rate_hz < 1.0 - kRounding)
     throw InputError(fmt::format(

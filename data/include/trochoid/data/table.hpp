@@ -9,6 +9,8 @@ namespace trochoid::data {
 /// Named numeric columns with '#' header lines: trajectories, studies, truth files. Units are in
 /// the column names.
 struct Table {
+  /// A run that asks for more rows, a few GB of trajectory, is refused: surely a slip of the pen.
+  static constexpr double kMostRows = 1e7;
   std::vector<std::pair<std::string, std::string>> header;  ///< key, value lines
   std::vector<std::string> columns;
   Eigen::MatrixXd values;  ///< rows x columns; NaN = empty cell
