@@ -34,46 +34,46 @@ class Contested : public testing::Test {
   Contest contest_{ladder_, tracks_, {}};
 };
 
-// It had stayed what it promised beside a rung that was no longer the chosen one.
-TEST_F(Contested, ARungThatWasOnlyPromisedIsFittedBesideAnother) {
+// It had stayed as tested beside a rung that was no longer the chosen one.
+TEST_F(Contested, ARungThatWasOnlyScoreTestedIsFittedBesideAnother) {
   const int air = term("air force"), pivoting = term("pivoting friction");
   Rungs rungs{fitted({pivoting}), fitted({air})};
-  Rung& promised = rungs.emplace_back(rung_with(ladder_, {air, pivoting}));
-  promised.fit = rungs[0].fit;
-  promised.fitted = promised.as_promised = true;
-  EXPECT_FALSE(is_known(rungs, promised.terms));
-  const Neighbour both{promised.terms};
+  Rung& tested = rungs.emplace_back(rung_with(ladder_, {air, pivoting}));
+  tested.fit = rungs[0].fit;
+  tested.fitted = tested.by_score_test = true;
+  EXPECT_FALSE(is_known(rungs, tested.terms));
+  const Neighbour both{tested.terms};
   const auto added = add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs);
   ASSERT_EQ(added.size(), 1u);
-  EXPECT_EQ(added[0], &promised);
+  EXPECT_EQ(added[0], &tested);
   EXPECT_EQ(rungs.size(), 3u);
-  EXPECT_TRUE(is_known(rungs, promised.terms));
-  EXPECT_LT(promised.bic, rungs[1].bic);
+  EXPECT_TRUE(is_known(rungs, tested.terms));
+  EXPECT_LT(tested.bic, rungs[1].bic);
   EXPECT_TRUE(add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs).empty());
 }
 
-// A later promise, beside another rung, had taken the place of a better one.
-TEST_F(Contested, OfTwoPromisesForTheSameTermsTheBetterOneStays) {
-  Rung promised = rung_with(ladder_, {term("air force")});
-  promised.fitted = promised.as_promised = true;
+// A later test, beside another rung, had taken the place of a better one.
+TEST_F(Contested, OfTwoScoreTestsForTheSameTermsTheBetterOneStays) {
+  Rung tested = rung_with(ladder_, {term("air force")});
+  tested.fitted = tested.by_score_test = true;
   Rungs rungs;
   for (const double bic : {20.0, 30.0, 10.0}) {
-    promised.bic = bic;
-    add_promised(promised, rungs);
+    tested.bic = bic;
+    add_score_tested(tested, rungs);
     ASSERT_EQ(rungs.size(), 1u);
     EXPECT_EQ(rungs[0].bic, std::min(bic, 20.0));
   }
 }
 
-TEST_F(Contested, APromiseTakesNoPlaceOfARungThatWasFitted) {
-  Rung known = rung_with(ladder_, {term("air force")}), promised = known;
-  known.fitted = promised.fitted = promised.as_promised = true;
+TEST_F(Contested, AScoreTestTakesNoPlaceOfARungThatWasFitted) {
+  Rung known = rung_with(ladder_, {term("air force")}), tested = known;
+  known.fitted = tested.fitted = tested.by_score_test = true;
   known.bic = 20.0;
-  promised.bic = 10.0;
+  tested.bic = 10.0;
   Rungs rungs{known};
-  add_promised(promised, rungs);
+  add_score_tested(tested, rungs);
   ASSERT_EQ(rungs.size(), 1u);
-  EXPECT_FALSE(rungs[0].as_promised);
+  EXPECT_FALSE(rungs[0].by_score_test);
 }
 
 }  // namespace

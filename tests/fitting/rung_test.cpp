@@ -403,7 +403,7 @@ TEST(Rivals, WithATermMoreMayDoWithoutAParameter) {
 }
 
 // A ring of tests/independent that rolls, held back by air and by pivoting friction.
-class Promised : public testing::Test {
+class ScoreTested : public testing::Test {
  protected:
   [[nodiscard]] Rung rung_with(const std::set<std::string>& losses) const {
     Rung rung;
@@ -429,69 +429,69 @@ class Promised : public testing::Test {
   const std::vector<data::Track> tracks_{data::read_track(folder_ + "/track.csv").tracks};
 };
 
-TEST_F(Promised, IsWhatAMissingLossThenGains) {
+TEST_F(ScoreTested, GainIsWhatAMissingLossThenBrings) {
   const Rung known = fitted({"air"}), with = fitted({"air", "pivoting"});
-  const auto promise = promised(tracks_, known, {}, rung_with({"air", "pivoting"}), {});
-  ASSERT_TRUE(promise);
-  const double share = 1.0 - promise->with.chi2 / promise->before;
+  const auto test = score_test(tracks_, known, {}, rung_with({"air", "pivoting"}), {});
+  ASSERT_TRUE(test);
+  const double share = 1.0 - test->with.chi2 / test->before;
   const double gained = 1.0 - with.fit.chi2 / known.fit.chi2;
   ASSERT_GT(gained, 0.05);
   EXPECT_NEAR(share, gained, 0.2 * gained);
-  EXPECT_EQ(promise->with.parameters, 1);
+  EXPECT_EQ(test->with.parameters, 1);
 }
 
-TEST_F(Promised, IsToldOfSeveralRecordingsToo) {
+TEST_F(ScoreTested, GainIsToldOfSeveralRecordingsToo) {
   const auto half = static_cast<std::ptrdiff_t>(tracks_.front().samples.size() / 2);
   std::vector<data::Track> halves(2, tracks_.front());
   halves[0].samples.resize(half);
   halves[1].samples.erase(halves[1].samples.begin(), halves[1].samples.begin() + half);
   const Rung known = fitted({"air"}, halves), with = fitted({"air", "pivoting"}, halves);
-  const auto promise = promised(halves, known, {}, rung_with({"air", "pivoting"}), {});
-  ASSERT_TRUE(promise);
-  const double share = 1.0 - promise->with.chi2 / promise->before;
+  const auto test = score_test(halves, known, {}, rung_with({"air", "pivoting"}), {});
+  ASSERT_TRUE(test);
+  const double share = 1.0 - test->with.chi2 / test->before;
   const double gained = 1.0 - with.fit.chi2 / known.fit.chi2;
   ASSERT_GT(gained, 0.01);
   EXPECT_NEAR(share, gained, 0.2 * gained);
 }
 
-TEST_F(Promised, IsNothingOfALossThatDoesNotAct) {
+TEST_F(ScoreTested, GainIsNothingOfALossThatDoesNotAct) {
   constexpr double kVeryStrong = 10.0;
   const Rung known = fitted({"air", "pivoting"});
   const std::map<int, std::set<std::string>> others{{1, {"air_force_N_s_m"}},
                                                     {2, {"pivoting_friction_m"}}};
-  const auto promise =
-      promised(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}), others);
-  ASSERT_TRUE(promise);
-  EXPECT_GT(promise->with.chi2, promise->before - kVeryStrong);
+  const auto test =
+      score_test(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}), others);
+  ASSERT_TRUE(test);
+  EXPECT_GT(test->with.chi2, test->before - kVeryStrong);
   // Nor does it do for one that acts.
   for (const int acting : {1, 2}) {
-    EXPECT_GT(promise->instead.at(acting).chi2, promise->before + kVeryStrong);
-    EXPECT_EQ(promise->instead.at(acting).parameters, 0);
+    EXPECT_GT(test->instead.at(acting).chi2, test->before + kVeryStrong);
+    EXPECT_EQ(test->instead.at(acting).parameters, 0);
   }
 }
 
-TEST_F(Promised, IsToldOfLossesThatTogetherTakeThePlaceOfOthers) {
+TEST_F(ScoreTested, GainIsToldOfLossesThatTogetherTakeThePlaceOfOthers) {
   const Rung known = fitted({"rolling"});
-  const auto promise = promised(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}),
-                                {{1, {"rolling_friction_m"}}, {2, {"air_force_N_s_m"}}});
-  ASSERT_TRUE(promise);
-  const Promise::Change &both = promise->instead.at(1), &one = promise->instead.at(2);
-  EXPECT_LT(both.chi2, promise->before - kVeryStrong);
+  const auto test = score_test(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}),
+                               {{1, {"rolling_friction_m"}}, {2, {"air_force_N_s_m"}}});
+  ASSERT_TRUE(test);
+  const ScoreTest::Change &both = test->instead.at(1), &one = test->instead.at(2);
+  EXPECT_LT(both.chi2, test->before - kVeryStrong);
   EXPECT_EQ(both.parameters, 1);
-  EXPECT_GE(one.chi2, promise->with.chi2);
+  EXPECT_GE(one.chi2, test->with.chi2);
   // How far error bars hold what is added is asked of what is added.
   EXPECT_GT(one.moves, 0.0);
   EXPECT_EQ(both.moves, 0.0);
 }
 
 // Beside a sliding body such a fit took most of a minute to end where it began.
-TEST_F(Promised, IsWhatIsToldOfALossThatWouldGainNothing) {
+TEST_F(ScoreTested, RungsAreOnlyThatWhereALossWouldGainNothing) {
   const Rung known = fitted({"air", "pivoting"}), with = fitted({"air", "pivoting", "rolling"});
   Rung rung = rung_with({"air", "pivoting", "rolling"});
-  const auto promise = promised(tracks_, known, {}, rung, {});
-  ASSERT_TRUE(promise);
-  constexpr double kDiluted = 1.0, kMuchTheSame = 1.0;  // of BIC
-  take_as_promised(known, *promise, promise->with, kDiluted, rung);
+  const auto test = score_test(tracks_, known, {}, rung, {});
+  ASSERT_TRUE(test);
+  constexpr double kInflation = 1.0, kMuchTheSame = 1.0;  // of BIC
+  take_from_score_test(known, *test, test->with, kInflation, rung);
   EXPECT_TRUE(rung.fitted);
   EXPECT_FALSE(rung.reason.empty());
   EXPECT_EQ(rung.parameters, with.parameters);
@@ -512,38 +512,37 @@ TEST_F(Promised, IsWhatIsToldOfALossThatWouldGainNothing) {
 }
 
 // A camera that a prior holds is no way out: the fit of the larger model holds it too.
-TEST_F(Promised, HoldsWhatIsKnownBeforehand) {
+TEST_F(ScoreTested, LossesHoldWhatIsKnownBeforehand) {
   Rung known = rung_with({"air", "pivoting"}), larger = rung_with({"air", "pivoting", "rolling"});
   for (Rung* rung : {&known, &larger}) rung->scene.fit.prior["scale"] = {1.1, 0.05};
   fit_rung(tracks_, nullptr, nullptr, {}, known);
   ASSERT_TRUE(known.fitted) << known.reason;
-  const auto promise = promised(tracks_, known, {}, larger, {});
-  ASSERT_TRUE(promise);
+  const auto test = score_test(tracks_, known, {}, larger, {});
+  ASSERT_TRUE(test);
   constexpr double kNearly = 0.9;  // robust weights take some of it
-  EXPECT_GT(promise->before, kNearly * promise->rows);
+  EXPECT_GT(test->before, kNearly * test->rows);
 }
 
-TEST_F(Promised, SaysWhereTheMinimumIsThen) {
+TEST_F(ScoreTested, LossesSayWhereTheMinimumIsThen) {
   const Rung known = fitted({"air"}), with = fitted({"air", "pivoting"});
-  const auto promise = promised(tracks_, known, {}, rung_with({"air", "pivoting"}), {});
-  ASSERT_TRUE(promise);
+  const auto test = score_test(tracks_, known, {}, rung_with({"air", "pivoting"}), {});
+  ASSERT_TRUE(test);
   const std::map<std::string, double> there = values_of(with.fit), here = values_of(known.fit);
   constexpr double kNearer = 0.5;  // the plane is not the valley
   for (const char* name : {"air_force_N_s_m", "w2_rad_s", "w3_rad_s"})
-    EXPECT_LT(std::abs(promise->with.values.at(name) - there.at(name)),
+    EXPECT_LT(std::abs(test->with.values.at(name) - there.at(name)),
               kNearer * std::abs(here.at(name) - there.at(name)))
         << name;
-  EXPECT_GT(promise->with.values.at("pivoting_friction_m"),
-            kNearer * there.at("pivoting_friction_m"));
+  EXPECT_GT(test->with.values.at("pivoting_friction_m"), kNearer * there.at("pivoting_friction_m"));
   // What stood for the loss is off by more than its error bar.
-  EXPECT_GT(promise->with.moves, 1.0);
+  EXPECT_GT(test->with.moves, 1.0);
 }
 
-TEST_F(Promised, IsUntoldWhereTheTrackIsTooShortForIt) {
+TEST_F(ScoreTested, GainIsUntoldWhereTheTrackIsTooShortForIt) {
   const Rung known = fitted({"air"});
   std::vector<data::Track> few = tracks_;
   few.front().samples.resize(2);
-  EXPECT_FALSE(promised(few, known, {}, rung_with({"air", "pivoting"}), {}));
+  EXPECT_FALSE(score_test(few, known, {}, rung_with({"air", "pivoting"}), {}));
 }
 
 // Number 01 of class A, seed 1009: air couples and an air force, for which rolling friction stood.
@@ -579,19 +578,19 @@ TEST_F(Exchanged, LossesStartWhereTheTangentPlaneHasTheirMinimum) {
                    {"air_linear_N_m_s[3]", 1.02e-8}},
                   {}, known);
   ASSERT_TRUE(known.fit.converged) << known.fit.reason;
-  const auto promise =
-      promised(tracks_, known, {}, rung_with(true, true), {{1, {"rolling_friction_m"}}});
-  ASSERT_TRUE(promise);
-  const Promise::Change& change = promise->instead.at(1);
+  const auto test =
+      score_test(tracks_, known, {}, rung_with(true, true), {{1, {"rolling_friction_m"}}});
+  ASSERT_TRUE(test);
+  const ScoreTest::Change& change = test->instead.at(1);
   EXPECT_FALSE(change.values.contains("rolling_friction_m"));
   Rung other = rung_with(false, true);
-  fit_neighbour(tracks_, known, {}, other, {change.values, change.chi2 - promise->before});
+  fit_neighbour(tracks_, known, {}, other, {change.values, change.chi2 - test->before});
   ASSERT_TRUE(other.fit.converged) << other.fit.reason;
   EXPECT_LT(other.bic, known.bic);
 }
 
 // Expectations may be wrong: then the solution of the known rung is the start.
-TEST_F(Promised, NeighboursNeedNotBeWhereTheyAreExpected) {
+TEST_F(ScoreTested, NeighboursNeedNotBeWhereTheyAreExpected) {
   const Rung known = fitted({"air"});
   Rung with = rung_with({"air", "pivoting"});
   Nearby astray{values_of(known.fit), 0.0};
@@ -680,15 +679,15 @@ TEST_F(SlidesLater, RollsFromTheBeginningWhereNothingSpeaksForASlip) {
 }
 
 // It was fitted with Coulomb's law, however softly friction sets in beside it.
-TEST_F(SlidesLater, StaysAsPromisedBesideOneThatRollsAtFirst) {
+TEST_F(SlidesLater, StaysAsTestedBesideOneThatRollsAtFirst) {
   const data::Track track = data::read_track(folder_ + "/track.csv").tracks.front();
   const Rung known = fitted(track, 0.0);
   Rung rung = rung_;
   rung.fit = known.fit;
-  rung.fitted = rung.as_promised = true;
+  rung.fitted = rung.by_score_test = true;
   rung.bic = known.bic + 1.0;
   begin_as(std::span(&track, 1), known, {}, rung);
-  EXPECT_TRUE(rung.as_promised);
+  EXPECT_TRUE(rung.by_score_test);
   EXPECT_FALSE(rung.rolls_at_first);
   EXPECT_EQ(rung.bic, known.bic + 1.0);
 }
@@ -792,7 +791,7 @@ TEST(SlidingRung, OfABodyThatCreepsAtFirstHasTheRatesItIsSeenWith) {
 
 // Integrated more coarsely its path has its minimum elsewhere: the way there and back took most of
 // the steps.
-TEST_F(Promised, NeighboursAreIntegratedAsFinelyAsTheRungTheyStartFrom) {
+TEST_F(ScoreTested, NeighboursAreIntegratedAsFinelyAsTheRungTheyStartFrom) {
   Rung known = fitted({"air"}), with = rung_with({"air", "pivoting"}), coarse = with;
   fit_neighbour(tracks_, known, {}, coarse);
   ASSERT_TRUE(coarse.fit.converged) << coarse.fit.reason;
@@ -804,7 +803,7 @@ TEST_F(Promised, NeighboursAreIntegratedAsFinelyAsTheRungTheyStartFrom) {
 }
 
 // Minutes went into the last digits of a path that was not the body's.
-TEST_F(Promised, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
+TEST_F(ScoreTested, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
   std::vector<std::string> lines;
   FitOptions astray;
   astray.log = [&](const std::string& line) { lines.push_back(line); };
@@ -823,7 +822,7 @@ TEST_F(Promised, APathThatLeavesMostOfTheMotionUnexplainedIsNotPolished) {
 
 // A little of a loss turns a body by whole turns seconds later: let act at a share of what it may
 // be, it lost the path, and the way back took most of the time.
-TEST_F(Promised, ALossThatWasGoneIsLetActWithoutLosingThePath) {
+TEST_F(ScoreTested, ALossThatWasGoneIsLetActWithoutLosingThePath) {
   std::vector<std::string> lines;
   FitOptions from;
   from.log = [&](const std::string& line) { lines.push_back(line); };

@@ -96,7 +96,7 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
                  if (&rung != &chosen) begin_as(contest.tracks, chosen, options, rung);
                });
   for (Rung& rung : rungs) {
-    if (!rung.as_promised) continue;  // beside the chosen one, whose scores are others now
+    if (!rung.by_score_test) continue;  // beside the chosen one, whose scores are others now
     rung.aicc += chosen.aicc - aicc;
     rung.bic += chosen.bic - bic;
     rung.parameters += chosen.parameters - parameters;

@@ -13,18 +13,18 @@ namespace trochoid::fitting {
 
 namespace {
 
-// Null where no rung with these terms is only promised.
-Rung* promised_before(Rungs& rungs, const Terms& terms) {
+// Null where no rung with these terms is only score-tested.
+Rung* score_tested_before(Rungs& rungs, const Terms& terms) {
   const auto found = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
-    return rung.terms == terms && rung.as_promised;
+    return rung.terms == terms && rung.by_score_test;
   });
   return found != rungs.end() ? &*found : nullptr;
 }
 
 // A rung with these terms, not fitted yet: a new one, or in the place of one that was only
-// promised.
+// score-tested.
 Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
-  Rung* const before = promised_before(rungs, terms);
+  Rung* const before = score_tested_before(rungs, terms);
   Rung& rung = before != nullptr ? *before : rungs.emplace_back();
   return rung = rung_with(ladder, terms);
 }
@@ -74,20 +74,20 @@ std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const 
 
 bool is_known(const Rungs& rungs, const Terms& terms) {
   return std::any_of(rungs.begin(), rungs.end(),
-                     [&](const Rung& rung) { return rung.terms == terms && !rung.as_promised; });
+                     [&](const Rung& rung) { return rung.terms == terms && !rung.by_score_test; });
 }
 
-void add_promised(Rung promised, Rungs& rungs) {
-  if (is_known(rungs, promised.terms)) return;
-  Rung* const before = promised_before(rungs, promised.terms);
+void add_score_tested(Rung tested, Rungs& rungs) {
+  if (is_known(rungs, tested.terms)) return;
+  Rung* const before = score_tested_before(rungs, tested.terms);
   if (before == nullptr)
-    rungs.push_back(std::move(promised));
-  else if (promised.bic < before->bic)
-    *before = std::move(promised);
+    rungs.push_back(std::move(tested));
+  else if (tested.bic < before->bic)
+    *before = std::move(tested);
 }
 
-Nearby nearby(const Promise& promise, const Promise::Change& change) {
-  return {change.values, change.chi2 - promise.before};
+Nearby nearby(const ScoreTest& test, const ScoreTest::Change& change) {
+  return {change.values, change.chi2 - test.before};
 }
 
 const Rung* least_bic(const Rungs& rungs) {

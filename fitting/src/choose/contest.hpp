@@ -43,15 +43,15 @@ struct Neighbour {
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs);
 
-/// Whether there is a rung with these terms that is not only promised.
+/// Whether there is a rung with these terms that is not only score-tested.
 [[nodiscard]] bool is_known(const Rungs& rungs, const Terms& terms);
 
-/// Adds a rung that is only promised (take_as_promised), unless one with its terms is known or was
-/// promised beside another rung with as little BIC.
-void add_promised(Rung promised, Rungs& rungs);
+/// Adds a rung that is only score-tested (take_from_score_test), unless one with its terms is known
+/// or was tested beside another rung with as little BIC.
+void add_score_tested(Rung tested, Rungs& rungs);
 
-/// What a promise lets expect of one of its changes.
-[[nodiscard]] Nearby nearby(const Promise& promise, const Promise::Change& change);
+/// What a score test lets expect of one of its changes.
+[[nodiscard]] Nearby nearby(const ScoreTest& test, const ScoreTest::Change& change);
 
 /// Of the rungs that could be fitted; null where there is none.
 [[nodiscard]] const Rung* least_bic(const Rungs& rungs);

@@ -11,63 +11,63 @@
 namespace trochoid::fitting {
 namespace {
 
-// What a change is promised to cost in BIC for its parameters, and to bring in chi-square.
-double price(const Promise& promise, const Promise::Change& change) {
-  return change.parameters * std::log(promise.rows);
+// What a change costs in BIC for its parameters, and is expected to bring in chi-square.
+double price(const ScoreTest& test, const ScoreTest::Change& change) {
+  return change.parameters * std::log(test.rows);
 }
-double gain(const Promise& promise, const Promise::Change& change) {
-  return promise.before - change.chi2;
+double gain(const ScoreTest& test, const ScoreTest::Change& change) {
+  return test.before - change.chi2;
 }
 
 // Whether a further term, however little speaks for it, widens the error bars noticeably by what it
 // moves other parameters by, as it is weighed there (rivals.cpp).
-bool counts_in_error_bars(const Promise::Change& change, double gained) {
+bool counts_in_error_bars(const ScoreTest::Change& change, double gained) {
   constexpr double kNoticeably = 1.3;
   const double odds = std::exp(0.5 * gained - change.parameters);  // after AIC
   const double variance = odds / (1.0 + odds) * change.moves * change.moves;
   return 1.0 + variance > kNoticeably * kNoticeably;
 }
 
-// Whether a promised change of a known rung may come to something. One that hardly follows the
+// Whether a score-tested change of a known rung may come to something. One that hardly follows the
 // track has to be mended for a good part: all else would only follow the tracker's errors. Where
 // what is left hangs together, a further term may be what is missing, and all that it takes away
 // counts; what takes the place of another, or stands beside a rung that leaves noise, may do as
-// well as that. So may what differs by more terms, but of that only what promises to do as well.
-bool worth_a_fit(const Rung& known, double dilution, const Promise& promise,
-                 const Promise::Change& change, const Difference& by) {
+// well as that. So may what differs by more terms, but of that only what is expected to do as well.
+bool worth_a_fit(const Rung& known, double inflation, const ScoreTest& test,
+                 const ScoreTest::Change& change, const Difference& by) {
   constexpr double kGoodPart = 0.25;
-  const double gained = gain(promise, change), paid = price(promise, change);
+  const double gained = gain(test, change), paid = price(test, change);
   if (known.fit.verdict == data::FitVerdict::doubtful ||
       known.fit.verdict == data::FitVerdict::unexplained)
-    return gained > kGoodPart * promise.before;
+    return gained > kGoodPart * test.before;
   if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
-  if (by.larger() && counts_in_error_bars(change, gained / dilution)) return true;
-  const double against = paid - gained / dilution;
+  if (by.larger() && counts_in_error_bars(change, gained / inflation)) return true;
+  const double against = paid - gained / inflation;
   if (by.larger()) return against < most_evidence_against(known);
   if (by.exchanged()) return against < kVeryStrong;
   return against < kStrong;
 }
 
-// Whether what a set promises one of its subsets promises as well.
+// Whether one of a set's subsets is expected to do as well as the set.
 bool has_idle_terms(const std::map<int, Terms>& sets, int key,
-                    const std::function<double(int)>& promised_bic) {
+                    const std::function<double(int)>& expected_bic) {
   return std::any_of(sets.begin(), sets.end(), [&](const auto& other) {
     return other.first != key && (other.first & key) == other.first &&
-           promised_bic(other.first) <= promised_bic(key);
+           expected_bic(other.first) <= expected_bic(key);
   });
 }
 
 // Whether a further loss need not be fitted to know what it comes to. Where a body slides that is
 // dear.
-bool promises_nothing(const Rung& known, double gained, int parameters, const Difference& by) {
+bool gains_nothing(const Rung& known, double gained, int parameters, const Difference& by) {
   constexpr double kByChance = 1.0;  // what a parameter gains of chi-square
   return by.larger() && known.fit.model == "sliding" && known.fit.whiteness_p >= kWhite &&
          gained < kByChance * parameters;
 }
 
-// Sets of terms beside a known rung's that may do as well, the most promising first: one term more,
-// one in the place of another, and, of those that differ by more, a few. Those that promise nothing
-// are added to the rungs as they are promised.
+// Sets of terms beside a known rung's that may do as well, the likeliest first: one term more,
+// one in the place of another, and, of those that differ by more, a few. Those that gain nothing
+// by the score test are added to the rungs as it has them.
 std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& known, Rungs& rungs) {
   constexpr std::size_t kMostFar = 4;
   const Ladder& ladder = contest.ladder;
@@ -75,17 +75,17 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   const Terms& all = sets.rbegin()->second;
   std::map<int, std::set<std::string>> absent;
   for (const auto& [key, terms] : sets) absent[key] = parameters_without(ladder, all, terms);
-  const auto promise =
-      promised(contest.tracks, known, contest.options, rung_with(ladder, all), absent);
+  const auto test =
+      score_test(contest.tracks, known, contest.options, rung_with(ladder, all), absent);
   std::vector<Neighbour> worth;
-  if (!promise) {
+  if (!test) {
     for (Terms& terms : with_one_more(ladder, known.terms)) worth.push_back({std::move(terms)});
     return worth;
   }
-  const double diluted = dilution(contest.tracks, known, contest.options);
-  const auto change = [&](int key) -> const Promise::Change& { return promise->instead.at(key); };
+  const double inflation = variance_inflation(contest.tracks, known, contest.options);
+  const auto change = [&](int key) -> const ScoreTest::Change& { return test->instead.at(key); };
   const auto bic = [&](int key) {  // beside the known one's
-    return price(*promise, change(key)) - gain(*promise, change(key));
+    return price(*test, change(key)) - gain(*test, change(key));
   };
   std::vector<int> order;
   for (const auto& [key, terms] : sets) order.push_back(key);
@@ -94,18 +94,18 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   for (const int key : order) {
     const Terms& terms = sets.at(key);
     const Difference by = difference(terms, known.terms);
-    if (is_known(rungs, terms) || !worth_a_fit(known, diluted, *promise, change(key), by)) continue;
+    if (is_known(rungs, terms) || !worth_a_fit(known, inflation, *test, change(key), by)) continue;
     const bool near = by.larger() || by.exchanged();
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
-    const double gained = gain(*promise, change(key)) / diluted;
-    if (promises_nothing(known, gained, change(key).parameters, by)) {
+    const double gained = gain(*test, change(key)) / inflation;
+    if (gains_nothing(known, gained, change(key).parameters, by)) {
       Rung rung = rung_with(ladder, terms);
-      take_as_promised(known, *promise, change(key), diluted, rung);
-      add_promised(std::move(rung), rungs);
+      take_from_score_test(known, *test, change(key), inflation, rung);
+      add_score_tested(std::move(rung), rungs);
       continue;
     }
     far += near ? 0 : 1;
-    worth.push_back({terms, nearby(*promise, change(key))});
+    worth.push_back({terms, nearby(*test, change(key))});
   }
   return worth;
 }
@@ -114,7 +114,7 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
 const Rung* exchange_terms(const Contest& contest, const Rung& known, Rungs& rungs) {
   constexpr std::size_t kFirst = 2;
   const std::vector<Neighbour> worth = worth_exchanging(contest, known, rungs);
-  // Where something is missing, what promises most leads on, and changes what the others promise.
+  // Where something is missing, the likeliest leads on, and changes what the others gain.
   if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
     add_neighbours(contest, std::span(worth).first(kFirst), known, rungs);
     const Rung* best = simplest_sufficient(contest.ladder, rungs);
@@ -133,7 +133,7 @@ const Rung* as_good(const Rungs& rungs, const Rung& chosen,
   const Rung* best = nullptr;
   if (chosen.fit.model == "sliding") return best;
   for (const Rung& rung : rungs)
-    if (rung.fitted && rung.fit.converged && !rung.as_promised && !exchanged.contains(&rung) &&
+    if (rung.fitted && rung.fit.converged && !rung.by_score_test && !exchanged.contains(&rung) &&
         rung.bic < chosen.bic + kBareMention && (best == nullptr || rung.bic < best->bic))
       best = &rung;
   return best;

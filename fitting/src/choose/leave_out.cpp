@@ -45,12 +45,12 @@ std::vector<Neighbour> may_suffice(const Contest& contest, const Rung& rung) {
       absent[term] = parameters_without(contest.ladder, rung.terms, fewer);
   }
   if (absent.empty()) return {};
-  const auto promise = promised(contest.tracks, rung, contest.options, rung, absent);
+  const auto test = score_test(contest.tracks, rung, contest.options, rung, absent);
   std::vector<Neighbour> smaller;
   for (const auto& [term, parameters] : absent) {
     smaller.push_back({rung.terms});
     smaller.back().terms.erase(term);
-    if (promise) smaller.back().near = nearby(*promise, promise->instead.at(term));
+    if (test) smaller.back().near = nearby(*test, test->instead.at(term));
   }
   return smaller;
 }

@@ -269,7 +269,7 @@ void try_rung(Rung& rung, const std::function<void()>& fit) {
 }  // namespace
 
 void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung) {
-  if (!rung.fitted || !rung.fit.converged || rung.as_promised) return;
+  if (!rung.fitted || !rung.fit.converged || rung.by_score_test) return;
   try {
     rung.held_back_rms_sigma = held_back(tracks, rung, options);
   } catch (const Error&) {
@@ -379,7 +379,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 
 void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
               Rung& rung) {
-  if (rung.scene.model.name != "sliding" || rung.rolls_at_first || rung.as_promised ||
+  if (rung.scene.model.name != "sliding" || rung.rolls_at_first || rung.by_score_test ||
       !usable(rung.fit))
     return;
   Values start = values_of(rung.fit);
@@ -393,9 +393,9 @@ void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitO
   if (rolls.fitted && rolls.fit.converged) rung = std::move(rolls);
 }
 
-std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung& known,
-                                const FitOptions& options, const Rung& larger,
-                                const std::map<int, std::set<std::string>>& others) {
+std::optional<ScoreTest> score_test(std::span<const data::Track> tracks, const Rung& known,
+                                    const FitOptions& options, const Rung& larger,
+                                    const std::map<int, std::set<std::string>>& others) {
   FitOptions at = options;
   at.rolls_at_first = known.rolls_at_first;
   at.start = values_of_all_arcs(known.fit);
@@ -407,7 +407,7 @@ std::optional<Promise> promised(std::span<const data::Track> tracks, const Rung&
   data::Scene scene = larger.scene;
   scene.model.slip_regularisation_m_s = known.scene.model.slip_regularisation_m_s;
   try {
-    return promised(tracks, scene, at, further, others);
+    return score_test(tracks, scene, at, further, others);
   } catch (const TrackError&) {
   } catch (const NumericalError&) {
   }
@@ -425,12 +425,13 @@ void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
   }
 }
 
-double dilution(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options) {
+double variance_inflation(std::span<const data::Track> tracks, const Rung& known,
+                          const FitOptions& options) {
   FitOptions at = options;
   at.rolls_at_first = known.rolls_at_first;
   at.start = values_of_all_arcs(known.fit);
   try {
-    return dilution(tracks, known.scene, at);
+    return variance_inflation(tracks, known.scene, at);
   } catch (const NumericalError&) {  // integrated as coarsely as a search does
     return 1.0;
   }
@@ -455,9 +456,9 @@ void fit_from_values(std::span<const data::Track> tracks,
   fit_from(tracks, values, Strategy::single, options, rung);
 }
 
-void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
-                      double diluted, Rung& rung) {
-  const double gained = (promise.before - change.chi2) / diluted;
+void take_from_score_test(const Rung& known, const ScoreTest& test, const ScoreTest::Change& change,
+                          double inflation, Rung& rung) {
+  const double gained = (test.before - change.chi2) / inflation;
   rung.fit = known.fit;
   rung.fit.chi2 -= gained;
   for (data::FitParameter& parameter : rung.fit.parameters) {
@@ -470,15 +471,15 @@ void take_as_promised(const Rung& known, const Promise& promise, const Promise::
   for (const model::ParameterInfo& info : predictor->parameters())
     if (const auto sigma = change.sigmas.find(info.name); sigma != change.sigmas.end())
       rung.fit.parameters.push_back({info.name, change.values.at(info.name),
-                                     sigma->second * std::sqrt(diluted), info.unit,
+                                     sigma->second * std::sqrt(inflation), info.unit,
                                      data::ParameterStatus::free, true, ""});
   rung.rolls_at_first = known.rolls_at_first;
-  rung.fitted = rung.as_promised = true;
+  rung.fitted = rung.by_score_test = true;
   rung.reason =
       "it would gain nothing by the derivatives beside the model without it, and was not fitted";
   rung.parameters = known.parameters + change.parameters;
   rung.aicc = known.aicc + 2.0 * change.parameters - gained;
-  rung.bic = known.bic + change.parameters * std::log(promise.rows) - gained;
+  rung.bic = known.bic + change.parameters * std::log(test.rows) - gained;
 }
 
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "choose/ladder.hpp"
-#include "choose/promise.hpp"
+#include "choose/score_test.hpp"
 #include "judge/draft.hpp"
 #include "trochoid/fitting/fit.hpp"
 
@@ -33,8 +33,8 @@ struct Rung {
   Settled settled;
   bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
   bool fitted = false;
-  bool as_promised = false;  ///< not fitted itself, take_as_promised()
-  std::string reason;        ///< why there is no fit, or why it is not accepted; else empty
+  bool by_score_test = false;  ///< not fitted itself, take_from_score_test()
+  std::string reason;          ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
   /// What explains the longest first part of the track that a search for it, or for the model that
@@ -92,7 +92,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
 void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
 
 /// The same for a rung beside one that rolls at first, from where that begins: what it says of the
-/// start is comparable then. As it is where that leads nowhere, or where it is only promised.
+/// start is comparable then. As it is where that leads nowhere, or where it is only score-tested.
 void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
               Rung& rung);
 
@@ -103,10 +103,9 @@ void predict_held_back(std::span<const data::Track> tracks, const FitOptions& op
 /// @param others  parameters of each of the known rung's terms that may be left out.
 /// @returns nothing where nothing can be told: the larger one has too many parameters for the
 /// track, or no prediction. Its fit says so.
-[[nodiscard]] std::optional<Promise> promised(std::span<const data::Track> tracks,
-                                              const Rung& known, const FitOptions& options,
-                                              const Rung& larger,
-                                              const std::map<int, std::set<std::string>>& others);
+[[nodiscard]] std::optional<ScoreTest> score_test(
+    std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
+    const Rung& larger, const std::map<int, std::set<std::string>>& others);
 
 /// Second thoughts about the fit of the rung that was chosen (adequacy.hpp).
 void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
@@ -114,8 +113,8 @@ void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
 
 /// How many times less than its change a rung's chi-square tells, for what its residuals have in
 /// common.
-[[nodiscard]] double dilution(std::span<const data::Track> tracks, const Rung& known,
-                              const FitOptions& options);
+[[nodiscard]] double variance_inflation(std::span<const data::Track> tracks, const Rung& known,
+                                        const FitOptions& options);
 
 /// Fits a rung from the values that explain a first part of the track, which it may explain more
 /// of. A sliding one rolls at first and slides by Coulomb's law from where that ends: friction that
@@ -134,15 +133,16 @@ struct Nearby {
   double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
 };
 
-/// Makes a rung with a further loss that promises nothing what the promise says, without a fit,
-/// which would creep along beside the known rung's: it is told of, and error bars allow for it.
-/// @param diluted  promised gains tell so many times less (dilution()).
-void take_as_promised(const Rung& known, const Promise& promise, const Promise::Change& change,
-                      double diluted, Rung& rung);
+/// Makes a rung with a further loss that gains nothing by the score test what that says, without a
+/// fit, which would creep along beside the known rung's: it is told of, and error bars allow for
+/// it.
+/// @param inflation  gains in chi-square tell so many times less (variance_inflation()).
+void take_from_score_test(const Rung& known, const ScoreTest& test, const ScoreTest::Change& change,
+                          double inflation, Rung& rung);
 
 /// Fits a rung that differs by a term or two from `known`, from where it is expected. Where what is
-/// found there is clearly worse than that promises, or nothing is expected, from the solution of
-/// `known` itself.
+/// found there is clearly worse than that, or nothing is expected, from the solution of `known`
+/// itself.
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
                    const FitOptions& options, Rung& rung, const Nearby& near = {});
 

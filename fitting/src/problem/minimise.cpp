@@ -135,19 +135,19 @@ class GeodesicDescent {
     for (int attempt = 0; attempt < kAttempts && waited <= kPatience; ++attempt) {
       factorise();
       const Eigen::VectorXd step = answer(rows_);
-      const double promised = chi2_ - (rows_ + jacobian_ * step).squaredNorm();
-      if (!(promised > kNothing * chi2_)) {
+      const double predicted = chi2_ - (rows_ + jacobian_ * step).squaredNorm();
+      if (!(predicted > kNothing * chi2_)) {
         walled_in_ = false;
         break;
       }
       const Eigen::VectorXd bend = bend_of(step);
       if (bend.size() > 0) {
-        const Way way = tried(step + 0.5 * bend, promised);
+        const Way way = tried(step + 0.5 * bend, predicted);
         if (way.chi2 < std::min(chi2_, straight.chi2)) return take(way);
         walled_in_ = walled_in_ && !std::isfinite(way.chi2);
         damp(std::isfinite(way.chi2) ? 5.0 : 30.0);
       } else if (straight.step.size() == 0) {
-        Way way = tried(step, promised);
+        Way way = tried(step, predicted);
         walled_in_ = walled_in_ && !std::isfinite(way.chi2);
         damp(std::isfinite(way.chi2) ? 4.0 : 30.0);
         if (way.kept > kSome) straight = std::move(way);
@@ -159,13 +159,13 @@ class GeodesicDescent {
     return straight.step.size() > 0 && take(straight);
   }
 
-  [[nodiscard]] Way tried(const Eigen::VectorXd& step, double promised) const {
+  [[nodiscard]] Way tried(const Eigen::VectorXd& step, double predicted) const {
     Way way;
     way.step = step;
     way.damping = damping_;
     if (!all_rows(problem_, u_ + step, way.rows, nullptr)) return way;
     way.chi2 = way.rows.squaredNorm();
-    way.kept = (chi2_ - way.chi2) / promised;
+    way.kept = (chi2_ - way.chi2) / predicted;
     return way;
   }
 

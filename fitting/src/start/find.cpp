@@ -89,7 +89,7 @@ Found look_about(const Problem& problem, Found found) {
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   if (!rim || (seen && !slides) || found.unexplained > kRoughly) return found;
   if ((seen || !slides) && surely_explained(problem, found)) return found;
-  return hop(problem, std::move(found), kMisses);
+  return basin_hop(problem, std::move(found), kMisses);
 }
 
 // The coefficients of friction, clearly different, that leave least of a problem unexplained, best
@@ -252,7 +252,7 @@ Found grow_into_sliding(const Problem& problem, const Start& start, int window, 
     if (reduced_chi2(part, best) > most) best = seek_friction(part, std::move(best), options);
     // Short slips that come and go with every parameter make ripples.
     if (const double off = reduced_chi2(part, best); off > most && off < kNear * most)
-      best = hop(part, judged(part, std::move(best), start.path), 2).solution;
+      best = basin_hop(part, judged(part, std::move(best), start.path), 2).solution;
     if (reduced_chi2(part, best) > most) {
       if (step <= kLeastStep) return {};
       step = std::max(kLeastStep, step / 2);

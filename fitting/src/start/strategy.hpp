@@ -69,10 +69,11 @@ struct Growth {
 [[nodiscard]] Found grow(const Problem& problem, const Start& start, int first_window,
                          const Growth& growth = {});
 
-/// Where a cost has ripples, as events that come and go with the parameters make them: steps off
-/// the best known point, as far as the misfit lets the linearised problem, and downhill again,
-/// until `misses` rounds in a row, or a dozen altogether, gained nothing. Reproducible.
-[[nodiscard]] Found hop(const Problem& problem, Found best, int misses);
+/// Basin hopping where a cost has ripples, as events that come and go with the parameters make
+/// them: steps off the best known point, as far as the misfit lets the linearised problem, and
+/// downhill again, until `misses` rounds in a row, or a dozen altogether, gained nothing.
+/// Reproducible.
+[[nodiscard]] Found basin_hop(const Problem& problem, Found best, int misses);
 
 /// Where a solution that falls flat does not pass: a body nods as it falls, and the dip of its tilt
 /// in which it comes to lie decides when and where. From one dip to the next the path jumps, and

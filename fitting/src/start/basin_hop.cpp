@@ -34,21 +34,21 @@ Eigen::MatrixXd reach(const Problem& problem, const Eigen::VectorXd& u, double r
   return cholesky.matrixU().solve(Eigen::MatrixXd::Identity(u.size(), u.size()));
 }
 
-// Looks at random places about a solution instead of going downhill from each: values are far
+// Tries random places about a solution instead of going downhill from each: values are far
 // cheaper than derivatives. Reproducible.
-class Looks {
+class RandomTrials {
  public:
-  explicit Looks(const Problem& problem) : problem_(problem) {}
+  explicit RandomTrials(const Problem& problem) : problem_(problem) {}
   // The place that leaves least, by steps in turn along the columns of L; empty where the model
   // ends at all of them. What is held stays as it is in `held`.
   Eigen::VectorXd best(int count, const Eigen::VectorXd& about, const Eigen::MatrixXd& L,
                        std::span<const double> steps, const Eigen::VectorXd& held) {
     double least = std::numeric_limits<double>::infinity();
     Eigen::VectorXd from, residuals;
-    for (int look = 0; look < count; ++look) {
+    for (int trial = 0; trial < count; ++trial) {
       Eigen::VectorXd z(L.cols());
       for (double& entry : z) entry = normal_(generator_);
-      Eigen::VectorXd u = about + steps[static_cast<std::size_t>(look) % steps.size()] * (L * z);
+      Eigen::VectorXd u = about + steps[static_cast<std::size_t>(trial) % steps.size()] * (L * z);
       for (Eigen::Index k = 0; k < u.size(); ++k)
         if (problem_.free[k].held) u[k] = held[k];
       if (!evaluate(problem_, 0, u, residuals, nullptr) || residuals.squaredNorm() >= least)
@@ -94,7 +94,7 @@ std::optional<Prelude> before(const Problem& problem, const Eigen::VectorXd& u, 
 }  // namespace
 
 Found fall_anew(const Problem& problem, Found found) {
-  constexpr int kRounds = 4, kLooks = 60;
+  constexpr int kRounds = 4, kTrials = 60;
   constexpr double kSteps[] = {0.5, 1.0, 2.0, 3.0};
   constexpr double kTellsSomething = 0.3;  // of the variance
   if (!found.solution.usable || found.passed || found.unexplained > kTellsSomething) return found;
@@ -104,10 +104,10 @@ Found fall_anew(const Problem& problem, Found found) {
   if (!prelude) return found;
   const Eigen::MatrixXd L = reach(prelude->part, prelude->solution.u, 1.0);
   if (L.size() == 0) return found;
-  Looks looks(problem);
+  RandomTrials trials(problem);
   for (int round = 0; round < kRounds && !found.passed && !exhausted(problem, found); ++round) {
     const Eigen::VectorXd from =
-        looks.best(kLooks, prelude->solution.u, L, kSteps, found.solution.u);
+        trials.best(kTrials, prelude->solution.u, L, kSteps, found.solution.u);
     if (from.size() == 0) break;
     Found other = judged(problem, minimise(problem, from), found.path);
     if (!better(other, found)) continue;
@@ -117,16 +117,16 @@ Found fall_anew(const Problem& problem, Found found) {
   return found;
 }
 
-Found hop(const Problem& problem, Found best, int misses) {
+Found basin_hop(const Problem& problem, Found best, int misses) {
   if (!best.solution.usable) return best;
   constexpr double kSteps[] = {0.5, 1.0, 2.0, 4.0, 10.0};
-  constexpr int kLooks = 40, kMostRounds = 12;
-  Looks looks(problem);
+  constexpr int kTrials = 40, kMostRounds = 12;
+  RandomTrials trials(problem);
   Eigen::MatrixXd L = reach(problem, best.solution.u, best.reduced_chi2);
   for (int round = 0, missed = 0;
        round < kMostRounds && missed < misses && L.size() > 0 && !exhausted(problem, best);
        ++round) {
-    const Eigen::VectorXd from = looks.best(kLooks, best.solution.u, L, kSteps, best.solution.u);
+    const Eigen::VectorXd from = trials.best(kTrials, best.solution.u, L, kSteps, best.solution.u);
     if (from.size() == 0) break;
     Found found = judged(problem, minimise(problem, from, {.iterations = 20}), best.path);
     // A ripple of less than 1 in chi-square moves nothing by more than its error bar.

@@ -13,7 +13,7 @@ namespace trochoid::fitting {
 /// What a minimum's tangent plane says of a model with further losses, in chi-square by the noise
 /// there: the score test (Rao, Proc. Camb. Phil. Soc. 44, 50, 1948). Costs a run with
 /// derivatives where a fit takes dozens.
-struct Promise {
+struct ScoreTest {
   struct Change {
     double chi2 = 0.0;   ///< afterwards
     int parameters = 0;  ///< more of them that are fitted, or fewer
@@ -40,16 +40,16 @@ struct Promise {
 /// @param others   names of the parameters of losses, further ones among them, that may be left out
 /// together, by a key of their own.
 /// @throws NumericalError where the model has no prediction.
-[[nodiscard]] Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
-                               const FitOptions& options, const std::set<std::string>& further,
-                               const std::map<int, std::set<std::string>>& others);
+[[nodiscard]] ScoreTest score_test(std::span<const data::Track> tracks, const data::Scene& scene,
+                                   const FitOptions& options, const std::set<std::string>& further,
+                                   const std::map<int, std::set<std::string>>& others);
 
 /// How many times less than its change a chi-square tells, where what is left at a minimum hangs
 /// together; at least 1.
 /// @param options  its start holds the values at the minimum.
 /// @throws NumericalError where the model has no prediction.
-[[nodiscard]] double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
-                              const FitOptions& options);
+[[nodiscard]] double variance_inflation(std::span<const data::Track> tracks,
+                                        const data::Scene& scene, const FitOptions& options);
 
 /// doubt_as_a_whole() (adequacy.hpp) for a fit whose values `options.start` holds.
 void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,

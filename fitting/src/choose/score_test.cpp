@@ -1,4 +1,4 @@
-#include "choose/promise.hpp"
+#include "choose/score_test.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -152,7 +152,7 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
   return variance;
 }
 
-// What losses that are added do to the error bars of the other parameters: Promise::Change.
+// What losses that are added do to the error bars of the other parameters: ScoreTest::Change.
 struct Moved {
   double moves = 0.0;
   Eigen::VectorXd wider;  // at least 1
@@ -214,9 +214,9 @@ std::set<int> named(const Problem& problem, const std::set<std::string>& names) 
 
 }  // namespace
 
-Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
-                 const FitOptions& options, const std::set<std::string>& further,
-                 const std::map<int, std::set<std::string>>& others) {
+ScoreTest score_test(std::span<const data::Track> tracks, const data::Scene& scene,
+                     const FitOptions& options, const std::set<std::string>& further,
+                     const std::map<int, std::set<std::string>>& others) {
   const Minimum minimum(tracks, scene, options);
   const Problem& problem = minimum.problem;
   const Tangent at = condensed(tangent(problem, minimum.u));
@@ -226,15 +226,15 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
     if (problem.free[i].held) held.insert(i);
   const std::set<int> added = named(problem, further);
   const auto more = static_cast<int>(added.size());
-  Promise promise;
-  promise.rows = problem.rows();
-  promise.before = least(at, added, held, known).chi2;
+  ScoreTest test;
+  test.rows = problem.rows();
+  test.before = least(at, added, held, known).chi2;
   const auto change = [&](const std::set<int>& removed) {
     const Least& to = least(at, removed, held, known);
     const bool larger = removed.size() < added.size() &&
                         std::includes(added.begin(), added.end(), removed.begin(), removed.end());
-    Promise::Change to_there{to.chi2, more - static_cast<int>(removed.size()),
-                             values_after(problem, minimum.u, to.step, removed)};
+    ScoreTest::Change to_there{to.chi2, more - static_cast<int>(removed.size()),
+                               values_after(problem, minimum.u, to.step, removed)};
     if (!larger) return to_there;
     const Moved by = moved(at, added, removed, held, known);
     to_there.moves = by.moves;
@@ -246,13 +246,13 @@ Promise promised(std::span<const data::Track> tracks, const data::Scene& scene,
         to_there.wider[problem.name(i)] = by.wider[i];
     return to_there;
   };
-  promise.with = change({});
-  for (const auto& [key, names] : others) promise.instead[key] = change(named(problem, names));
-  return promise;
+  test.with = change({});
+  for (const auto& [key, names] : others) test.instead[key] = change(named(problem, names));
+  return test;
 }
 
-double dilution(std::span<const data::Track> tracks, const data::Scene& scene,
-                const FitOptions& options) {
+double variance_inflation(std::span<const data::Track> tracks, const data::Scene& scene,
+                          const FitOptions& options) {
   const Minimum at(tracks, scene, options);
   const double widened = uncertainty(at.problem, at.u).widened;
   return widened * widened;
