@@ -490,10 +490,7 @@ void doubt_attitudes(const std::vector<AttitudeDoubt>& doubts, std::vector<Glimp
   for (const AttitudeDoubt& doubt : doubts) {
     auto& seen = glimpses[doubt.at].seen;
     if (!seen || !seen->pose || seen->attitude_doubtful) continue;
-    seen->attitude_doubtful = true;
-    seen->pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
-    allow_for_tilt(doubt.off_theta_rad, *seen);
-    allow_for(doubt.off_px, doubt.off_m, *seen);
+    doubt_attitude(doubt.off_px, doubt.off_m, doubt.off_theta_rad, *seen);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -18,9 +19,13 @@ void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sigh
   seen.pose->covariance_m2 += m2, seen.pose->common.m2 += m2;
 }
 
-void allow_for_tilt(double off_rad, Sighting& seen) {
-  seen.pose->sigma_theta_rad = std::hypot(seen.pose->sigma_theta_rad, off_rad);
-  seen.pose->common.theta_rad2 += off_rad * off_rad;
+void doubt_attitude(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m,
+                    double off_tilt_rad, Sighting& seen) {
+  seen.attitude_doubtful = true;
+  allow_for(off_px, off_m, seen);
+  seen.pose->sigma_theta_rad = std::hypot(seen.pose->sigma_theta_rad, off_tilt_rad);
+  seen.pose->common.theta_rad2 += off_tilt_rad * off_tilt_rad;
+  seen.pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
 }
 
 Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i) {

@@ -61,7 +61,7 @@ class Measuring {
 /// Runs work(measuring, i) for i of 0..count on all processors, each next one where one is free.
 /// What it gives must not depend on the order.
 void on_all_cores(const Background& background, const BodyFinder& finder, std::size_t count,
-                   const std::function<void(Measuring&, std::size_t)>& work);
+                  const std::function<void(Measuring&, std::size_t)>& work);
 
 /// What the frames around frame i show of the picture: the light beside the outline, and how sharp
 /// it is.
@@ -73,8 +73,10 @@ struct Surroundings {
 
 /// Allows for the centre being this far off as well, in the picture and on the floor.
 void allow_for(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m, Sighting& seen);
-/// The same for its tilt.
-void allow_for_tilt(double off_rad, Sighting& seen);
+/// Doubts a sighting's attitude: allows for its centre and tilt being this far off as well, and
+/// takes nothing for known of its azimuth.
+void doubt_attitude(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m,
+                    double off_tilt_rad, Sighting& seen);
 /// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
 [[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
 

@@ -526,18 +526,15 @@ bool is_led_to(const BodyFinder& finder, const std::vector<Glimpse>& glimpses, s
 /// What the frames around still contradict may be where they say instead: its covariance holds
 /// both. Where it does so for another reading already, which may be the same, the tilt's alone is
 /// seen to.
-void doubt(const Expected& expected, Sighting& seen) {
+void doubt_reading(const Expected& expected, Sighting& seen) {
   PoseMeasurement& pose = *seen.pose;
   const double off_rad = std::abs(expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
   if (seen.attitude_doubtful) {
     pose.sigma_theta_rad = std::max(pose.sigma_theta_rad, off_rad);
     return;
   }
-  seen.attitude_doubtful = true;
-  pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
-  allow_for_tilt(off_rad, seen);
-  allow_for(expected.seen.centre_px - seen.centre_px,
-            (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>(), seen);
+  doubt_attitude(expected.seen.centre_px - seen.centre_px,
+                 (expected.seen.pose->pose.centre_m - pose.pose.centre_m).head<2>(), off_rad, seen);
 }
 
 }  // namespace
@@ -618,7 +615,7 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
                             (poor[i] && off > kPoorOff_rad));
       if (off < least_rad) least_rad = off, nearest = std::move(expected);
     }
-    if (nearest && doubted) doubt(*nearest, *glimpses[i].seen);
+    if (nearest && doubted) doubt_reading(*nearest, *glimpses[i].seen);
   }
 }
 

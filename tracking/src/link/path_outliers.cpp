@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -158,14 +157,11 @@ std::vector<Run> runs_of(const std::vector<Glimpse>& glimpses) {
 }
 
 // A sighting may as well be at another place: its covariance then holds both.
-void doubt(const Place& place, Sighting& seen) {
-  PoseMeasurement& pose = *seen.pose;
+void doubt_place(const Place& place, Sighting& seen) {
   const Eigen::Vector2d px = place.px - seen.centre_px;
-  seen.attitude_doubtful = true;
-  allow_for(px, place.m - pose.pose.centre_m.head<2>(), seen);
   // A fit that went astray did so in all it says.
-  allow_for_tilt(px.norm() / seen.rim.semi_major_px(), seen);
-  pose.sigma_phi_rad = std::numeric_limits<double>::infinity();
+  doubt_attitude(px, place.m - seen.pose->pose.centre_m.head<2>(),
+                 px.norm() / seen.rim.semi_major_px(), seen);
 }
 
 // Where a straight line between two other frames puts the body in frame i.
@@ -182,7 +178,7 @@ Place between(const std::vector<Glimpse>& glimpses, std::size_t from, std::size_
 }  // namespace
 
 void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
-  for (const auto& [i, place] : Path(glimpses).take_out()) doubt(place, *glimpses[i].seen);
+  for (const auto& [i, place] : Path(glimpses).take_out()) doubt_place(place, *glimpses[i].seen);
 }
 
 void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
@@ -201,7 +197,7 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
       const Eigen::Vector2d px = place.px - seen.centre_px;
       const Eigen::Vector2d m = place.m - seen.pose->pose.centre_m.head<2>();
       if (px.norm() < kOfRadius * seen.rim.semi_major_px()) continue;
-      doubt(place, seen);
+      doubt_place(place, seen);
       // The path need not have been straight in between.
       allow_for({-px.y(), px.x()}, {-m.y(), m.x()}, seen);
     }
