@@ -11,7 +11,7 @@
 namespace trochoid::tools {
 namespace {
 
-std::string length_words(double length_m) {
+std::string scale_bar_words(double length_m) {
   if (length_m >= 1.0) return fmt::format("{:g} m", length_m);
   if (length_m >= 1e-3) return fmt::format("{:g} mm", length_m * 1e3);
   return fmt::format("{:g} um", length_m * 1e6);
@@ -72,7 +72,7 @@ void draw_scale_bar(cv::Mat picture, std::optional<double> scale_px_per_m, doubl
     ink.line({x, base - 0.4 * text_px}, {x, base + 0.4 * text_px}, stroke, 1.0);
   ink.lay_on(picture, stroke);
   draw_text_with_halo(
-      picture, scale_px_per_m ? length_words(length) : fmt::format("{:g} px", length),
+      picture, scale_px_per_m ? scale_bar_words(length) : fmt::format("{:g} px", length),
       {left + 0.5 * length_px, base - 0.9 * text_px}, text_px, palette::white, Align::centre);
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kTooWide = 1.5;  // residuals this many times the track's sigma need a reason
 
-std::string length_words(double length_m) {
+std::string scatter_words(double length_m) {
   if (length_m >= 1e-3) return fmt::format("{:.3g} mm", length_m * 1e3);
   return fmt::format("{:.3g} µm", length_m * 1e6);
 }
@@ -30,7 +30,7 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
       facts.prediction.angles_alone()
           ? fmt::format("{:.3g} mrad rms of the spin angle", 1e3 * facts.rms_spin_rad)
           : fmt::format(
-                "{} rms per axis{}", length_words(facts.rms_axis_m),
+                "{} rms per axis{}", scatter_words(facts.rms_axis_m),
                 std::isfinite(facts.rms_axis_sigma)
                     ? fmt::format(" ({:.2f} times the tracker's own error)", facts.rms_axis_sigma)
                     : "");

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -51,12 +50,6 @@ struct FitOutcome {
   double integration_sigma = 0.0;  ///< median integration error at the solution in sigmas
 };
 
-double thread_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 std::vector<FitSetting> fit_settings() {
   using fitting::Strategy;
   const MadeTrackOptions ten_seconds{
@@ -104,9 +97,9 @@ FitOutcome measure(const FitSetting& setting, const Options& options) {
     const MadeTrack made = make_track(setting.tracks, generator);
     fitting::FitOptions how = setting.how;
     if (setting.start_off) how.start = start_off(made, generator);
-    const double begin_ms = thread_ms();
+    const double begin_ms = thread_time_ms();
     const data::Fit fit = fitting::fit(std::span(&made.track, 1), made.scene, how);
-    times_ms.push_back(thread_ms() - begin_ms);
+    times_ms.push_back(thread_time_ms() - begin_ms);
     double error = 0.0, in_sigmas = 0.0;
     for (const std::string& name : made.judged) {
       const data::FitParameter* found = fit.find(name);

@@ -20,12 +20,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-double thread_time_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 // Scenes are independent of each other and of the order in which threads take them.
 std::mt19937_64 generator_of(std::uint64_t seed, int scene) {
   std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(scene)};
@@ -204,6 +198,12 @@ Draw draw(const MadeTrackOptions& tracks, std::uint64_t seed, int index) {
 }
 
 }  // namespace
+
+double thread_time_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
 
 std::vector<FitStrategy> fit_strategies() {
   using fitting::Strategy;

@@ -10,6 +10,9 @@
 
 namespace trochoid::tools {
 
+/// Processor time that the calling thread has taken [ms].
+[[nodiscard]] double thread_time_ms();
+
 /// A way to fit: how it starts and how it goes on from there (FitOptions::strategy).
 struct FitStrategy {
   enum class Start { none, off, blind };  ///< off: 30-50 % wrong; blind: what anyone would write
