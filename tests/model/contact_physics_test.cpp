@@ -45,8 +45,9 @@ TEST(ContactLimits, SlidingWithGreatFrictionIsRolling) {
   scene.model.friction = 1e3;
   const Trajectory sliding = simulate(scene);
   EXPECT_TRUE(sliding.events.empty());
-  EXPECT_LE(largest_difference(rolling, sliding, "theta_rad"), 1e-12);
-  EXPECT_LE(largest_difference(rolling, sliding, "x_m"), 1e-12);
+  constexpr double kRounding = 1e-12;  // a body that sticks is integrated as one that rolls
+  EXPECT_LE(largest_difference(rolling, sliding, "theta_rad"), kRounding);
+  EXPECT_LE(largest_difference(rolling, sliding, "x_m"), kRounding);
 }
 
 TEST(ContactLimits, SlidingWithoutFrictionIsTheSmoothFloor) {
@@ -57,8 +58,10 @@ TEST(ContactLimits, SlidingWithoutFrictionIsTheSmoothFloor) {
   scene.model.slip_regularisation_m_s = 1e-3;
   scene.model.friction = 1e-13;  // 0 itself is taken for the smooth floor
   const Trajectory sliding = simulate(scene);
-  EXPECT_LE(largest_difference(smooth, sliding, "theta_rad"), 1e-8);
-  EXPECT_LE(largest_difference(smooth, sliding, "x_m"), 1e-11);
+  // Tolerance 1e-12 on the fast nutation of the tilt; the path feels the friction alone.
+  constexpr double kTilt_rad = 1e-8, kPath_m = 1e-11;
+  EXPECT_LE(largest_difference(smooth, sliding, "theta_rad"), kTilt_rad);
+  EXPECT_LE(largest_difference(smooth, sliding, "x_m"), kPath_m);
   scene.model.friction = 0.0;
   EXPECT_EQ(largest_difference(smooth, simulate(scene), "theta_rad"), 0.0);
 }
@@ -66,6 +69,8 @@ TEST(ContactLimits, SlidingWithoutFrictionIsTheSmoothFloor) {
 // Turning the body about e2 by pi exchanges its faces and keeps its motion: theta -> pi - theta,
 // phi -> phi + pi, w1 -> -w1, w3 -> -w3. It checks the lower rim's side in every law.
 TEST(ContactLimits, AMotionDoesNotKnowWhichFaceIsUp) {
+  // The same steps but for rounding, which moves events, and jumps of the force with them.
+  constexpr double kRoundingGrown = 1e-6;
   for (const char* name : {"s05_smooth_disc", "s06_roll_disc", "s08_slide_disc",
                            "s09_ring_retrograde_drag", "s10_stick_slip_event"}) {
     data::Scene scene = reference_scene(name);
@@ -79,14 +84,14 @@ TEST(ContactLimits, AMotionDoesNotKnowWhichFaceIsUp) {
     const Trajectory turned = simulate(scene);
     ASSERT_EQ(run.values.rows(), turned.values.rows()) << name;
     for (const char* same : {"x_m", "y_m", "z_m", "w2_rad_s", "normal_force_N", "contact_x_m"})
-      EXPECT_LE(largest_difference(run, turned, same), 1e-6) << name << " " << same;
+      EXPECT_LE(largest_difference(run, turned, same), kRoundingGrown) << name << " " << same;
   }
 }
 
 // Skidding upright disc: friction mu g slows the centre and spins the disc up until v = 2/3 v0
 // after |v0| / (3 mu g); the hoop ends at v0 / 2 after |v0| / (2 mu g).
 TEST(ContactClosedForms, ASkiddingDiscRollsAtTwoThirdsOfItsSpeed) {
-  constexpr double kTime_s = 1e-6;  // threshold of sticking over mu g, with a margin
+  constexpr double kSpeed_m_s = 1e-6, kTime_s = 1e-6;  // threshold of sticking, and over mu g
   for (const bool hoop : {false, true}) {
     data::Scene scene = disc(0.0);
     if (hoop) {
@@ -101,7 +106,7 @@ TEST(ContactClosedForms, ASkiddingDiscRollsAtTwoThirdsOfItsSpeed) {
     const Trajectory run = simulate(scene);
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_NEAR(run.events[0].t_s, 0.6 / ((hoop ? 2.0 : 3.0) * 0.2 * 9.81), kTime_s);
-    EXPECT_NEAR(column(run, "vx_m_s").tail(1)[0], hoop ? 0.3 : 0.4, 1e-6);
+    EXPECT_NEAR(column(run, "vx_m_s").tail(1)[0], hoop ? 0.3 : 0.4, kSpeed_m_s);
     EXPECT_EQ(run.outcome, Outcome::reached_end);
   }
 }
@@ -127,10 +132,12 @@ TEST(ContactClosedForms, UprightMotionsAreStableAboveTheirThresholds) {
     const double g_R = 9.81 / 0.0375;
     const double rolling = std::sqrt(g_R / (hoop ? 4.0 : 3.0));
     const double spinning = std::sqrt(g_R * (hoop ? 2.0 / 3.0 : 4.0 / 5.0));
-    EXPECT_LT(tilt_after(scene, 0.0, 1.05 * rolling), 1e-4);
-    EXPECT_GT(tilt_after(scene, 0.0, 0.95 * rolling), 1e-3);
-    EXPECT_LT(tilt_after(scene, 1.05 * spinning, 0.0), 1e-4);
-    EXPECT_GT(tilt_after(scene, 0.95 * spinning, 0.0), 1e-3);
+    // It begins at 1e-6 rad; three seconds are many growth times.
+    constexpr double kStays_rad = 1e-4, kGrows_rad = 1e-3;
+    EXPECT_LT(tilt_after(scene, 0.0, 1.05 * rolling), kStays_rad);
+    EXPECT_GT(tilt_after(scene, 0.0, 0.95 * rolling), kGrows_rad);
+    EXPECT_LT(tilt_after(scene, 1.05 * spinning, 0.0), kStays_rad);
+    EXPECT_GT(tilt_after(scene, 0.95 * spinning, 0.0), kGrows_rad);
   }
 }
 

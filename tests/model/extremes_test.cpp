@@ -136,9 +136,11 @@ double rate_error(const Trajectory& run, double disturbance_rad_s) {
 TEST(FreeBodyExtreme, NearTheSeparatrixStaysOnTheExactPath) {
   const Trajectory run = simulate(near_separatrix(1e-4));
   ASSERT_EQ(run.outcome, Outcome::reached_end);
-  EXPECT_LT(run.values.col(12).minCoeff(), -1.99);  // it has flipped
-  // Rounding of 1e-16 in 2T I2 - L^2 = 1e-8 moves the flips by 1e-8 of a growth time.
-  EXPECT_LT(rate_error(run, 1e-4), 1e-6);
+  EXPECT_LT(run.values.col(12).minCoeff(), -1.99);  // of -2 rad/s: it has flipped
+  // Rounding of 1e-16 in 2T I2 - L^2 = 1e-8 moves the flips by 1e-8 of a growth time, each by as
+  // much again.
+  constexpr double kOfSomeFlips = 1e-6;
+  EXPECT_LT(rate_error(run, 1e-4), kOfSomeFlips);
 }
 
 // Disturbed by 1e-9 the difference is 1e-18: no double-precision run can know when the second flip
@@ -148,7 +150,8 @@ TEST(FreeBodyExtreme, AtTheSeparatrixTheRunEndsWhereItIsNoLongerKnown) {
   EXPECT_EQ(run.outcome, Outcome::tolerance_not_reachable);
   EXPECT_LT(run.end_s, 60.0);
   EXPECT_GT(run.end_s, 10.0);
-  EXPECT_LT(rate_error(run, 1e-9), 0.3);
+  constexpr double kWithinAFlip_rad_s = 0.3;  // of 2: the rates are not those of another flip
+  EXPECT_LT(rate_error(run, 1e-9), kWithinAFlip_rad_s);
 }
 
 // Derivatives against central differences of quadruple-precision runs: with h = 1e-9 their own
@@ -223,7 +226,8 @@ TEST(TopExtremes, ASleepingTopStaysAsleepAndItsAnglesAreNumbers) {
     const Trajectory run = simulate(scene);
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_TRUE(run.values.allFinite()) << theta;
-    EXPECT_LT((run.values.col(2).array() - theta).abs().maxCoeff(), 1e-12);
+    constexpr double kRounding = 1e-12;  // of an equilibrium
+    EXPECT_LT((run.values.col(2).array() - theta).abs().maxCoeff(), kRounding);
   }
 }
 

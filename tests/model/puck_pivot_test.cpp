@@ -33,8 +33,8 @@ TEST(FaceFriction, HasItsLimits) {
   constexpr double kRounding = 1e-13;
   EXPECT_NEAR(law(1.0).force, 8.0 / (3.0 * M_PI), kRounding);
   EXPECT_NEAR(law(1.0).couple, 8.0 / (9.0 * M_PI), kRounding);
-  EXPECT_NEAR(law(1.0 + 1e-9).couple, 8.0 / (9.0 * M_PI), 1e-8);
-  EXPECT_NEAR(law(1e-7).force, 1e-7, 1e-20);
+  EXPECT_NEAR(law(1.0 + 1e-9).couple, 8.0 / (9.0 * M_PI), 1e-8);  // its slope is logarithmic there
+  EXPECT_NEAR(law(1e-7).force, 1e-7, 1e-7 * kRounding);
   EXPECT_NEAR(law(1e-7).couple, 2.0 / 3.0, kRounding);
   EXPECT_NEAR(law(1e7).force, 1.0, kRounding);
   EXPECT_NEAR(law(1e7).couple * 4e7, 1.0, kRounding);
@@ -102,6 +102,12 @@ double column(const Trajectory& run, Eigen::Index row, const std::string& name) 
   return NAN;
 }
 
+// At 1e-9 of its first speed a puck counts as at rest: what is left would take less than that [s].
+constexpr double kRest_s = 1e-8;
+constexpr double kPath_m = 1e-11;    // tolerance 1e-12, of some dozen steps
+constexpr double kAngle_rad = 1e-9;  // 1e-12 of spins of some 30 rad/s
+constexpr double kPivot_rad = 1e-8;  // a hundred local errors at the tolerance of 1e-10
+
 // Without spin the deceleration is mu g: s = v0 t - mu g t^2 / 2, rest after v0 / (mu g).
 TEST(Puck, StopsLikeABlockWhenItDoesNotSpin) {
   const data::Scene scene = puck_scene();
@@ -109,13 +115,13 @@ TEST(Puck, StopsLikeABlockWhenItDoesNotSpin) {
   const double a = 0.2 * 9.81, rest_s = 1.0 / a;
   EXPECT_EQ(run.outcome, Outcome::at_rest);
   ASSERT_EQ(run.events.size(), 1u);
-  EXPECT_NEAR(run.events[0].t_s, rest_s, 1e-8);
+  EXPECT_NEAR(run.events[0].t_s, rest_s, kRest_s);
   ASSERT_EQ(run.values.rows(), 101);
   for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
     const double t = std::min(0.01 * static_cast<double>(n), rest_s);
     const double s = t - 0.5 * a * t * t;
-    EXPECT_NEAR(column(run, n, "x_m"), 0.1 + 0.8 * s, 1e-11);
-    EXPECT_NEAR(column(run, n, "y_m"), -0.05 + 0.6 * s, 1e-11);
+    EXPECT_NEAR(column(run, n, "x_m"), 0.1 + 0.8 * s, kPath_m);
+    EXPECT_NEAR(column(run, n, "y_m"), -0.05 + 0.6 * s, kPath_m);
     EXPECT_EQ(column(run, n, "psi_rad"), 0.3);
   }
 }
@@ -133,8 +139,8 @@ TEST(Puck, SpinsDownUniformlyInPlace) {
   scene.start.w3_rad_s = -30.0;
   const Trajectory run = simulate(scene);
   const double a = 0.2 * 9.81 * 4.0 / (3.0 * 0.03), rest_s = 30.0 / a;
-  EXPECT_NEAR(run.events.at(0).t_s, rest_s, 1e-8);
-  EXPECT_NEAR(column(run, 100, "psi_rad"), 0.3 - 450.0 / a, 1e-9);
+  EXPECT_NEAR(run.events.at(0).t_s, rest_s, kRest_s);
+  EXPECT_NEAR(column(run, 100, "psi_rad"), 0.3 - 450.0 / a, kAngle_rad);
   EXPECT_EQ(column(run, 100, "x_m"), 0.1);
 }
 
@@ -147,7 +153,8 @@ TEST(Puck, EndsBothMotionsTogetherAtTheKnownRatio) {
   DormandPrince<Puck<double>> stepper(puck, uniform_control<7>(1e-12));
   stepper.start(0.0, y);
   while (stepper.y()[0] > 1e-8) ASSERT_EQ(stepper.step(1e3), StepEnd::accepted);
-  EXPECT_NEAR(stepper.y()[0] / stepper.y()[2], 0.653, 5e-4);
+  constexpr double kThirdDigit = 5e-4;
+  EXPECT_NEAR(stepper.y()[0] / stepper.y()[2], 0.653, kThirdDigit);
 }
 
 void expect_derivatives(const Predictor& predictor, std::span<const double> t_s,
@@ -238,7 +245,7 @@ TEST(Pivot, FollowsTheClosedFormUntilItStops) {
   };
   for (Eigen::Index n = 0; n < run.values.rows(); ++n)
     EXPECT_NEAR(column(run, n, "psi_rad"), angle(std::min(0.1 * static_cast<double>(n), rest_s)),
-                1e-8);
+                kPivot_rad);
 }
 
 TEST(Pivot, StopsDryInTheParabolasTime) {
@@ -246,8 +253,9 @@ TEST(Pivot, StopsDryInTheParabolasTime) {
   scene.model.spin_down_dry_rad_s2 = 4.0;
   scene.start.w3_rad_s = -40.0;
   const Trajectory run = simulate(scene);
-  EXPECT_NEAR(run.events.at(0).t_s, 10.0, 1e-12);
-  EXPECT_NEAR(column(run, 200, "psi_rad"), -200.0, 1e-9);
+  constexpr double kExact = 1e-12;  // a parabola is exact for the method: rounding is left
+  EXPECT_NEAR(run.events.at(0).t_s, 10.0, kExact);
+  EXPECT_NEAR(column(run, 200, "psi_rad"), -200.0, 1000.0 * kExact);
 }
 
 TEST(Pivot, NeverStopsWithoutDryFriction) {
@@ -255,13 +263,14 @@ TEST(Pivot, NeverStopsWithoutDryFriction) {
   scene.model.spin_down_viscous_1_s = 2.0;
   const Trajectory run = simulate(scene);
   EXPECT_EQ(run.outcome, Outcome::reached_end);
-  EXPECT_NEAR(column(run, 200, "psi_rad"), 20.0, 1e-7);
+  EXPECT_NEAR(column(run, 200, "psi_rad"), 20.0, 10.0 * kPivot_rad);  // as it creeps to its limit
 }
 
 // The pendulum's period for an amplitude A is 4 K(sin(A/2))/omega; a body of known mass tells its
 // energy.
 TEST(Pivot, SwingsLikeAPendulumWithAWeightBesideItsAxis) {
   constexpr double kAmplitude_rad = 2.0, kGs = 9.0;
+  constexpr double kEnergy = 1e-9;  // a hundred local errors of 1e-11
   data::Scene scene = pivot_scene();
   scene.body->mass_kg = 0.1;
   scene.body->thickness_m = 0.01;
@@ -275,8 +284,9 @@ TEST(Pivot, SwingsLikeAPendulumWithAWeightBesideItsAxis) {
   const Trajectory run = simulate(scene);
   EXPECT_EQ(run.outcome, Outcome::reached_end);
   for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
-    EXPECT_NEAR(column(run, n, "psi_rad"), n % 2 == 0 ? kAmplitude_rad : -kAmplitude_rad, 1e-8);
-    EXPECT_NEAR(column(run, n, "energy_J") / column(run, 0, "energy_J"), 1.0, 1e-9);
+    EXPECT_NEAR(column(run, n, "psi_rad"), n % 2 == 0 ? kAmplitude_rad : -kAmplitude_rad,
+                kPivot_rad);
+    EXPECT_NEAR(column(run, n, "energy_J") / column(run, 0, "energy_J"), 1.0, kEnergy);
   }
 }
 
@@ -303,7 +313,8 @@ TEST(Pivot, StopsWhereDryFrictionHoldsTheWeight) {
     }
     at = near;
   }
-  EXPECT_NEAR(column(run, run.values.rows() - 1, "psi_rad"), at, 1e-7);
+  constexpr double kSwings = 10.0;  // each hands its error on to the next
+  EXPECT_NEAR(column(run, run.values.rows() - 1, "psi_rad"), at, kSwings * kPivot_rad);
 }
 
 // dw/dt = -d/(1 + k w): w + k w^2/2 falls linearly in time.
@@ -314,10 +325,12 @@ TEST(Pivot, WeakensWithSpeedAsItsLawSays) {
   scene.model.spin_down_weakening_s_rad = k;
   const Trajectory run = simulate(scene);
   const double whole = w0 + 0.5 * k * w0 * w0;
-  EXPECT_NEAR(run.events.at(0).t_s, whole / kDry, 1e-8);
+  constexpr double kStop_s = 1e-8;  // a hundred local errors, of a stop within ten seconds
+  EXPECT_NEAR(run.events.at(0).t_s, whole / kDry, kStop_s);
   for (const Eigen::Index n : {20, 60, 90}) {
     const double w = column(run, n, "w3_rad_s");
-    EXPECT_NEAR(w + 0.5 * k * w * w, whole - kDry * 0.1 * static_cast<double>(n), 1e-7);
+    const double expected = whole - kDry * 0.1 * static_cast<double>(n);
+    EXPECT_NEAR(w + 0.5 * k * w * w, expected, 10.0 * kPivot_rad);  // rates of up to 80 rad/s
   }
 }
 

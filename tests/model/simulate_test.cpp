@@ -81,7 +81,8 @@ TEST_P(EveryIntegrator, GivesTheSameRun) {
 INSTANTIATE_TEST_SUITE_P(Simulate, EveryIntegrator,
                          testing::Values("taylor", "dop853", "cvode-adams", "cvode-bdf", "arkode"));
 
-// The estimate is what people will believe: it must not promise more than the run keeps.
+// The estimate is what people will believe: it must not promise more than the run keeps, nor be
+// far from it.
 TEST(Simulate, ErrorEstimateCoversTheTrueError) {
   for (const double tolerance : {1e-5, 1e-7, 1e-9}) {
     Reference expected = reference("s03_top_thesis_base");
@@ -97,8 +98,11 @@ TEST(Simulate, TheThesisFormGivesTheSameMotion) {
   Reference expected = reference("s04_top_loops");
   expected.posed.scene.model.name = "top-euler";
   const Trajectory run = rerun(expected, 1e-12);
-  EXPECT_LT(largest_difference(run, "x_m", expected, "x"), 1e-10);
-  EXPECT_LT(largest_difference(run, "psi_rad", expected, "psi"), 1e-8);
+  // A hundred local errors of 1e-12; near the pole, where Euler angles are singular, psi turns
+  // fast.
+  constexpr double kPath_m = 1e-10, kSpin_rad = 1e-8;
+  EXPECT_LT(largest_difference(run, "x_m", expected, "x"), kPath_m);
+  EXPECT_LT(largest_difference(run, "psi_rad", expected, "psi"), kSpin_rad);
 }
 
 TEST(Simulate, NamesWhatTheSceneLacks) {

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kRounding = 1e-12;  // relative, of a closed form of a few operations
+constexpr double kRounding = 1e-12;   // relative, of a closed form of a few operations
+constexpr double kCancelled = 1e-10;  // of one whose terms cancel to some digits
 
 data::Body disc(double thickness_m) {
   data::Body body;
@@ -34,8 +35,10 @@ data::Body hoop() {
   return body;
 }
 
-// Aluminium disc of 5 mm; frequencies from an independent simulation of small nutations, 6 digits.
+// Aluminium disc of 5 mm; frequencies from an independent simulation of nutations that were small,
+// not infinitesimal.
 TEST(SteadyRolling, NutatesAtTheFrequenciesOfSimulatedSmallNutations) {
+  constexpr double kOfThatSize = 5e-4;
   struct Case {
     double tilt_deg, precession, nu;
   };
@@ -43,7 +46,7 @@ TEST(SteadyRolling, NutatesAtTheFrequenciesOfSimulatedSmallNutations) {
        {Case{70.0, 26.0, 21.7303}, Case{40.0, 25.0, 24.3358}, Case{20.0, 35.0, 37.4834}}) {
     const SteadyMotion motion =
         steady_rolling(disc(0.005), kGravity, tilt_deg * kDegree, precession);
-    EXPECT_NEAR(std::sqrt(motion.nutation2_1_s2), nu, 5e-4) << tilt_deg;
+    EXPECT_NEAR(std::sqrt(motion.nutation2_1_s2), nu, kOfThatSize) << tilt_deg;
   }
 }
 
@@ -59,14 +62,13 @@ TEST(SteadyRolling, OfAThinBodyHasTheClosedFormFrequency) {
         24.0 * 24.0 / (A + mR2) *
         (3 * A * c * c + mR2 * s * s + k3 * ((C + mR2) * s * s / c - (3 * C + mR2) * c) +
          k3 * k3 * C * (C + mR2) / A);
-    EXPECT_NEAR(motion.nutation2_1_s2 / expected, 1.0, 1e-10);
+    EXPECT_NEAR(motion.nutation2_1_s2 / expected, 1.0, kCancelled);
   }
 }
 
 // Equation (1) read two ways: the spin at a precession, and the precessions at the speed that this
 // spin gives. The quadratic's roots cancel to some digits.
 TEST(SteadyRolling, PrecessesAtOneOfTheRatesThatItsSpeedAsksFor) {
-  constexpr double kCancelled = 1e-10;
   const RimBody body{.m = 0.06, .A = 2.1e-5, .C = 4.2e-5, .R = 0.0375, .h = 0.0025};
   for (const double theta : {0.3, 0.8, 1.3})
     for (const double W : {-30.0, 12.0, 25.0}) {
@@ -86,18 +88,18 @@ TEST(SteadyRolling, WithTheCentreAtRestIsTheEulerDisc) {
   const double expected = std::sqrt(4.0 * kGravity / (0.0375 * std::sin(theta)));
   EXPECT_NEAR(motion->precession_rad_s / expected, 1.0, kRounding);
   EXPECT_NEAR(motion->w3_rad_s, 0.0, kRounding * expected);
-  EXPECT_NEAR(motion->friction_demand, 0.0, 1e-12);
+  EXPECT_NEAR(motion->friction_demand, 0.0, kRounding);
 }
 
 TEST(SteadyRolling, OnACircleIsTheMotionOfThatPrecessionAndDemandsTheCentripetalForce) {
   const auto circle = steady_rolling_on_circle(disc(0.005), kGravity, 1.0, 0.08);
   ASSERT_TRUE(circle);
-  EXPECT_NEAR(circle->circle_radius_m, 0.08, 1e-12);
+  EXPECT_NEAR(circle->circle_radius_m, 0.08, kRounding);
   const double W = circle->precession_rad_s;
-  EXPECT_NEAR(circle->friction_demand, 0.08 * W * W / kGravity, 1e-10);
-  EXPECT_NEAR(circle->normal_force_N, 0.05964117303299373 * kGravity, 1e-12);
+  EXPECT_NEAR(circle->friction_demand, 0.08 * W * W / kGravity, kCancelled);
+  EXPECT_NEAR(circle->normal_force_N, 0.05964117303299373 * kGravity, kRounding);
   const SteadyMotion same = steady_rolling(disc(0.005), kGravity, 1.0, W);
-  EXPECT_NEAR(same.w3_rad_s / circle->w3_rad_s, 1.0, 1e-10);
+  EXPECT_NEAR(same.w3_rad_s / circle->w3_rad_s, 1.0, kCancelled);
 }
 
 TEST(SteadyMotion, OnASmoothFloorBalancesGravityByGyroscopicCouples) {

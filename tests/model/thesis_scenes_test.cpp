@@ -31,7 +31,8 @@ TEST(ThesisScenes, AllRunToTheirEnd) {
     const Trajectory run = simulate(data::read_scene(file.path()));
     EXPECT_EQ(run.outcome, Outcome::reached_end) << file.path();
     EXPECT_TRUE(run.values.allFinite()) << file.path();
-    EXPECT_LT(run.error_estimate_rad, 1e-7) << file.path();
+    constexpr double kAddedUp_rad = 1e-7;  // tolerance 1e-10 of the scenes, a thousand steps
+    EXPECT_LT(run.error_estimate_rad, kAddedUp_rad) << file.path();
   }
   EXPECT_GE(scenes, 20);
 }
@@ -66,8 +67,10 @@ TEST_P(ThesisTable, AgreesWithTheClosedForm) {
   const auto lows = minima(run);
   ASSERT_GE(lows.size(), 2u);
   const double periods = static_cast<double>(lows.size());
-  EXPECT_NEAR(lows.back().first / periods, GetParam().period_s, 1e-4);
-  EXPECT_NEAR(lows.back().second / periods, GetParam().dphi_per_period, 1e-3);
+  constexpr double kMinimum_s = 1e-4, kFastest_rad_s = 10.0;  // minima(); of the precession there
+  EXPECT_NEAR(lows.back().first / periods, GetParam().period_s, kMinimum_s);
+  EXPECT_NEAR(lows.back().second / periods, GetParam().dphi_per_period,
+              kMinimum_s * kFastest_rad_s);
 }
 INSTANTIATE_TEST_SUITE_P(Top, ThesisTable,
                          testing::Values(Row{"thesis-base", 80.7620172969, 9.21003754080,
@@ -122,8 +125,9 @@ TEST(ThesisScenes, FreeBodyKeepsEnergyAndMomentum) {
 
 TEST(ThesisScenes, EqualMomentsLeaveTheRatesConstant) {
   const Trajectory run = run_scene("thesis-free-case1");
+  constexpr double kRounding = 1e-14;  // their slopes vanish
   for (const char* name : {"wx_rad_s", "wy_rad_s", "wz_rad_s"})
-    EXPECT_LT((column(run, name).array() - 1.0).abs().maxCoeff(), 1e-14) << name;
+    EXPECT_LT((column(run, name).array() - 1.0).abs().maxCoeff(), kRounding) << name;
 }
 
 }  // namespace

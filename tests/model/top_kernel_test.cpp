@@ -76,6 +76,7 @@ TEST(TopKernel, EveryInstructionSetGivesTheSameNumbers) {
 }
 
 TEST(TopKernel, SeriesAndRungeKuttaAgree) {
+  constexpr double kAllowed = 1e-8;  // local errors of two methods over some hundred steps
   for (unsigned seed = 1; seed <= 20; ++seed) {
     std::mt19937_64 random(seed);
     TopRun run = random_top(random, seed % 2 == 0);
@@ -85,7 +86,7 @@ TEST(TopKernel, SeriesAndRungeKuttaAgree) {
     run_top_dop853(run, runge_kutta);
     ASSERT_EQ(series.end_reason, static_cast<int>(RunEnd::reached_end));
     for (int i = 0; i < kTopEndValues; ++i) {
-      EXPECT_NEAR(series.end[i], runge_kutta.end[i], 1e-8 * (1.0 + std::abs(series.end[i])))
+      EXPECT_NEAR(series.end[i], runge_kutta.end[i], kAllowed * (1.0 + std::abs(series.end[i])))
           << "seed " << seed << " value " << i;
     }
   }

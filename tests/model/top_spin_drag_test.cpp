@@ -75,6 +75,7 @@ Eigen::VectorXd defaults(const Predictor& predictor) {
 
 // scipy's DOP853 at 1e-12, in body axes with a quaternion; dry friction stops the one spin halfway.
 TEST(TopSpinDrag, FollowsThePathsOfAnotherProgram) {
+  constexpr double kOthers_m = 1e-10;  // its steps' errors together
   for (const OtherTop& top : {kDry, kQuadratic}) {
     const data::Table path = path_of(top);
     const Eigen::VectorXd t_s = path.column("t_s"), x = path.column("x_m"), y = path.column("y_m");
@@ -84,14 +85,16 @@ TEST(TopSpinDrag, FollowsThePathsOfAnotherProgram) {
     request.tolerance = 1e-13;
     const Prediction run = predictor->predict(defaults(*predictor), request);
     for (Eigen::Index n = 0; n < t_s.size(); ++n) {
-      EXPECT_NEAR(run.values[2 * n], x[n], 1e-10) << top.name << " at " << t_s[n];
-      EXPECT_NEAR(run.values[2 * n + 1], y[n], 1e-10) << top.name << " at " << t_s[n];
+      EXPECT_NEAR(run.values[2 * n], x[n], kOthers_m) << top.name << " at " << t_s[n];
+      EXPECT_NEAR(run.values[2 * n + 1], y[n], kOthers_m) << top.name << " at " << t_s[n];
     }
   }
 }
 
 // The spin is dpsi + dphi cos(theta); psi is the integral of dpsi, here by Simpson's rule.
 TEST(TopSpinDrag, TurnsAsFastAsInAnotherProgramAndByTheIntegralOfThat) {
+  constexpr double kSpin_rad_s = 1e-7;  // tolerance 1e-10, of a thousand steps
+  constexpr double kSimpson = 1e-4;     // its rule, with four steps from row to row
   for (const OtherTop& top : {kDry, kQuadratic}) {
     const data::Table path = path_of(top);
     const Eigen::VectorXd t_s = path.column("t_s"), spin = path.column("spin_rad_s");
@@ -107,12 +110,12 @@ TEST(TopSpinDrag, TurnsAsFastAsInAnotherProgramAndByTheIntegralOfThat) {
       for (Eigen::Index n = 0; n + 1 < t_s.size(); ++n) {
         const Eigen::Index row = 4 * n;
         const double here = run.values(row, 6) + run.values(row, 4) * std::cos(run.values(row, 2));
-        EXPECT_NEAR(here, spin[n], 1e-7) << top.name << " at " << t_s[n];
+        EXPECT_NEAR(here, spin[n], kSpin_rad_s) << top.name << " at " << t_s[n];
         const double step_s = t_s[n + 1] - t_s[n];
         turned_rad += step_s / 12.0 *
                       (rate(row) + 4.0 * rate(row + 1) + 2.0 * rate(row + 2) + 4.0 * rate(row + 3) +
                        rate(row + 4));
-        EXPECT_NEAR(run.values(row + 4, 3), turned_rad, 1e-4 * (1.0 + turned_rad)) << top.name;
+        EXPECT_NEAR(run.values(row + 4, 3), turned_rad, kSimpson * (1.0 + turned_rad)) << top.name;
       }
     }
   }
@@ -141,8 +144,9 @@ TEST(TopSpinDrag, DerivativesMatchDifferences) {
     request.t_s = t_s;
     request.observables = {Observable::x_m, Observable::y_m, Observable::theta_rad,
                            Observable::phi_rad, Observable::psi_rad};
+    constexpr double kDifferences = 2e-5;  // of steps of 1e-5
     for (const DerivativeColumn& column : derivative_columns(*predictor, at, request, 1e-5))
-      EXPECT_LT(column.error(), 2e-5 * (1.0 + column.size())) << column.parameter;
+      EXPECT_LT(column.error(), kDifferences * (1.0 + column.size())) << column.parameter;
   }
 }
 
@@ -163,7 +167,9 @@ TEST(TopSpinDrag, ASpinLastsAsLongAsItsLossesAllow) {
       sum += weight / (d.dry + (d.gamma3 + d.quadratic * b) * b);
     }
     const double lasts_s = sum * kSpin / (3.0 * kSteps);
-    EXPECT_NEAR(spin_lasts_s(-kSpin, d.dry, d.gamma3, d.quadratic), lasts_s, 1e-9 * lasts_s);
+    constexpr double kRule =
+        1e-9;  // h^4 of its steps and rounding of their sum, 1e-12, with a margin
+    EXPECT_NEAR(spin_lasts_s(-kSpin, d.dry, d.gamma3, d.quadratic), lasts_s, kRule * lasts_s);
   }
   EXPECT_EQ(spin_lasts_s(kSpin, 0.0, 0.1, 0.1), INFINITY);
   EXPECT_EQ(spin_lasts_s(0.0, 1.0, 0.1, 0.1), 0.0);
@@ -187,7 +193,8 @@ TEST(TopSpinDrag, HoldsASpinThatIsUsedUpAtOnce) {
   for (const double b_1_s : {1e-17, -1e-17}) {
     values[spin] = b_1_s;
     const Eigen::VectorXd little = predictor->predict(values, request).values;
-    EXPECT_LT((little - none).cwiseAbs().maxCoeff(), 1e-10) << b_1_s;
+    constexpr double kSamePath_m = 1e-10;  // tolerance 1e-12, of a hundred steps
+    EXPECT_LT((little - none).cwiseAbs().maxCoeff(), kSamePath_m) << b_1_s;
   }
 }
 
