@@ -233,15 +233,19 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
 
 /// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
 /// has its own doubts.
-enum class Word { last, one_of_several };
+enum class Purpose { answer, candidate };
 
 // A fit of one model: its path is found at once; what is said of it, in particular its error bars,
 // may wait until it is known which of several models is meant.
 class OneFit {
  public:
   OneFit(std::span<const data::Track> tracks, const model::Predictor& plain,
-         const data::Scene& given_scene, const FitOptions& options, Word word)
-      : tracks_(tracks), scene_(given_scene), options_(options), stages_(options_), word_(word) {
+         const data::Scene& given_scene, const FitOptions& options, Purpose purpose)
+      : tracks_(tracks),
+        scene_(given_scene),
+        options_(options),
+        stages_(options_),
+        purpose_(purpose) {
     if (tracks.empty()) throw TrackError("no track to fit");
     scene_.fit.free_pivot = scene_.fit.free_pivot || options.free_pivot;
     wrapped_ = observed(plain, scene_, frame_time_s(tracks));
@@ -269,7 +273,7 @@ class OneFit {
   data::Scene scene_;
   FitOptions options_;
   Stages stages_;
-  Word word_;
+  Purpose purpose_;
   std::unique_ptr<model::Predictor> wrapped_;
   Problem problem_;
   Solution solution_;
@@ -347,7 +351,7 @@ data::Fit OneFit::described(Bars bars) {
   judge(problem_, solution_, error, cut_short_, fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);
-  if (word_ == Word::last) doubt_as_a_whole(problem_, solution_.u, error, fit);
+  if (purpose_ == Purpose::answer) doubt_as_a_whole(problem_, solution_.u, error, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;
     fit.outcome = data::FitOutcome::unexplained;
@@ -372,10 +376,10 @@ void check_given_start(const FitOptions& options, const model::Predictor& predic
 class CompletedFit {
  public:
   CompletedFit(std::span<const data::Track> tracks, const data::Scene& scene,
-               const FitOptions& options, Word word)
+               const FitOptions& options, Purpose purpose)
       : scene_(scene),
         predictor_(model::make_predictor(scene_)),
-        one_(tracks, *predictor_, scene_, options, word) {}
+        one_(tracks, *predictor_, scene_, options, purpose) {}
 
   void find(FirstPart* first_part = nullptr) {
     const auto relatives = relatives_of(scene_);
@@ -405,7 +409,7 @@ class CompletedFit {
 data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
               const data::Scene& scene, const FitOptions& options) {
   check_given_start(options, predictor, scene);
-  OneFit one(tracks, predictor, scene, options, Word::last);
+  OneFit one(tracks, predictor, scene, options, Purpose::answer);
   one.find({}, nullptr);
   return one.described(Bars::full);
 }
@@ -414,14 +418,14 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
               const FitOptions& options) {
   const data::Scene scene = completed(given, options);
   check_given_start(options, *model::make_predictor(scene), scene);
-  CompletedFit one(tracks, scene, options, Word::last);
+  CompletedFit one(tracks, scene, options, Purpose::answer);
   one.find();
   return one.described(Bars::full);
 }
 
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
                              const FitOptions& options, Bars bars, const Settled& near) {
-  CompletedFit one(tracks, completed(given, options), options, Word::one_of_several);
+  CompletedFit one(tracks, completed(given, options), options, Purpose::candidate);
   one.start_as(near);
   one.find();
   return one.described(bars);
@@ -430,7 +434,7 @@ data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Sc
 Draft draft_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
                            const FitOptions& options, FirstPart* first_part, const Settled& near) {
   const auto one = std::make_shared<CompletedFit>(tracks, completed(given, options), options,
-                                                  Word::one_of_several);
+                                                  Purpose::candidate);
   one->start_as(near);
   one->find(first_part);
   const auto full = std::make_shared<std::optional<data::Fit>>();
