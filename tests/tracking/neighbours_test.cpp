@@ -2,6 +2,7 @@
 
 #include "geometry/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
+#include "link/one_side.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -10,19 +10,13 @@
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
 #include "geometry/pose_motion.hpp"
-#include "link/attitude_sequence.hpp"
-#include "link/chroma_site.hpp"
-#include "link/lying.hpp"
-#include "link/neighbours.hpp"
+#include "link/linking.hpp"
 #include "link/path_motion.hpp"
-#include "link/path_outliers.hpp"
-#include "link/readings.hpp"
-#include "link/shadows.hpp"
 #include "link/track_assembly.hpp"
+#include "link/track_notes.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/parallel.hpp"
-#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -334,8 +328,8 @@ class Tracking {
     return {std::move(path), std::move(ahead)};
   }
 
-  /// What consecutive frames say together: attitudes, and frames their neighbours can help.
-  /// @param settled so many at the front have been looked at with all their neighbours.
+  /// What consecutive frames say together.
+  /// @param settled see Linking.
   void decide(BodyPath& path, const std::vector<Frame>& frames, std::size_t settled,
               Follower& ahead) const {
     std::vector<Glimpse> glimpses;
@@ -344,35 +338,9 @@ class Tracking {
       if (const auto at = path.frames.find(frame.index); at != path.frames.end())
         glimpses.back().seen = std::move(at->second.seen);
     }
-    forget_what_the_path_jumps_to(glimpses);
-    forget_what_is_faint_beside_gaps(glimpses);
     // Where there are other bodies, what is dark beside one need not be its shadow.
-    if (objects_ == 1)
-      if (const auto lamp = find_lamp(background_, *finder_, glimpses)) path.lamp = lamp;
-    // Only what is measured again is measured with it.
-    if (!path.chroma_site_px && options_.effort != Effort::quick)
-      path.chroma_site_px = find_chroma_site(background_, *finder_, glimpses);
-    const Background lit = background_.lit_by(path.lamp).sited_at(
-        path.chroma_site_px.value_or(Eigen::Vector2d::Zero()));
-    look_at_shadows(lit, *finder_, glimpses);
-    const auto doubts = decide_attitudes(lit, *finder_, glimpses);
-    mend_from_neighbours(lit, *finder_, glimpses);
-    mend_from_one_side(lit, *finder_, glimpses);
-    const ReadingDoubt reading = choose_readings(lit, *finder_, glimpses);
-    if (reading.otherwise) mend_from_neighbours(lit, *finder_, glimpses);
-    if (options_.effort != Effort::quick) {
-      measure_again(lit, *finder_, settled, glimpses);
-      mend_from_neighbours(lit, *finder_, glimpses, true);
-    }
-    doubt_attitudes(doubts, glimpses);
-    measure_what_lies(lit, *finder_, glimpses);
-    doubt_what_is_contradicted(*finder_, glimpses);
-    doubt_what_leaves_the_path(glimpses);
-    doubt_what_stands_alone(glimpses);
-    forget_what_tells_nothing(glimpses);
-    place_other_readings(*finder_, settled, glimpses);
-    for (std::size_t which = 0; which < path.readings.size(); ++which)
-      path.readings[which].add(reading.tallies[which]);
+    const Linking link{background_, *finder_, objects_ == 1, options_.effort};
+    link(settled, path, glimpses);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
@@ -439,38 +407,6 @@ class Tracking {
     return rule;
   }
 
-  /// A transfer curve other than the camera's puts all edges to one side, and so do other causes.
-  [[nodiscard]] std::vector<std::string> doubts_about_edges() const {
-    constexpr double kNoticeable_px = 0.15;
-    std::vector<double> polarities_px;
-    for (const BodyPath& path : paths_)
-      for (const auto& [index, at] : path.frames)
-        if (at.seen.pose) polarities_px.push_back(at.seen.pose->polarity_px);
-    if (polarities_px.empty()) return {};
-    const double usual_px = data::median(std::move(polarities_px));
-    if (std::abs(usual_px) < kNoticeable_px) return {};
-    const bool linear = camera_->transfer == data::Transfer::linear;
-    return {fmt::format(
-        "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another "
-        "radius or a camera with transfer = \"{}\" does that",
-        std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear")};
-  }
-
-  /// Of an outline of a few pixels any tilt looks much like another.
-  [[nodiscard]] std::optional<std::string> doubt_about_tilt(const BodyPath& path,
-                                                            const data::Track& track) const {
-    constexpr double kFew_px = 6.0;
-    const bool tilted = std::any_of(track.samples.begin(), track.samples.end(),
-                                    [](const auto& sample) { return sample.theta.has_value(); });
-    const double radius_px = usual_radius_px(path);
-    if (!tilted || radius_px >= kFew_px) return std::nullopt;
-    return fmt::format(
-        "{} only {:.1f} px in radius: too few for its tilt and precession to mean anything; film "
-        "it "
-        "larger, 30 px at least",
-        paths_.size() > 1 ? fmt::format("object {} is", track.object) : "the body is", radius_px);
-  }
-
   /// In most of the frames that tell.
   [[nodiscard]] bool stays_on_a_pin(const BodyPath& path) const {
     int on = 0, off = 0;
@@ -505,67 +441,18 @@ class Tracking {
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
-    result.file.notes = doubts_about_edges();
-    for (std::size_t k = 0; k < paths_.size(); ++k)
-      if (auto doubt = doubt_about_tilt(paths_[k], result.file.tracks[k]))
-        result.file.notes.push_back(std::move(*doubt));
-    if (const std::int64_t missing = recording_.info().missing; missing > 0)
-      result.file.notes.push_back(fmt::format(
-          "by their numbers {} of {} pictures are missing; the others keep the times of "
-          "theirs",
-          missing, recording_.info().frames + missing));
-    else if (missing_ > 0)
-      result.file.notes.push_back(fmt::format(
-          "by their time stamps {} of {} pictures are missing; the others keep their times",
-          missing_, frames_ + missing_));
-    if (const auto& others = recording_.info().left_out; !others.empty())
-      result.file.notes.push_back(fmt::format(
-          "{} picture{} of the folder, named unlike the others, {} left out: {}{}", others.size(),
-          others.size() == 1 ? "" : "s", others.size() == 1 ? "is" : "are",
-          others.front().filename().string(), others.size() == 1 ? "" : ", ..."));
-    constexpr std::int64_t kChance = 2;
-    if (const std::int64_t repeated = recording_.repeated(); repeated > kChance)
-      result.file.notes.push_back(fmt::format(
-          "{} of {} pictures repeat the one before: unless the body was out of sight in them, "
-          "their "
-          "time stamps are wrong; was the clip converted from another rate, or did the camera "
-          "stutter?",
-          repeated, frames_));
-    if (recording_.info().evened)
-      result.file.notes.push_back(
-          "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "
-          "without it they keep their own times");
-    if (exposure_fraction() > 1.0)
-      result.file.notes.push_back(fmt::format(
-          "exposure_s is {:.3g} times the time from picture to picture; is it in seconds?",
-          exposure_fraction()));
-    if (recording_.info().interlaced)
-      result.file.notes.push_back(
-          "the video is interlaced: every picture is two half ones of different times; "
-          "deinterlace it first");
+    result.file.notes =
+        notes_about_measurement(paths_, result.file.tracks, camera_ ? &*camera_ : nullptr);
+    const WhatWasRead read{.frames = frames_,
+                           .missing = missing_,
+                           .repeated = recording_.repeated(),
+                           .exposure_fraction = exposure_fraction()};
+    for (std::string& note : notes_about_recording(recording_.info(), read))
+      result.file.notes.push_back(std::move(note));
     result.file.camera = words;
     result.summary.camera_words = words;
-    if (options_.edges) write_edges(*options_.edges);
+    if (options_.edges) data::write_table(edge_table(paths_), *options_.edges);
     return result;
-  }
-
-  void write_edges(const fs::path& target) const {
-    data::Table table;
-    table.header = {{"edges", "accepted edge points per frame"}};
-    table.columns = {"frame",    "object",   "x_px",     "y_px",
-                     "normal_x", "normal_y", "sigma_px", "residual_px"};
-    std::vector<double> cells;
-    for (std::size_t k = 0; k < paths_.size(); ++k)
-      for (const auto& [index, at] : paths_[k].frames)
-        for (const EdgePoint& e : at.seen.edges)
-          cells.insert(cells.end(), {static_cast<double>(index), static_cast<double>(k),
-                                     e.image_px.x(), e.image_px.y(), e.normal_px.x(),
-                                     e.normal_px.y(), e.sigma_px, e.residual_px});
-    const auto columns = static_cast<Eigen::Index>(table.columns.size());
-    const auto rows = static_cast<Eigen::Index>(cells.size()) / columns;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    table.values = Eigen::Map<const RowMajor>(cells.data(), rows, columns);
-    data::write_table(table, target);
   }
 
   fs::path video_;

@@ -1,0 +1,82 @@
+#include "link/second_look.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "find/forecast.hpp"
+#include "geometry/pose_motion.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Pose = data::Pose<>;
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+/// Where a body would have been one frame before `pose`, moving as between its neighbours.
+Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
+  Pose earlier = pose;
+  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, kTurn);
+  const double turned = std::remainder(pose.phi_rad - before.phi_rad, kTurn) +
+                        std::remainder(after.phi_rad - pose.phi_rad, kTurn);
+  // More than half a turn in two frames.
+  earlier.phi_rad -= std::abs(turned) > 0.5 * kTurn ? 0.5 * turned : turn;
+  earlier.theta_rad -= 0.5 * (after.theta_rad - before.theta_rad);
+  earlier.centre_m -= 0.5 * (after.centre_m - before.centre_m);
+  return earlier;
+}
+
+/// As far beyond `to` as that is from `from`.
+Pose beyond(const Pose& from, const Pose& to) {
+  Pose pose = to;
+  pose.phi_rad += std::remainder(to.phi_rad - from.phi_rad, kTurn);
+  pose.theta_rad += to.theta_rad - from.theta_rad;
+  pose.centre_m += to.centre_m - from.centre_m;
+  return pose;
+}
+
+/// Where the body of frame i would have been one frame before it; nothing if it is not seen on
+/// either side.
+std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::size_t i,
+                                     bool alike) {
+  const Pose& pose = glimpses[i].pose();
+  const auto at = [&](std::size_t k) -> std::optional<Pose> {
+    if (k >= glimpses.size() || !glimpses[k].posed()) return std::nullopt;
+    return alike ? nearer_face(glimpses[k].pose(), pose, 0.0) : glimpses[k].pose();
+  };
+  const std::optional<Pose> before = at(i - 1), after = at(i + 1);
+  if (!before && !after) return std::nullopt;
+  return one_frame_before(before ? *before : beyond(*after, pose), pose,
+                          after ? *after : beyond(*before, pose));
+}
+
+}  // namespace
+
+void measure_again(const Background& background, const BodyFinder& finder, std::size_t settled,
+                   std::vector<Glimpse>& glimpses) {
+  constexpr double kAsGood = 0.8;  // the first look had half the places and scatters
+  constexpr double kNear = 0.25;
+  const bool alike = finder.faces_look_alike();
+  const std::vector<Glimpse> was = glimpses;
+  on_all_cores(background, finder, glimpses.size(), [&](Measuring& measure, std::size_t i) {
+    if (i < settled || !was[i].posed() || was[i].seen->attitude_doubtful) return;
+    const std::optional<Pose> before = one_frame_before(was, i, alike);
+    if (!before) return;
+    const Sighting& seen = *was[i].seen;
+    const Surroundings surroundings = surroundings_of(was, i);
+    Sighting guess = seen;
+    guess.pose->blur_px = surroundings.blur_px;
+    auto again = measure(*was[i].frame, std::move(guess), before, &surroundings.shading);
+    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
+    const double off =
+        std::max(between_axes(axis_of(again->pose->pose), axis_of(seen.pose->pose), alike),
+                 (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());
+    if (off > kNear) return;
+    again->turned_rad = seen.turned_rad;
+    glimpses[i].seen = std::move(again);
+  });
+}
+
+}  // namespace trochoid::tracking

@@ -1,0 +1,137 @@
+#include "link/track_notes.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+using Note = std::optional<std::string>;
+
+Note note_on_missing(const VideoInfo& video, const WhatWasRead& read) {
+  if (video.missing > 0)
+    return fmt::format(
+        "by their numbers {} of {} pictures are missing; the others keep the times of theirs",
+        video.missing, video.frames + video.missing);
+  if (read.missing > 0)
+    return fmt::format(
+        "by their time stamps {} of {} pictures are missing; the others keep their times",
+        read.missing, read.frames + read.missing);
+  return std::nullopt;
+}
+
+Note note_on_left_out(const VideoInfo& video) {
+  const auto& others = video.left_out;
+  if (others.empty()) return std::nullopt;
+  const bool one = others.size() == 1;
+  return fmt::format("{} picture{} of the folder, named unlike the others, {} left out: {}{}",
+                     others.size(), one ? "" : "s", one ? "is" : "are",
+                     others.front().filename().string(), one ? "" : ", ...");
+}
+
+Note note_on_repeated(const WhatWasRead& read) {
+  constexpr std::int64_t kChance = 2;
+  if (read.repeated <= kChance) return std::nullopt;
+  return fmt::format(
+      "{} of {} pictures repeat the one before: unless the body was out of sight in them, their "
+      "time stamps are wrong; was the clip converted from another rate, or did the camera "
+      "stutter?",
+      read.repeated, read.frames);
+}
+
+Note note_on_evened(const VideoInfo& video) {
+  if (!video.evened) return std::nullopt;
+  return "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "
+         "without it they keep their own times";
+}
+
+Note note_on_exposure(const WhatWasRead& read) {
+  if (read.exposure_fraction <= 1.0) return std::nullopt;
+  return fmt::format(
+      "exposure_s is {:.3g} times the time from picture to picture; is it in seconds?",
+      read.exposure_fraction);
+}
+
+Note note_on_interlaced(const VideoInfo& video) {
+  if (!video.interlaced) return std::nullopt;
+  return "the video is interlaced: every picture is two half ones of different times; "
+         "deinterlace it first";
+}
+
+/// A transfer curve other than the camera's puts all edges to one side, and so do other causes.
+Note note_on_edges(const std::vector<BodyPath>& paths, const data::Camera* camera) {
+  constexpr double kNoticeable_px = 0.15;
+  std::vector<double> polarities_px;
+  for (const BodyPath& path : paths)
+    for (const auto& [index, at] : path.frames)
+      if (at.seen.pose) polarities_px.push_back(at.seen.pose->polarity_px);
+  if (polarities_px.empty() || camera == nullptr) return std::nullopt;
+  const double usual_px = data::median(std::move(polarities_px));
+  if (std::abs(usual_px) < kNoticeable_px) return std::nullopt;
+  const bool linear = camera->transfer == data::Transfer::linear;
+  return fmt::format(
+      "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another radius or a "
+      "camera with transfer = \"{}\" does that",
+      std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
+}
+
+/// Of an outline of a few pixels any tilt looks much like another.
+Note note_on_tilt(const BodyPath& path, const data::Track& track, bool several) {
+  constexpr double kFew_px = 6.0;
+  const bool tilted = std::any_of(track.samples.begin(), track.samples.end(),
+                                  [](const auto& sample) { return sample.theta.has_value(); });
+  const double radius_px = usual_radius_px(path);
+  if (!tilted || radius_px >= kFew_px) return std::nullopt;
+  return fmt::format(
+      "{} only {:.1f} px in radius: too few for its tilt and precession to mean anything; film it "
+      "larger, 30 px at least",
+      several ? fmt::format("object {} is", track.object) : "the body is", radius_px);
+}
+
+std::vector<std::string> given(std::initializer_list<Note> notes) {
+  std::vector<std::string> out;
+  for (const Note& note : notes)
+    if (note) out.push_back(*note);
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
+  return given({note_on_missing(video, read), note_on_left_out(video), note_on_repeated(read),
+                note_on_evened(video), note_on_exposure(read), note_on_interlaced(video)});
+}
+
+std::vector<std::string> notes_about_measurement(const std::vector<BodyPath>& paths,
+                                                 const std::vector<data::Track>& tracks,
+                                                 const data::Camera* camera) {
+  std::vector<std::string> notes = given({note_on_edges(paths, camera)});
+  for (std::size_t k = 0; k < paths.size(); ++k)
+    if (auto note = note_on_tilt(paths[k], tracks[k], paths.size() > 1))
+      notes.push_back(std::move(*note));
+  return notes;
+}
+
+data::Table edge_table(const std::vector<BodyPath>& paths) {
+  data::Table table;
+  table.header = {{"edges", "accepted edge points per frame"}};
+  table.columns = {"frame",    "object",   "x_px",     "y_px",
+                   "normal_x", "normal_y", "sigma_px", "residual_px"};
+  std::vector<double> cells;
+  for (std::size_t k = 0; k < paths.size(); ++k)
+    for (const auto& [index, at] : paths[k].frames)
+      for (const EdgePoint& e : at.seen.edges)
+        cells.insert(cells.end(),
+                     {static_cast<double>(index), static_cast<double>(k), e.image_px.x(),
+                      e.image_px.y(), e.normal_px.x(), e.normal_px.y(), e.sigma_px, e.residual_px});
+  table.set_rows(cells);
+  return table;
+}
+
+}  // namespace trochoid::tracking
