@@ -91,14 +91,16 @@ Camera Camera::overhead(int width_px, int height_px, double scale_px_per_m, doub
 void Camera::check_size(int recorded_width_px, int recorded_height_px,
                         const std::string& recording) const {
   if (width_px == 0 || (width_px == recorded_width_px && height_px == recorded_height_px)) return;
-  const double scale = static_cast<double>(recorded_width_px) / width_px;
-  const auto centre = [scale](double c) { return scale * (c + 0.5) - 0.5; };
+  const double x_scale = static_cast<double>(recorded_width_px) / width_px;
+  const double y_scale = static_cast<double>(recorded_height_px) / height_px;
+  const auto centre = [](double scale, double c) { return scale * (c + 0.5) - 0.5; };
   std::string words = "calibrate the camera at this size";
-  if (std::abs(scale * height_px - recorded_height_px) <= 1.0)
+  if (std::abs(x_scale * height_px - recorded_height_px) <= 1.0)
     words += fmt::format(
         ", or if it is the same view scaled, nothing cut off, write a camera file with width {}, "
-        "height {}, fx {:.7g}, fy {:.7g}, cx {:.7g}, cy {:.7g}",
-        recorded_width_px, recorded_height_px, scale * fx, scale * fy, centre(cx), centre(cy));
+        "height {}, fx {:.7g}, fy {:.7g}, cx {:.7g}, cy {:.7g}, all else as it is",
+        recorded_width_px, recorded_height_px, x_scale * fx, y_scale * fy, centre(x_scale, cx),
+        centre(y_scale, cy));
   throw InputError(fmt::format("{} is for {} x {} pictures, {} has {} x {}; {}",
                                file.empty() ? "the camera" : file + ": the camera", width_px,
                                height_px, recording, recorded_width_px, recorded_height_px, words));

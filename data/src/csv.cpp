@@ -22,11 +22,23 @@ std::string_view without_quotes(std::string_view cell) {
   return quoted ? trimmed(cell.substr(1, cell.size() - 2)) : cell;
 }
 
-// Names hold none of these: where there is no comma, another one separates them.
+// Names without quotes hold none of these: where there is no comma, another one separates them.
 char separator_of(std::string_view names) {
+  std::string bare;
+  bool quoted = false;
+  for (const char c : names) {
+    if (c == '"') quoted = !quoted;
+    if (!quoted) bare += c;
+  }
   for (const char separator : {',', ';', '\t'})
-    if (names.find(separator) != std::string_view::npos) return separator;
+    if (bare.find(separator) != std::string::npos) return separator;
   return ',';
+}
+
+// A first line that tells spreadsheets what separates cells, as the names do.
+bool tells_separator(std::string_view line) {
+  constexpr std::string_view kWord = "sep=";
+  return trimmed(line).starts_with(kWord) && trimmed(line).size() <= kWord.size() + 1;
 }
 
 void check_columns(const std::vector<std::string>& columns, const std::string& place) {
@@ -61,7 +73,9 @@ CsvReader::CsvReader(std::string_view text, std::string where)
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
   std::string_view line;
-  if (!next_content_line(line))
+  bool any = next_content_line(line);
+  if (any && tells_separator(line)) any = next_content_line(line);
+  if (!any)
     throw InputError(fmt::format("{}: {}", where_,
                                  text_.empty() ? "the file is empty" : "holds no column names"));
   separator_ = separator_of(trimmed(line));

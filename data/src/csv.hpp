@@ -9,10 +9,9 @@ namespace trochoid::data {
 
 /// Line-wise reader of a table of numbers below '#' header lines and one line of column names.
 /// Cells are separated by commas or, where the column names are, by semicolons or tabs; then
-/// numbers may have decimal commas. Tolerates CRLF, a byte order mark, blanks around cells, empty
-/// lines and
-/// '#' lines anywhere, these with separators at their ends; everything else is refused with file
-/// and line.
+/// numbers may have decimal commas. Tolerates CRLF, a byte order mark, a first line "sep=;" as
+/// spreadsheets have it, blanks around cells, empty lines and '#' lines anywhere, these with
+/// separators at their ends; everything else is refused with file and line.
 class CsvReader {
  public:
   /// Reads up to the column names. `text` must outlive the reader; `where` names the file.

@@ -18,6 +18,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr int kVersion = 1;
 
+// Each value has a spelling.
+template <class Enum>
+constexpr bool all_spelled(Enum last) {
+  return spellings(last).size() == static_cast<std::size_t>(last) + 1;
+}
+static_assert(all_spelled(ParameterStatus::prior) && all_spelled(FitOutcome::not_identifiable) &&
+              all_spelled(FitVerdict::unexplained) && all_spelled(ProfileVerdict::flat));
+
 template <class Visit>
 void parameter_keys(Visit&& visit) {
   visit("name", &FitParameter::name);

@@ -65,7 +65,8 @@ struct TrackColumns {
 bool gives_no_place(const CsvReader& csv, const TrackColumns& columns) {
   const auto unknown = [&](int column) {
     constexpr std::string_view kNaN = "nan";
-    const std::string_view cell = column < 0 ? std::string_view() : csv.cell(column);
+    std::string_view cell = column < 0 ? std::string_view() : csv.cell(column);
+    if (cell.starts_with('-')) cell.remove_prefix(1);  // as some programs write 0 / 0
     return cell.empty() || std::equal(cell.begin(), cell.end(), kNaN.begin(), kNaN.end(),
                                       [](unsigned char a, char b) { return std::tolower(a) == b; });
   };

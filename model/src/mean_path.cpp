@@ -34,7 +34,7 @@ class Interpolator {
                                   Eigen::Index& hint) const {
     const double sign = phi_[phi_.size() - 1] < phi_[0] ? -1.0 : 1.0;
     while (hint + 4 < phi_.size() && sign * (at - phi_[hint + 2]) > 0.0) ++hint;
-    return data::through<double>({phi_.data() + hint, 4}, {column.data() + hint, 4}, at);
+    return data::polynomial_at<double>({phi_.data() + hint, 4}, {column.data() + hint, 4}, at);
   }
 
  private:

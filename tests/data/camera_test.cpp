@@ -124,10 +124,20 @@ TEST(CameraSize, ThatIsNotTheRecordingsIsRefusedWithBothNames) {
     FAIL() << "it is another size";
   } catch (const InputError& error) {
     // Pixel centres are whole numbers: half the old picture's width, 319.5, becomes 639.5.
-    EXPECT_TRUE(std::string(error.what())
-                    .ends_with("has 1280 x 960; calibrate the camera at this size, or if it is the "
-                               "same view scaled, nothing cut off, write a camera file with width "
-                               "1280, height 960, fx 4000, fy 4000, cx 639.5, cy 479.5"))
+    EXPECT_TRUE(
+        std::string(error.what())
+            .ends_with("has 1280 x 960; calibrate the camera at this size, or if it is the "
+                       "same view scaled, nothing cut off, write a camera file with width "
+                       "1280, height 960, fx 4000, fy 4000, cx 639.5, cy 479.5, all else as "
+                       "it is"))
+        << error.what();
+  }
+  try {
+    camera.check_size(426, 320, "ring.mp4");  // a third smaller, the width rounded
+    FAIL() << "it is another size";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("fx 1331.25, fy 1333.333, cx 212.5, cy 159.5"),
+              std::string::npos)
         << error.what();
   }
   camera.width_px = 0;  // not known

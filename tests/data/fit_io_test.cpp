@@ -129,6 +129,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "\"status\" must be free, fixed, derived or prior"},
         Refusal{"OddVerdict", kBegin + R"("parameters": [], "verdict": "x"})",
                 "\"verdict\" must be good, good_correlated, weak"},
+        Refusal{"OddOutcome",
+                R"({"trochoid_fit": 1, "model": "top", "outcome": "x", "parameters": []})",
+                "\"outcome\" must be converged, no_convergence"},
         Refusal{
             "RaggedCovariance",
             kBegin +

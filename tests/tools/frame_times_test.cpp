@@ -33,7 +33,7 @@ TEST(FrameTimes, FollowTheTrackAndGoOnAtItsRate) {
 }
 
 // Thirty pictures a second in whole milliseconds, then half as many, and some that were lost.
-TEST(FrameTimes, TellTheRateOfACameraAtItsFastest) {
+TEST(FrameTimes, TellTheRateOfACameraThatIsFastAtFirst) {
   data::TrackFile file;
   file.tracks.emplace_back();
   double t_s = 0.0;
@@ -44,7 +44,20 @@ TEST(FrameTimes, TellTheRateOfACameraAtItsFastest) {
     file.tracks.front().samples.push_back(sample);
     t_s += (frame < 30 ? 1.0 : 2.0) / 30.0 + (frame == 10 ? 1.0 : 0.0);
   }
-  EXPECT_NEAR(1.0 / FrameTimes(file).shortest_step_s(), 30.0, 0.1);
+  EXPECT_NEAR(1.0 / FrameTimes(file).usual_step_s(), 30.0, 0.1);
+}
+
+// Stamps that a container has written for two pictures at once: their mean rate is the camera's.
+TEST(FrameTimes, TellTheRateOfPicturesStampedInPairs) {
+  data::TrackFile file;
+  file.tracks.emplace_back();
+  for (int frame = 0; frame < 60; ++frame) {
+    data::TrackSample sample;
+    sample.frame = frame;
+    sample.t_s = 0.066 * (frame / 2) + 0.002 * (frame % 2);
+    file.tracks.front().samples.push_back(sample);
+  }
+  EXPECT_NEAR(FrameTimes(file).usual_step_s(), 0.033, 1e-6);
 }
 
 TEST(FrameTimes, AreUnknownWithoutNumbers) {
@@ -52,7 +65,7 @@ TEST(FrameTimes, AreUnknownWithoutNumbers) {
   for (data::TrackSample& sample : file.tracks.front().samples) sample.frame = -1;
   const FrameTimes times(file);
   EXPECT_FALSE(times.numbered());
-  EXPECT_EQ(times.shortest_step_s(), 0.0);
+  EXPECT_EQ(times.usual_step_s(), 0.0);
   EXPECT_FALSE(times.time_of(3));
   EXPECT_FALSE(times.frame_at(0.01));
 }

@@ -92,7 +92,7 @@ void check_placeholders(const fs::path& manifest, const toml::node& node, const 
                         const std::string& text) {
   for (std::size_t open = text.find('{'); open != std::string::npos;
        open = text.find('{', open + 1)) {
-    const std::string word = text.substr(open, text.find('}', open) - open + 1);
+    const std::string word = text.substr(open, text.find('}', open) - open) + "}";
     if (word != "{stem}" && word != "{folder}")
       fail(manifest, node,
            fmt::format("{} = '{}': {} stands for nothing; {{stem}} and {{folder}} are the "

@@ -49,6 +49,7 @@ struct Views {
   std::vector<tracking::BoardView> found;
   std::vector<cv::Mat> pictures;  ///< of `found`
   cv::Size size;
+  std::string floor;  ///< the one of the floor, by its name in `found`; empty: not said
   int looked_at = 0;
   std::string other_board;  ///< what is seen of one that was not looked for, in words
   std::optional<int> orientation;
@@ -108,15 +109,8 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   }
 }
 
-// Whether a picture is called as --floor has it: by its path, or its name alone.
-bool is_called(const std::string& name, const fs::path& wanted) {
-  const fs::path plain = wanted.lexically_normal();
-  return fs::path(name).lexically_normal() == plain || fs::path(name).filename() == plain;
-}
-
-// Pictures and videos, those of folders and patterns one by one; first the picture of the floor, if
-// it is none of them.
-std::vector<fs::path> files_of(const Options& options) {
+// Pictures and videos, those of folders and patterns one by one.
+std::vector<fs::path> inputs_of(const Options& options) {
   std::vector<fs::path> files;
   for (const fs::path& input : options.inputs) {
     const std::vector<fs::path> some = fs::is_directory(input)
@@ -126,12 +120,32 @@ std::vector<fs::path> files_of(const Options& options) {
   }
   for (const fs::path& file : files)
     if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  const fs::path floor = options.floor;
+  return files;
+}
+
+// What --floor names: a file, be it called otherwise among the inputs, or one of these by its name
+// alone; as it is if neither, such as a picture of a video.
+fs::path floor_among(const std::vector<fs::path>& files, const fs::path& floor) {
   std::error_code ignored;
-  const bool apart = std::none_of(files.begin(), files.end(), [&](const fs::path& file) {
-    return is_called(file.string(), floor) || fs::equivalent(file, floor, ignored);
-  });
-  if (apart && fs::is_regular_file(floor, ignored)) files.insert(files.begin(), floor);
+  const auto among = [&](const auto& is_it) {
+    const auto at = std::find_if(files.begin(), files.end(), is_it);
+    return at == files.end() ? floor : *at;
+  };
+  if (fs::is_regular_file(floor, ignored))
+    return among([&](const fs::path& file) { return fs::equivalent(file, floor, ignored); });
+  return among([&](const fs::path& file) { return file.filename() == floor; });
+}
+
+// All pictures and videos, that of the floor first if it is one.
+std::vector<fs::path> files_of(const Options& options) {
+  std::vector<fs::path> files = inputs_of(options);
+  const fs::path floor = floor_among(files, options.floor);
+  std::error_code ignored;
+  const auto at = std::find(files.begin(), files.end(), floor);
+  if (at != files.end())
+    std::rotate(files.begin(), at, at + 1);
+  else if (fs::is_regular_file(floor, ignored))
+    files.insert(files.begin(), floor);
   return files;
 }
 
@@ -153,7 +167,10 @@ std::vector<fs::path> each_once(const std::vector<fs::path>& files) {
 Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
   Views views;
   Progress progress("calibrate", "files");
-  const std::vector<fs::path> files = each_once(files_of(options));
+  std::vector<fs::path> files = each_once(files_of(options));
+  views.floor = floor_among(files, options.floor).string();
+  // The boards say what size pictures have.
+  if (files.front() == views.floor) std::rotate(files.begin(), files.begin() + 1, files.end());
   for (std::size_t i = 0; i < files.size(); ++i) {
     look_into(files[i], pattern, views);
     progress.update(static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(files.size()));
@@ -214,10 +231,13 @@ std::size_t worst_view(const tracking::Calibration& result) {
 std::size_t floor_view(const Options& options, const Views& views) {
   if (options.floor.empty()) return 0;
   for (std::size_t i = 0; i < views.found.size(); ++i)
-    if (is_called(views.found[i].name, options.floor)) return i;
-  throw InputError(fmt::format(
-      "--floor {}: no picture of this name shows the board whole; is it among the pictures?",
-      options.floor));
+    if (views.found[i].name == views.floor) return i;
+  std::error_code ignored;
+  throw InputError(
+      fmt::format("--floor {}: {}", options.floor,
+                  fs::exists(views.floor, ignored)
+                      ? "the board is not seen whole in it"
+                      : "no such picture; give a file, or the name of one among the pictures"));
 }
 
 std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const char* y,
@@ -389,8 +409,10 @@ void add_calibrate_command(CLI::App& app) {
       ->check(positive_number());
   command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]")
       ->needs("--marker-mm");
-  command->add_option("--floor", options->floor,
-                      "Picture in which the board lies on the floor [the first]");
+  command->add_option(
+      "--floor", options->floor,
+      "Picture in which the board lies on the floor, one of the others or of its own "
+      "[the first]");
   command
       ->add_option("--floor-height-mm", options->floor_height_mm,
                    "Height of that board, of the points or of the circle above the floor [0]")

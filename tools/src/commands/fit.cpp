@@ -225,8 +225,8 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
   fit->add_option("--object", command->object, "Fit this object of the track only")
       ->check(whole_number());
-  fit->add_option("--from", command->options.from, "First sample: seconds or frame (f120)");
-  fit->add_option("--to", command->options.to, "Last sample: seconds or frame (f240)");
+  fit->add_option("--from", command->options.from, "First moment: seconds (1.5) or a frame (f120)");
+  fit->add_option("--to", command->options.to, "Last moment: seconds or a frame");
   fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
   fit->add_flag("--compare", command->compare,
                 "Try the models that make sense for the scene; fit the simplest that suffices");

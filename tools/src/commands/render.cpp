@@ -18,13 +18,17 @@
 #include "draw/encoded_file.hpp"
 #include "draw/render_picture.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/table.hpp"
 #include "trochoid/model/simulate.hpp"
 
 namespace trochoid::tools {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kPerFrame = 16;  // samples of the motion per frame
 
 struct Options {
   std::string scene;
@@ -62,14 +66,8 @@ class Motion {
     const auto value = [&](std::size_t column) {
       const Eigen::VectorXd& v = columns_[column];
       if (last < 3) return v[std::clamp<Eigen::Index>(std::lround(place), 0, last)];
-      double sum = 0.0;
-      for (int k = 0; k < 4; ++k) {  // Lagrange
-        double basis = 1.0;
-        for (int m = 0; m < 4; ++m)
-          if (m != k) basis *= (u - m) / (k - m);
-        sum += basis * v[i + k];
-      }
-      return sum;
+      constexpr std::array kPlaces{0.0, 1.0, 2.0, 3.0};
+      return data::polynomial_at<double>(kPlaces, {v.data() + i, kPlaces.size()}, u);
     };
     data::Pose<> pose;
     pose.centre_m = {value(0), value(1), value(2)};
@@ -228,14 +226,13 @@ data::Scene scene_to_draw(const Options& options, const Targets& targets) {
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
   if (options.rate_hz > 0.0) scene.run.rate_hz = options.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
-  constexpr double kMostFrames = 1e6;  // hours of drawing
+  constexpr double kMostFrames = data::Table::kMostRows / kPerFrame;  // a day of drawing
   check_rate(options.scene, scene.run.rate_hz, targets.video);
   check_length(options.scene, scene.run.until_s, scene.run.rate_hz, kMostFrames, "frames");
   return scene;
 }
 
 Motion simulated(const std::string& scene_name, data::Scene scene) {
-  constexpr int kPerFrame = 16;  // samples of the motion per frame
   scene.run.rate_hz *= kPerFrame;
   const model::Trajectory run = in_scene(scene_name, [&] { return model::simulate(scene); });
   tell_idle_keys(scene_name, scene);
@@ -426,7 +423,10 @@ void add_render_command(CLI::App& app) {
       ->add_option("-o,--output", options->output,
                    "Clip to write (.mp4, .mkv), or a folder for video.mp4, truth.csv, camera.json "
                    "and object.json")
-      ->required();
+      ->required()
+      ->transform([](const std::string& name) {  // no folder is made that is left again
+        return fs::path(name).lexically_normal().string();
+      });
   CLI::Option* camera = command->add_option("--camera", options->camera,
                                             "Camera file [the scene's, else from above]");
   command->add_option("--width", options->width_px, "Of the picture [px, 640]")

@@ -95,8 +95,8 @@ void add_track_options(CLI::App& command, TrackInputs& inputs, TrackChoices& cho
           "--at", [&choices](const std::string& text) { choices.at_px = point_named(text); },
           "A point x,y [px] on the body in the first frame used")
       ->check(point());
-  command.add_option("--from", choices.from, "First frame to use: seconds (1.5) or frame (f120)");
-  command.add_option("--to", choices.to, "Last frame to use: seconds or frame");
+  command.add_option("--from", choices.from, "First moment: seconds (1.5) or a frame (f120)");
+  command.add_option("--to", choices.to, "Last moment: seconds or a frame");
   command
       .add_option("--rate", choices.rate_hz,
                   "True frame rate [Hz]: of slow motion, or of an image folder or series")

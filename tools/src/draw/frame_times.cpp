@@ -1,13 +1,27 @@
 #include "draw/frame_times.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <map>
-#include <numeric>
 
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
+namespace {
+
+// Stamps jitter, or come in pairs; means over a few frames hardly do. Some of these are longer for
+// a frame that was lost or a camera that was slow.
+std::optional<double> usual_step_of(const std::vector<std::pair<std::int64_t, double>>& known) {
+  constexpr std::size_t kFrames = 8;
+  constexpr double kShort = 0.25;
+  std::vector<double> means_s;
+  for (std::size_t i = kFrames; i < known.size(); ++i)
+    means_s.push_back((known[i].second - known[i - kFrames].second) /
+                      static_cast<double>(known[i].first - known[i - kFrames].first));
+  if (means_s.empty()) return std::nullopt;
+  return data::quantile(std::move(means_s), kShort);
+}
+
+}  // namespace
 
 FrameTimes::FrameTimes(const data::TrackFile& tracks) {
   std::map<std::int64_t, double> times;
@@ -20,14 +34,8 @@ FrameTimes::FrameTimes(const data::TrackFile& tracks) {
     steps_s.push_back((known_[i].second - known_[i - 1].second) /
                       static_cast<double>(known_[i].first - known_[i - 1].first));
   if (steps_s.empty()) return;
-  // Stamps jitter, by their rounding if by nothing else: the mean of those about as short as most.
-  constexpr double kShort = 0.1, kAboutAsShort = 1.5;
-  const double most_s = kAboutAsShort * data::quantile(steps_s, kShort);
-  const auto longer =
-      std::partition(steps_s.begin(), steps_s.end(), [=](double s) { return s <= most_s; });
-  shortest_s_ = std::accumulate(steps_s.begin(), longer, 0.0) /
-                static_cast<double>(std::distance(steps_s.begin(), longer));
   frame_s_ = data::median(std::move(steps_s));
+  usual_s_ = usual_step_of(known_).value_or(frame_s_);
 }
 
 std::optional<double> FrameTimes::time_of(std::int64_t frame) const {

@@ -17,14 +17,15 @@ class FrameTimes {
   /// The inverse, between frames a fraction.
   [[nodiscard]] std::optional<double> frame_at(double t_s) const;
   [[nodiscard]] bool numbered() const { return !known_.empty(); }
-  /// From frame to frame where none is lost and the camera is at its fastest; 0 if not known [s].
-  [[nodiscard]] double shortest_step_s() const { return shortest_s_; }
+  /// From frame to frame where none is lost and the camera is as fast as it is for a quarter of the
+  /// recording; 0 if not known [s].
+  [[nodiscard]] double usual_step_s() const { return usual_s_; }
   /// Whether the frame has a sample.
   [[nodiscard]] bool has(std::int64_t frame) const;
 
  private:
   std::vector<std::pair<std::int64_t, double>> known_;  ///< in order
-  double frame_s_ = 0.0, shortest_s_ = 0.0;
+  double frame_s_ = 0.0, usual_s_ = 0.0;
 };
 
 }  // namespace trochoid::tools

@@ -10,6 +10,7 @@
 #include "draw/encoded_file.hpp"
 #include "draw/frame_times.hpp"
 #include "draw/overlay_drawing.hpp"
+#include "draw/pace.hpp"
 #include "draw/residual_strip.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/moment.hpp"
@@ -65,16 +66,10 @@ std::string as_frame(const FrameTimes& times, const std::string& text, bool is_f
 /// its pictures were lost or it was slower at times.
 double rate_shown_hz(const tracking::VideoInfo& info, const OverlayContent& content) {
   constexpr double kRounding = 0.02;
-  const double step_s = content.shortest_step_s();
+  const double step_s = content.usual_step_s();
   if (!(step_s > 0.0) || std::abs(step_s * info.frame_rate_hz - 1.0) < kRounding)
     return info.frame_rate_hz;
   return 1.0 / step_s;
-}
-
-/// How often the frame before is to be seen again until the next comes.
-int repeats(double step_s, double rate_hz) {
-  constexpr double kLongest_s = 10.0;
-  return std::max(0, static_cast<int>(std::lround(std::min(step_s, kLongest_s) * rate_hz)) - 1);
 }
 
 /// Draws the pictures of an overlay one after the other; strokes of the past are kept between
@@ -259,6 +254,8 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   written.height_px = painter.size().height;
   EncodedFile overlay(path, painter.size(), written.frame_rate_hz, coding::kForViewing);
   Progress progress("overlay");
+  constexpr double kLongestPause_s = 2.0;  // on the screen
+  Pace pace(rate_hz, kLongestPause_s / written.slowed);
   std::int64_t drawn = 0;
   cv::Mat picture;
   const auto show = [&](std::int64_t frame, double t_s) {
@@ -272,8 +269,8 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
     if (drawn > 0) {
       const std::int64_t before = written.frame.back();
       const double from_s = written.t_s.back();
-      const int again = repeats(t_s - from_s, rate_hz);
-      for (int k = 1; k <= again; ++k) show(before, from_s + (t_s - from_s) * k / (again + 1));
+      const int pictures = pace.pictures(t_s - from_s);
+      for (int k = 1; k < pictures; ++k) show(before, from_s + (t_s - from_s) * k / pictures);
     }
     picture = painter.paint(*frame, t_s);
     show(frame->index, t_s);

@@ -21,7 +21,8 @@ struct OverlayOptions {
 };
 
 /// What an overlay video holds: picture k of the video is frame[k] of the recording, at t_s[k]. A
-/// frame stays as long as it did in the recording: it comes again where the next was lost or late.
+/// frame stays as long as it did in the recording: it comes again where the next was lost or late,
+/// for two seconds of the overlay at most.
 struct OverlayFrames {
   double frame_rate_hz = 0.0;  ///< of the overlay video
   double slowed = 1.0;

@@ -62,7 +62,7 @@ class OverlayContent {
   /// `fallback_s` is returned for a track without frame numbers.
   [[nodiscard]] double time_of_frame(std::int64_t frame, double fallback_s) const;
   /// As FrameTimes has it.
-  [[nodiscard]] double shortest_step_s() const { return frame_times_.shortest_step_s(); }
+  [[nodiscard]] double usual_step_s() const { return frame_times_.usual_step_s(); }
   /// Whether any object was found in the frame.
   [[nodiscard]] bool detected(std::int64_t frame, double t_s) const;
   [[nodiscard]] double first_s() const { return first_s_; }

@@ -41,12 +41,12 @@ struct Neighbours {
       level.emplace_back(axis_of(p).head<2>());
     }
     // Whatever rolls on its rim runs in circles: a chord would lead inside.
-    pose.centre_m = data::through<Eigen::Vector3d>(times, centres, t_s);
+    pose.centre_m = data::polynomial_at<Eigen::Vector3d>(times, centres, t_s);
     const bool upright = axis_of(pose).z() >= 0.0;
     const double early = rate_between(before, a, alike), late = rate_between(b, after, alike);
     const bool slow = std::max(std::abs(early), std::abs(late)) * frame_s() < kSlowTurn_rad;
     if (goes_on(level) || (slow && std::min(level_of(pose), level_of(to)) < kNearlyUpright)) {
-      const Eigen::Vector2d n = data::through<Eigen::Vector2d>(times, level, t_s);
+      const Eigen::Vector2d n = data::polynomial_at<Eigen::Vector2d>(times, level, t_s);
       const double z = std::sqrt(std::max(0.0, 1.0 - n.squaredNorm()));
       set_axis(Eigen::Vector3d(n.x(), n.y(), upright ? z : -z).normalized(), pose);
       return pose;

@@ -97,8 +97,8 @@ class Path {
       m.emplace_back(glimpses_[at].pose().centre_m.head<2>());
     }
     const double t_s = glimpses_[posed_[k]].frame->t_s;
-    return Place{data::through<Eigen::Vector2d>(times, px, t_s),
-                 data::through<Eigen::Vector2d>(times, m, t_s)};
+    return Place{data::polynomial_at<Eigen::Vector2d>(times, px, t_s),
+                 data::polynomial_at<Eigen::Vector2d>(times, m, t_s)};
   }
 
   const std::vector<Glimpse>& glimpses_;

@@ -4,10 +4,10 @@
 
 namespace trochoid::data {
 
-/// Value at t of the polynomial through all the values [Lagrange].
+/// Value at t of the polynomial through all the values, in Lagrange's form.
 /// @param times  all different; as many as values, at least one.
 template <class Value>
-[[nodiscard]] Value through(std::span<const double> times, std::span<const Value> values,
+[[nodiscard]] Value polynomial_at(std::span<const double> times, std::span<const Value> values,
                             double t) {
   Value sum = 0.0 * values[0];
   for (std::size_t k = 0; k < times.size(); ++k) {
