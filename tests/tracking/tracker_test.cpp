@@ -350,6 +350,25 @@ TEST(TrackVideo, ABodyOfAnotherSizeAtThePointIsSaidToBe) {
   }
 }
 
+TEST(TrackVideo, ABodyOfAFewPixelsIsSaidToBeTooSmall) {
+  const ScratchFolder folder("small");
+  write_clip(folder / "clip.mkv", drawn_floor(220, 130, 150.0), 60, 2.0,
+             [](cv::Mat& picture, int i) {
+               draw_disc(picture, 40.0 + 2.0 * i, 65.0, 4.0, 3.0, 0.2 * i, 60.0);
+             });
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.004;
+  body.thickness_m = 1e-4;
+  scene.support.kind = data::SupportKind::floor;
+  try {
+    (void)track_video(folder / "clip.mkv", scene, data::Camera::from_scale(220, 130, 1000.0));
+    FAIL() << "tracked what is hardly more than a speck";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("about 4.0 px, too few to be found"));
+  }
+}
+
 // Seen face on, precession and spin are one angle.
 TEST(TrackVideo, ADiscOnAPinShowsItsTurnByItsMark) {
   const ScratchFolder folder("pin");

@@ -106,10 +106,25 @@ class Tracking {
                       "changes: put it on a stand, or track a "
                       "part where it is still (from, to)",
                       video_.string()));
+    tell_too_small();
     throw InputError(
         fmt::format("{}: no moving body found; point at it: at x,y, or at_px under "
                     "[tracking] in the scene",
                     video_.string()));
+  }
+
+  /// Of so few pixels no outline is told from noise.
+  void tell_too_small() const {
+    constexpr double kFew_px = 8.0;
+    const VideoInfo& video = recording_.info();
+    const double radius_px =
+        finder_->expected_major_px({0.5 * video.width_px, 0.5 * video.height_px});
+    if (radius_px > 0.0 && radius_px < kFew_px)
+      throw InputError(
+          fmt::format("{}: no moving body found: by radius_m and the camera or scale its rim has a "
+                      "radius of about {:.1f} px, too few to be found; film it larger, 30 px at "
+                      "least",
+                      video_.string(), radius_px));
   }
 
   /// A wrong scale or radius hides a body that is plain to see: its rim alone is.
