@@ -44,6 +44,13 @@ TEST(Pace, WaitsWhereFramesWereLost) {
   EXPECT_EQ(pace.pictures(1.0 / 30.0), 1);
 }
 
+// A camera that takes six pictures at 100 Hz every three seconds, shown at its mean rate.
+TEST(Pace, KeepsTheLengthOfARecordingInBursts) {
+  std::vector<double> steps_s;
+  for (int k = 0; k < 60; ++k) steps_s.push_back(k % 6 == 5 ? 3.0 : 0.01);
+  EXPECT_NEAR(pictures_of(Pace(2.5, 2.0), steps_s), 2.5 * 10 * 3.05, 8);
+}
+
 TEST(Pace, CutsALongPauseAndGoesOnAsIfItHadNotBeen) {
   Pace pace(30.0, 2.0);
   EXPECT_EQ(pace.pictures(3600.0), 60);

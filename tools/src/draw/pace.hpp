@@ -16,7 +16,7 @@ class Pace {
 
   /// Of a frame that the next one follows so much later.
   [[nodiscard]] int pictures(double step_s) {
-    constexpr double kMostAhead = 2.0;  // of the recording's times: what is more is not made up for
+    constexpr double kMostAhead = 10.0;  // of the times: what is more is not made up for
     due_ += std::max(0.0, step_s) * rate_hz_;
     const double shown = std::clamp(std::round(due_), 1.0, most_);
     due_ = shown < most_ ? std::max(due_ - shown, -kMostAhead) : 0.0;
