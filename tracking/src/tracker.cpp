@@ -456,8 +456,9 @@ class Tracking {
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
-    result.file.notes =
-        notes_about_measurement(paths_, result.file.tracks, camera_ ? &*camera_ : nullptr);
+    if (camera_)
+      if (auto note = note_about_edges(paths_, *camera_))
+        result.file.notes.push_back(std::move(*note));
     const WhatWasRead read{.frames = frames_,
                            .missing = missing_,
                            .repeated = recording_.repeated(),

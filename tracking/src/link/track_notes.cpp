@@ -64,58 +64,32 @@ Note note_on_interlaced(const VideoInfo& video) {
          "deinterlace it first";
 }
 
-/// A transfer curve other than the camera's puts all edges to one side, and so do other causes.
-Note note_on_edges(const std::vector<BodyPath>& paths, const data::Camera* camera) {
+}  // namespace
+
+std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
+  std::vector<std::string> notes;
+  for (const Note& note :
+       {note_on_missing(video, read), note_on_left_out(video), note_on_repeated(read),
+        note_on_evened(video), note_on_exposure(read), note_on_interlaced(video)})
+    if (note) notes.push_back(*note);
+  return notes;
+}
+
+std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
+                                            const data::Camera& camera) {
   constexpr double kNoticeable_px = 0.15;
   std::vector<double> polarities_px;
   for (const BodyPath& path : paths)
     for (const auto& [index, at] : path.frames)
       if (at.seen.pose) polarities_px.push_back(at.seen.pose->polarity_px);
-  if (polarities_px.empty() || camera == nullptr) return std::nullopt;
+  if (polarities_px.empty()) return std::nullopt;
   const double usual_px = data::median(std::move(polarities_px));
   if (std::abs(usual_px) < kNoticeable_px) return std::nullopt;
-  const bool linear = camera->transfer == data::Transfer::linear;
+  const bool linear = camera.transfer == data::Transfer::linear;
   return fmt::format(
       "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another radius or a "
       "camera with transfer = \"{}\" does that",
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
-}
-
-/// Of an outline of a few pixels any tilt looks much like another.
-Note note_on_tilt(const BodyPath& path, const data::Track& track, bool several) {
-  constexpr double kFew_px = 6.0;
-  const bool tilted = std::any_of(track.samples.begin(), track.samples.end(),
-                                  [](const auto& sample) { return sample.theta.has_value(); });
-  const double radius_px = usual_radius_px(path);
-  if (!tilted || radius_px >= kFew_px) return std::nullopt;
-  return fmt::format(
-      "{} only {:.1f} px in radius: too few for its tilt and precession to mean anything; film it "
-      "larger, 30 px at least",
-      several ? fmt::format("object {} is", track.object) : "the body is", radius_px);
-}
-
-std::vector<std::string> given(std::initializer_list<Note> notes) {
-  std::vector<std::string> out;
-  for (const Note& note : notes)
-    if (note) out.push_back(*note);
-  return out;
-}
-
-}  // namespace
-
-std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
-  return given({note_on_missing(video, read), note_on_left_out(video), note_on_repeated(read),
-                note_on_evened(video), note_on_exposure(read), note_on_interlaced(video)});
-}
-
-std::vector<std::string> notes_about_measurement(const std::vector<BodyPath>& paths,
-                                                 const std::vector<data::Track>& tracks,
-                                                 const data::Camera* camera) {
-  std::vector<std::string> notes = given({note_on_edges(paths, camera)});
-  for (std::size_t k = 0; k < paths.size(); ++k)
-    if (auto note = note_on_tilt(paths[k], tracks[k], paths.size() > 1))
-      notes.push_back(std::move(*note));
-  return notes;
 }
 
 data::Table edge_table(const std::vector<BodyPath>& paths) {

@@ -1,12 +1,12 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "link/track_assembly.hpp"
 #include "trochoid/data/camera.hpp"
 #include "trochoid/data/table.hpp"
-#include "trochoid/data/track.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 
 namespace trochoid::tracking {
@@ -23,12 +23,10 @@ struct WhatWasRead {
 [[nodiscard]] std::vector<std::string> notes_about_recording(const VideoInfo& video,
                                                              const WhatWasRead& read);
 
-/// What a user should know of what was measured in it: edges that lie to one side, outlines too
-/// small for a tilt.
-/// @param camera of poses; may be null if there are none.  @param tracks of the paths.
-[[nodiscard]] std::vector<std::string> notes_about_measurement(
-    const std::vector<BodyPath>& paths, const std::vector<data::Track>& tracks,
-    const data::Camera* camera);
+/// Where all edges lie to one side: a transfer curve other than the camera's does that, and so do
+/// other causes. Nothing of paths without poses.
+[[nodiscard]] std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
+                                                          const data::Camera& camera);
 
 /// The accepted edge points of all frames [px].
 [[nodiscard]] data::Table edge_table(const std::vector<BodyPath>& paths);
