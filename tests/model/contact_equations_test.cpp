@@ -17,8 +17,8 @@ namespace {
 // state the contact force, energy and contact point must be those of the file, which was made with
 // independent code. Numbers in the files carry 15 digits; forces are O(1) N.
 constexpr double kFileDigits = 1e-11;
-constexpr double kRateDigits =
-    10.0 * kFileDigits;  // rates of the angles are some ten times as large
+// Rates of the angles are some ten times as large.
+constexpr double kRateDigits = 10.0 * kFileDigits;
 
 struct Reference {
   data::Scene scene;

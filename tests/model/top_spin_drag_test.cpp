@@ -167,8 +167,8 @@ TEST(TopSpinDrag, ASpinLastsAsLongAsItsLossesAllow) {
       sum += weight / (d.dry + (d.gamma3 + d.quadratic * b) * b);
     }
     const double lasts_s = sum * kSpin / (3.0 * kSteps);
-    constexpr double kRule =
-        1e-9;  // h^4 of its steps and rounding of their sum, 1e-12, with a margin
+    // h^4 of its steps and rounding of their sum, 1e-12, with a margin.
+    constexpr double kRule = 1e-9;
     EXPECT_NEAR(spin_lasts_s(-kSpin, d.dry, d.gamma3, d.quadratic), lasts_s, kRule * lasts_s);
   }
   EXPECT_EQ(spin_lasts_s(kSpin, 0.0, 0.1, 0.1), INFINITY);

@@ -226,7 +226,7 @@ data::Scene scene_to_draw(const Options& options, const Targets& targets) {
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
   if (options.rate_hz > 0.0) scene.run.rate_hz = options.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
-  constexpr double kMostFrames = data::Table::kMostRows / kPerFrame;  // a day of drawing
+  constexpr double kMostFrames = data::Table::kMostRows / kPerFrame;  // hours of drawing
   check_rate(options.scene, scene.run.rate_hz, targets.video);
   check_length(options.scene, scene.run.until_s, scene.run.rate_hz, kMostFrames, "frames");
   return scene;
