@@ -2,8 +2,13 @@
 
 add_library(trochoid_warnings INTERFACE)
 target_compile_options(trochoid_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wno-psabi
+  -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wno-psabi
   $<$<BOOL:${TROCHOID_WERROR}>:-Werror>)
+if(NOT CMAKE_UNITY_BUILD)
+  target_compile_options(trochoid_warnings INTERFACE -Wshadow)
+elseif(CMAKE_CXX_COMPILER_ID STREQUAL GNU)  # a local may have the name of another file's constant
+  target_compile_options(trochoid_warnings INTERFACE -Wshadow=local)
+endif()
 if(TROCHOID_SANITIZE)
   target_compile_options(trochoid_warnings INTERFACE
     -fsanitize=${TROCHOID_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::data {
 namespace {
 
 bool same_direction(double a_rad, double b_rad) {
   constexpr double kSameAngle_rad = 1e-6;  // far below what any picture shows
-  return std::abs(std::remainder(a_rad - b_rad, 2.0 * std::numbers::pi)) < kSameAngle_rad;
+  return std::abs(std::remainder(a_rad - b_rad, kTurn)) < kSameAngle_rad;
 }
 
 // Turning the body over about a diameter at `axis_rad` sends a dot at angle a to 2 axis - a.

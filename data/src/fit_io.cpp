@@ -16,7 +16,7 @@ namespace trochoid::data {
 namespace {
 
 using Json = nlohmann::ordered_json;
-constexpr int kVersion = 1;
+constexpr int kFitVersion = 1;
 
 // Each value has a spelling.
 template <class Enum>
@@ -325,9 +325,9 @@ Fit parse_fit(const std::string& text, const std::string& where) {
   const nlohmann::json json = parse_json_object(text, where);
   const JsonReader reader(json, where);
   const double version = reader.number("trochoid_fit");
-  if (version != kVersion)
+  if (version != kFitVersion)
     reader.fail(fmt::format("\"trochoid_fit\" is version {}, this program reads version {}",
-                            version, kVersion));
+                            version, kFitVersion));
   for (const char* needed : {"model", "outcome", "parameters"})
     static_cast<void>(reader.at(needed));
   Fit fit;
@@ -343,7 +343,7 @@ Fit read_fit(const std::filesystem::path& path) {
 std::string fit_text(const Fit& fit, const std::string& where) {
   check_fit(fit, where);
   Json json;
-  json["trochoid_fit"] = kVersion;
+  json["trochoid_fit"] = kFitVersion;
   json.update(to_json(fit));
   // Text from outside (a file name) may be broken UTF-8: replace it rather than refuse to write.
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -4,6 +4,7 @@
 
 #include "json_read.hpp"
 #include "scene_keys.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/io.hpp"
 
 // object.json of a recording with truth: docs/formats.md. Only what somebody with a caliper and a
@@ -34,7 +35,7 @@ SpinMark read_marker(const nlohmann::json& object, const std::string& where) {
   SpinMark mark;
   mark.distance_m = length(json, "r_m", kNonNegative);
   mark.size_m = length(json, "radius_m", kPositive);
-  mark.angle_rad = json.number_or("angle_deg", 0.0) * kPi / 180.0;
+  mark.angle_rad = radians(json.number_or("angle_deg", 0.0));
   if (json.has("faces")) {
     const nlohmann::json& faces = json.at("faces");
     const auto holds = [&](int face) {

@@ -6,15 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::data {
 namespace {
 
 using Edge = OutlinePoint::Edge;
-constexpr double kPi = std::numbers::pi;
 
 // Everything about visibility on an axisymmetric body depends on the position around the axis only
 // through  c(a) = n(a) . q,  where n(a) is the radial direction at angle a and q is the part of
@@ -132,8 +131,7 @@ OutlinePoint outline_point(const Camera& camera, Edge edge, const Eigen::Vector3
 // Samples [from, to] of a circle evenly along its image.
 void sample_arc(const View& view, const Camera& camera, const Circle& circle, double from,
                 double to, bool silhouette, double step_px, std::vector<OutlinePoint>& out) {
-  constexpr double kChord =
-      2.0 * kPi / 48.0;  // the speed along an ellipse varies little over 7.5 deg
+  constexpr double kChord = kTurn / 48.0;  // the speed along an ellipse varies little over 7.5 deg
   constexpr int kMost = 64;
   const int chords = std::clamp(static_cast<int>(std::ceil((to - from) / kChord)), 1, kMost - 1);
   const Eigen::Vector3d middle = view.centre + circle.height * view.axis;
@@ -181,7 +179,7 @@ void add_circle(const View& view, const Camera& camera, const Circle& circle, do
     if (arc.visible) sample_arc(view, camera, circle, from, to, arc.silhouette, step_px, out);
   };
   add(-half, half);
-  add(half, 2.0 * kPi - half);
+  add(half, kTurn - half);
 }
 
 void add_walls(const View& view, const Body& body, const Camera& camera, double step_px,
@@ -250,7 +248,7 @@ std::vector<WireCurve> wireframe(const Body& body, const Pose<>& pose, const Cam
   for (const Circle& circle : circles_of(body)) {
     WireCurve curve{circle.edge, {}, {}};
     for (int i = 0; i <= points; ++i) {
-      const double angle = 2.0 * kPi * i / points;
+      const double angle = kTurn * i / points;
       const Eigen::Vector3d at =
           view.centre + circle.height * view.axis + circle.radius * view.radial(angle);
       curve.image_px.push_back(camera.image_from_table(at));

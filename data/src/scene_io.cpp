@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "scene_reader.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/given_keys.hpp"
 #include "trochoid/data/io.hpp"
@@ -38,7 +39,7 @@ SpinMark read_mark(const toml::node& node, const std::string& where) {
   reader.read("angle_deg", angle_deg, kAny);
   if (angle_deg && reader.has("angle_rad"))
     reader.fail("angle_deg", "angle_deg and angle_rad are both given; keep one");
-  if (angle_deg) mark.angle_rad = *angle_deg * kPi / 180.0;
+  if (angle_deg) mark.angle_rad = radians(*angle_deg);
   read_faces(reader, mark);
   reader.refuse_unknown();
   if (!reader.has("distance_m"))

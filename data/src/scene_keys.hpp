@@ -3,6 +3,7 @@
 #include <limits>
 #include <string_view>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/scene.hpp"
 
 /// The scene file's keys, stated once: the reader, the writer and the suggestions for misspelt keys
@@ -20,7 +21,6 @@ struct Range {
   }
 };
 constexpr double kLargest = std::numeric_limits<double>::max();
-constexpr double kPi = 3.14159265358979323846;
 constexpr Range kAny{-kLargest, kLargest, true, "a finite number"};
 constexpr Range kPositive{0.0, kLargest, false, "greater than 0"};
 constexpr Range kNonNegative{0.0, kLargest, true, "0 or greater"};

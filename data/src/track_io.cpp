@@ -16,7 +16,7 @@
 namespace trochoid::data {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kTrackVersion = 1;
 constexpr const char* kUnits = "s, m, m^2, px, rad";
 constexpr int kMaxObject = 1000000;
 
@@ -129,9 +129,9 @@ void read_header(const CsvReader& csv, const std::string& where, TrackFile& file
   constexpr std::string_view kMagic = "trochoid track ";
   for (const auto& [key, value] : csv.header()) {
     if (key.starts_with(kMagic)) {
-      if (key != fmt::format("{}{}", kMagic, kVersion))
+      if (key != fmt::format("{}{}", kMagic, kTrackVersion))
         throw InputError(fmt::format("{}: is {}, this program reads version {}", where,
-                                     in_quotes(key), kVersion));
+                                     in_quotes(key), kTrackVersion));
     } else if (key == "units") {
       if (value != kUnits)
         throw InputError(
@@ -172,7 +172,7 @@ std::vector<Row> rows_by_time(const TrackFile& file) {
 }
 
 std::string header_of(const TrackFile& file) {
-  std::string text = header_line(fmt::format("trochoid track {}", kVersion));
+  std::string text = header_line(fmt::format("trochoid track {}", kTrackVersion));
   text += header_line("units", kUnits);
   const auto add = [&](const char* key, const std::string& value) {
     if (!value.empty()) text += header_line(key, value);

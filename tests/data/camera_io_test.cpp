@@ -52,12 +52,12 @@ TEST(CameraFile, KeepsAnOrthographicCameraOrthographic) {
   EXPECT_EQ(read_camera(folder / "c.json").projection, Camera::Projection::orthographic);
 }
 
-struct Refusal {
+struct RefusedCamera {
   const char* name;
   std::string text;
   const char* reason;
 };
-class CameraRefusal : public testing::TestWithParam<Refusal> {};
+class CameraRefusal : public testing::TestWithParam<RefusedCamera> {};
 
 TEST_P(CameraRefusal, NamesFileAndKey) {
   const TestFolder folder;
@@ -69,21 +69,23 @@ TEST_P(CameraRefusal, NamesFileAndKey) {
 
 INSTANTIATE_TEST_SUITE_P(
     Files, CameraRefusal,
-    testing::Values(
-        Refusal{"Empty", "", "empty"}, Refusal{"NotJson", "width = 3", "not JSON"},
-        Refusal{"Missing", with("\"fx\"", "\"gx\""), "key \"fx\" is missing"},
-        Refusal{"ZeroFocalLength", with("1180.0", "0"), "\"fx\" = 0 must be greater than 0"},
-        Refusal{"WordForNumber", with("406.3", "\"middle\""), "\"cx\" must be a finite number"},
-        Refusal{"NoPixels", with("800", "0"), "\"width\""},
-        Refusal{"HalfPixels", with("800", "800.5"), "\"width\""},
-        Refusal{"ShortDistortion", with("-0.24, ", ""), "list of 5"},
-        Refusal{"Mirrored", with("[0, -1, 0]", "[0, 1, 0]"), "no rotation"},
-        Refusal{"Stretched", with("[1, 0, 0]", "[2, 0, 0]"), "no rotation"},
-        Refusal{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
-        Refusal{"UnknownCurve", with("\"linear\"", "\"log\""),
-                "\"transfer\" must be sRGB or linear"},
-        Refusal{"LongShutter", with("0.25", "2.5"), "0..1"},
-        Refusal{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
+    testing::Values(RefusedCamera{"Empty", "", "empty"},
+                    RefusedCamera{"NotJson", "width = 3", "not JSON"},
+                    RefusedCamera{"Missing", with("\"fx\"", "\"gx\""), "key \"fx\" is missing"},
+                    RefusedCamera{"ZeroFocalLength", with("1180.0", "0"),
+                                  "\"fx\" = 0 must be greater than 0"},
+                    RefusedCamera{"WordForNumber", with("406.3", "\"middle\""),
+                                  "\"cx\" must be a finite number"},
+                    RefusedCamera{"NoPixels", with("800", "0"), "\"width\""},
+                    RefusedCamera{"HalfPixels", with("800", "800.5"), "\"width\""},
+                    RefusedCamera{"ShortDistortion", with("-0.24, ", ""), "list of 5"},
+                    RefusedCamera{"Mirrored", with("[0, -1, 0]", "[0, 1, 0]"), "no rotation"},
+                    RefusedCamera{"Stretched", with("[1, 0, 0]", "[2, 0, 0]"), "no rotation"},
+                    RefusedCamera{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
+                    RefusedCamera{"UnknownCurve", with("\"linear\"", "\"log\""),
+                                  "\"transfer\" must be sRGB or linear"},
+                    RefusedCamera{"LongShutter", with("0.25", "2.5"), "0..1"},
+                    RefusedCamera{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
     [](const auto& instance) { return instance.param.name; });
 
 // The rendered recordings print truth with five digits after the point in pixels; metres with

@@ -97,12 +97,12 @@ TEST(FitFile, WithACovarianceThatDoesNotFitItsNamesIsRefused) {
   EXPECT_EQ(folder.entries(), 0);
 }
 
-struct Refusal {
+struct RefusedFit {
   const char* name;
   std::string text;
   const char* reason;
 };
-class FitRefusal : public testing::TestWithParam<Refusal> {};
+class FitRefusal : public testing::TestWithParam<RefusedFit> {};
 
 TEST_P(FitRefusal, NamesFileAndReason) {
   const TestFolder folder;
@@ -116,32 +116,33 @@ const std::string kBegin = R"({"trochoid_fit": 1, "model": "top", "outcome": "co
 INSTANTIATE_TEST_SUITE_P(
     Files, FitRefusal,
     testing::Values(
-        Refusal{"Empty", "", "empty"}, Refusal{"List", "[1]", "JSON object"},
-        Refusal{"Truncated", "{\"model\":\n \"top\"", ":2: not JSON"},
-        Refusal{"NoVersion", "{}", "trochoid_fit"},
-        Refusal{"FutureVersion", R"({"trochoid_fit": 2})", "version 2"},
-        Refusal{"NoParameters", kBegin + "\"dof\": 1}", "\"parameters\" is missing"},
-        Refusal{"ParametersNoList", kBegin + R"("parameters": {}})", "must be a list"},
-        Refusal{"NamelessParameter", kBegin + R"("parameters": [{"value": 1}]})", "no name"},
-        Refusal{"WordValue", kBegin + R"("parameters": [{"name": "a", "value": "x"}]})",
-                "\"parameters\"[0]: \"value\" must be a number"},
-        Refusal{"OddStatus", kBegin + R"("parameters": [{"name": "a", "status": "x"}]})",
-                "\"status\" must be free, fixed, derived or prior"},
-        Refusal{"OddVerdict", kBegin + R"("parameters": [], "verdict": "x"})",
-                "\"verdict\" must be good, good_correlated, weak"},
-        Refusal{"OddOutcome",
-                R"({"trochoid_fit": 1, "model": "top", "outcome": "x", "parameters": []})",
-                "\"outcome\" must be converged, no_convergence"},
-        Refusal{
+        RefusedFit{"Empty", "", "empty"}, RefusedFit{"List", "[1]", "JSON object"},
+        RefusedFit{"Truncated", "{\"model\":\n \"top\"", ":2: not JSON"},
+        RefusedFit{"NoVersion", "{}", "trochoid_fit"},
+        RefusedFit{"FutureVersion", R"({"trochoid_fit": 2})", "version 2"},
+        RefusedFit{"NoParameters", kBegin + "\"dof\": 1}", "\"parameters\" is missing"},
+        RefusedFit{"ParametersNoList", kBegin + R"("parameters": {}})", "must be a list"},
+        RefusedFit{"NamelessParameter", kBegin + R"("parameters": [{"value": 1}]})", "no name"},
+        RefusedFit{"WordValue", kBegin + R"("parameters": [{"name": "a", "value": "x"}]})",
+                   "\"parameters\"[0]: \"value\" must be a number"},
+        RefusedFit{"OddStatus", kBegin + R"("parameters": [{"name": "a", "status": "x"}]})",
+                   "\"status\" must be free, fixed, derived or prior"},
+        RefusedFit{"OddVerdict", kBegin + R"("parameters": [], "verdict": "x"})",
+                   "\"verdict\" must be good, good_correlated, weak"},
+        RefusedFit{"OddOutcome",
+                   R"({"trochoid_fit": 1, "model": "top", "outcome": "x", "parameters": []})",
+                   "\"outcome\" must be converged, no_convergence"},
+        RefusedFit{
             "RaggedCovariance",
             kBegin +
                 R"("parameters": [], "covariance_names": ["a","b"], "covariance": [[1,2],[3]]})",
             "square"},
-        Refusal{"HugeWhole", kBegin + R"("parameters": [], "dof": 99999999999})", "whole number"},
-        Refusal{"NegativeSeed", kBegin + R"("parameters": [], "seed": -1})", ">= 0"},
-        Refusal{"HugeNumber", kBegin + R"("parameters": [], "chi2": 1e999})", "out of range"},
-        Refusal{"BrokenUtf8", "{\"model\": \"\xff\"}", "not JSON"},
-        Refusal{"DeepNesting", std::string(100000, '['), "not JSON"}),
+        RefusedFit{"HugeWhole", kBegin + R"("parameters": [], "dof": 99999999999})",
+                   "whole number"},
+        RefusedFit{"NegativeSeed", kBegin + R"("parameters": [], "seed": -1})", ">= 0"},
+        RefusedFit{"HugeNumber", kBegin + R"("parameters": [], "chi2": 1e999})", "out of range"},
+        RefusedFit{"BrokenUtf8", "{\"model\": \"\xff\"}", "not JSON"},
+        RefusedFit{"DeepNesting", std::string(100000, '['), "not JSON"}),
     [](const auto& instance) { return instance.param.name; });
 
 }  // namespace

@@ -70,7 +70,7 @@ Body ring() {
   return body;
 }
 
-Body disc() {
+Body thick_disc() {
   Body body;
   body.radius_m = 0.04;
   body.thickness_m = 0.009;
@@ -122,7 +122,7 @@ void expect_edges_separate_surfaces(const Body& body, const Camera& camera) {
 }
 
 TEST(Outline, SeparatesBodyFromFloorForADiscUnderAnObliqueDistortedCamera) {
-  expect_edges_separate_surfaces(disc(), oblique_camera());
+  expect_edges_separate_surfaces(thick_disc(), oblique_camera());
 }
 TEST(Outline, SeparatesBodyFromFloorForARingUnderAnObliqueDistortedCamera) {
   expect_edges_separate_surfaces(ring(), oblique_camera());
@@ -159,7 +159,7 @@ void expect_silhouette_is_complete(const Body& body, const Camera& camera) {
 }
 
 TEST(Outline, MissesNoPartOfTheSilhouetteOfADisc) {
-  expect_silhouette_is_complete(disc(), oblique_camera());
+  expect_silhouette_is_complete(thick_disc(), oblique_camera());
 }
 TEST(Outline, MissesNoPartOfTheSilhouetteOfARing) {
   expect_silhouette_is_complete(ring(), oblique_camera());
@@ -177,7 +177,7 @@ constexpr double kChordShare = 1e-3;
 
 TEST(Outline, OfAFlatDiscSeenFromAboveIsOneCircle) {
   const Camera camera = Camera::from_scale(400, 300, 1000.0);
-  const auto outline = visible_outline(disc(), pose_at(0.0, 0.3, disc()), camera);
+  const auto outline = visible_outline(thick_disc(), pose_at(0.0, 0.3, thick_disc()), camera);
   EXPECT_NEAR(length_px(outline, Edge::upper_rim), 2.0 * kPi * 40.0,
               2.0 * kPi * 40.0 * kChordShare);
   EXPECT_EQ(length_px(outline, Edge::lower_rim), 0.0);
@@ -187,7 +187,7 @@ TEST(Outline, OfAFlatDiscSeenFromAboveIsOneCircle) {
 
 TEST(Outline, OfADiscOnEdgeSeenFromAboveIsARectangle) {
   const Camera camera = Camera::from_scale(400, 300, 1000.0);
-  const auto outline = visible_outline(disc(), pose_at(kPi / 2, 0.3, disc()), camera);
+  const auto outline = visible_outline(thick_disc(), pose_at(kPi / 2, 0.3, thick_disc()), camera);
   EXPECT_NEAR(length_px(outline, Edge::upper_rim), 80.0, 0.1);
   EXPECT_NEAR(length_px(outline, Edge::lower_rim), 80.0, 0.1);
   EXPECT_NEAR(length_px(outline, Edge::side_wall), 18.0, 1e-9);
@@ -195,11 +195,11 @@ TEST(Outline, OfADiscOnEdgeSeenFromAboveIsARectangle) {
 
 TEST(Outline, OfATiltedDiscUnderAnOrthographicCameraIsPointSymmetric) {
   const Camera camera = Camera::from_scale(400, 300, 1000.0);
-  const Pose<> pose = pose_at(1.0, 0.7, disc());
+  const Pose<> pose = pose_at(1.0, 0.7, thick_disc());
   const Eigen::Vector2d centre = camera.image_from_table<double>(pose.centre_m);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double weight = 0.0;
-  for (const auto& p : visible_outline(disc(), pose, camera, 0.5)) {
+  for (const auto& p : visible_outline(thick_disc(), pose, camera, 0.5)) {
     if (!p.silhouette) continue;
     sum += p.arc_px * p.image_px;
     weight += p.arc_px;
@@ -221,10 +221,10 @@ TEST(Outline, DoesNotDependOnWhichFaceTheAxisPointsOutOf) {
 }
 
 TEST(Outline, OfABodyBehindTheCameraIsEmpty) {
-  Pose<> pose = pose_at(0.4, 0.0, disc());
+  Pose<> pose = pose_at(0.4, 0.0, thick_disc());
   pose.centre_m.z() = 2.0;
-  EXPECT_TRUE(visible_outline(disc(), pose, oblique_camera()).empty());
-  EXPECT_TRUE(wireframe(disc(), pose, oblique_camera()).empty());
+  EXPECT_TRUE(visible_outline(thick_disc(), pose, oblique_camera()).empty());
+  EXPECT_TRUE(wireframe(thick_disc(), pose, oblique_camera()).empty());
 }
 
 TEST(Outline, OfAShapelessTopIsRefusedByName) {
@@ -239,8 +239,8 @@ TEST(Outline, OfAShapelessTopIsRefusedByName) {
 }
 
 TEST(Wireframe, HidesExactlyTheFarRimOfADiscSeenFromStraightAbove) {
-  const auto curves =
-      wireframe(disc(), pose_at(0.0, 0.0, disc()), Camera::from_scale(400, 300, 1000.0));
+  const auto curves = wireframe(thick_disc(), pose_at(0.0, 0.0, thick_disc()),
+                                Camera::from_scale(400, 300, 1000.0));
   ASSERT_EQ(curves.size(), 2u);
   EXPECT_THAT(curves[0].hidden, testing::Each(false));
   EXPECT_THAT(curves[1].hidden, testing::Each(true));

@@ -1,4 +1,5 @@
 #include "trochoid/fitting/compare.hpp"
+#include "common.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -174,14 +175,6 @@ TEST(Compare, LeavesOutWhatComesBeforeTheRelease) {
   EXPECT_NEAR(fitted.find("spin_down_dry_rad_s2")->value, 0.8,
               4.0 * fitted.find("spin_down_dry_rad_s2")->sigma);
   EXPECT_THAT(fitted.warnings, testing::Contains(testing::HasSubstr("begins at rest")));
-}
-
-data::Scene top() {
-  data::Scene scene;
-  scene.support.kind = data::SupportKind::pivot;
-  scene.support.pivot_m = Eigen::Vector3d::Zero();
-  scene.model.name = "top";
-  return scene;
 }
 
 TEST(Compare, SaysWhetherATopNeedsDrag) {

@@ -59,7 +59,7 @@ class Bent : public model::Predictor {
   }
 };
 
-constexpr int kSamples = 12;
+constexpr int kPoints = 12;
 
 // Measured as (across, 0), a sigma more or less: the minimum is at (across, across^2).
 data::Track track_of(int samples, double sigma, double across) {
@@ -74,9 +74,9 @@ data::Track track_of(int samples, double sigma, double across) {
   return track;
 }
 
-Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
-  const data::Track track = track_of(kSamples, sigma, across);
-  return make_problem(bent, {make_arc(track, 0, kSamples, {}, false)}, {});
+Problem bent_problem(const Bent& bent, double sigma, double across = 1.0) {
+  const data::Track track = track_of(kPoints, sigma, across);
+  return make_problem(bent, {make_arc(track, 0, kPoints, {}, false)}, {});
 }
 
 // Straight steps are as short as the valley is narrow: the steps a minimiser has by default would
@@ -84,7 +84,7 @@ Problem problem_of(const Bent& bent, double sigma, double across = 1.0) {
 TEST(Minimise, FollowsABentValleyToItsEnd) {
   constexpr double kSigma = 1.0, kRows = 24.0;
   const Bent bent(300.0);
-  const Problem problem = problem_of(bent, kSigma);
+  const Problem problem = bent_problem(bent, kSigma);
   const Eigen::Vector2d far(-3.0, 9.0);
   const Solution found = minimise(problem, far);
   EXPECT_NEAR(found.u[0], 1.0, 0.01 * kSigma);
@@ -95,7 +95,7 @@ TEST(Minimise, FollowsABentValleyToItsEnd) {
 
 TEST(Minimise, StaysWhereNothingIsToBeGained) {
   const Bent bent(300.0);
-  const Solution solution = minimise(problem_of(bent, 1.0), Eigen::Vector2d(1.0, 1.0));
+  const Solution solution = minimise(bent_problem(bent, 1.0), Eigen::Vector2d(1.0, 1.0));
   EXPECT_TRUE(solution.usable && solution.converged);
   EXPECT_EQ(bent.derivatives(), 1);
 }
@@ -105,7 +105,7 @@ TEST(Minimise, StaysWhereNothingIsToBeGained) {
 TEST(Minimise, ReachesTheEndAlsoWhereRunsWithDerivativesAreABitOff) {
   for (const double error : {0.02, -0.02}) {
     const Bent rough(300.0, error);
-    const Solution found = minimise(problem_of(rough, 1.0), Eigen::Vector2d(-3.0, 9.0));
+    const Solution found = minimise(bent_problem(rough, 1.0), Eigen::Vector2d(-3.0, 9.0));
     EXPECT_TRUE(found.converged);
     EXPECT_NEAR(found.u[0], 1.0, std::abs(error));
     EXPECT_NEAR(found.u[1], 1.0, 2.0 * std::abs(error));
@@ -114,7 +114,7 @@ TEST(Minimise, ReachesTheEndAlsoWhereRunsWithDerivativesAreABitOff) {
 
 TEST(Minimise, HeedsWhatIsKnownBeforehand) {
   const Bent bent(1.0);
-  Problem problem = problem_of(bent, 1.0);
+  Problem problem = bent_problem(bent, 1.0);
   constexpr double kKnown = 3.0, kSigma = 0.1;
   problem.free[0].prior = data::Prior{kKnown, kSigma};
   const Solution solution = minimise(problem, Eigen::Vector2d(0.0, 0.0));
@@ -128,11 +128,11 @@ TEST(Minimise, HeedsWhatIsKnownBeforehand) {
 // loss has that half only where it came out as nothing, or as less than its error.
 TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
   constexpr double kSigma = 1.0, kNothing = 1e-6;
-  const double s = kSigma / std::sqrt(kSamples);
+  const double s = kSigma / std::sqrt(kPoints);
   for (const double loss : {kNothing, 0.1 * s}) {
     Bent bent(10.0);
     bent.make_the_first_a_loss(10.0);
-    const Problem problem = problem_of(bent, kSigma, loss);
+    const Problem problem = bent_problem(bent, kSigma, loss);
     const Eigen::Vector2d minimum(std::log(loss), loss * loss);
     const Eigen::MatrixXd covariance = uncertainty(problem, minimum).covariance;
     // A dozen samples know their own scatter to a fifth, and error bars allow for that.
@@ -148,10 +148,10 @@ TEST(Bend, IsInTheErrorBarsBesideALossThatIsNotThere) {
 // for 9 parameters, the others 8.8.
 TEST(Bend, OfALossThatIsHardlySeenIsInTheErrorBars) {
   constexpr double kSigma = 1.0, kNothing = 1e-6, kGiven = 1.0;
-  const double s = kSigma / std::sqrt(kSamples);
+  const double s = kSigma / std::sqrt(kPoints);
   Bent bent(10.0);
   bent.make_the_first_a_loss(kGiven);
-  const Problem problem = problem_of(bent, kSigma, kNothing);
+  const Problem problem = bent_problem(bent, kSigma, kNothing);
   const Uncertainty error = uncertainty(problem, Eigen::Vector2d(std::log(kNothing), 0.0));
   EXPECT_FALSE(error.identifiable[0]);
   constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
@@ -164,10 +164,10 @@ TEST(Bend, OfALossThatIsHardlySeenIsInTheErrorBars) {
 TEST(Bend, OfManyTimesTheValleysWidthIsInTheErrorBars) {
   constexpr double kSigma = 1.0, kSteepness = 300.0;
   const Bent bent(kSteepness);
-  const Problem problem = problem_of(bent, kSigma, 0.0);
+  const Problem problem = bent_problem(bent, kSigma, 0.0);
   const Eigen::MatrixXd covariance = uncertainty(problem, Eigen::Vector2d::Zero()).covariance;
   constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
-  const double bend = std::sqrt(3.0) * kSigma * kSigma / kSamples;
+  const double bend = std::sqrt(3.0) * kSigma * kSigma / kPoints;
   EXPECT_NEAR(std::sqrt(covariance(1, 1)), bend, 2.0 * kFew * bend);
 }
 
@@ -217,7 +217,7 @@ class Saddle : public model::Predictor {
 // Nothing seen but noise of no mean over the samples of either parameter.
 Problem noise_about(const Saddle& saddle, double sigma, const data::Scene& scene = {}) {
   data::Track track;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kPoints; ++i) {
     data::TrackSample sample;
     sample.t_s = 0.1 * i;
     const double signs[] = {1.0, 1.0, -1.0, -1.0};
@@ -225,7 +225,7 @@ Problem noise_about(const Saddle& saddle, double sigma, const data::Scene& scene
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma * sigma;
     track.samples.push_back(sample);
   }
-  return make_problem(saddle, {make_arc(track, 0, kSamples, {}, false)}, scene);
+  return make_problem(saddle, {make_arc(track, 0, kPoints, {}, false)}, scene);
 }
 
 // The mean square of a product of two independent errors is that of their mean squares, also if
@@ -233,7 +233,7 @@ Problem noise_about(const Saddle& saddle, double sigma, const data::Scene& scene
 TEST(Bend, OfTwoParametersTogetherIsInTheErrorBarOfAThird) {
   constexpr double kSigma = 0.5, kNothing = 1e-6;
   constexpr double kFew = 0.2;  // a dozen samples know their own scatter to a fifth
-  const double left = kSigma / std::sqrt(kSamples / 2), right = 2.0 * left;
+  const double left = kSigma / std::sqrt(kPoints / 2), right = 2.0 * left;
   for (const bool limited : {false, true}) {
     Saddle saddle;
     data::Scene scene;

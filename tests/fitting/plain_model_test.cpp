@@ -48,17 +48,17 @@ class Sum : public model::Predictor {
   }
 };
 
-constexpr double kSigma_m = 1e-3, kStep_s = 0.1;
-constexpr int kSamples = 20;
+constexpr double kScatter_m = 1e-3, kRow_s = 0.1;
+constexpr int kSumRows = 20;
 
-Problem problem_of(const Sum& sum, int samples = kSamples) {
+Problem problem_of(const Sum& sum, int samples = kSumRows) {
   data::Track track;
   for (int i = 0; i < samples; ++i) {
     data::TrackSample sample;
-    sample.t_s = kStep_s * i;
-    const double noise = i % 2 == 0 ? kSigma_m : -kSigma_m;
+    sample.t_s = kRow_s * i;
+    const double noise = i % 2 == 0 ? kScatter_m : -kScatter_m;
     sample.centre_m = Eigen::Vector2d(1.0 + noise, 0.5 * sample.t_s - noise);
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kScatter_m * kScatter_m;
     track.samples.push_back(sample);
   }
   return make_problem(sum, {make_arc(track, 0, samples, {}, false)}, {});
@@ -95,10 +95,10 @@ TEST(Windows, LeaveASampleOutThatAloneIsFarOff) {
   const Sum sum;
   Problem problem = problem_of(sum, kMany);
   for (Reading& reading : problem.arcs[0].readings)
-    if (reading.sample == kWrong) reading.value.x() += 100.0 * kSigma_m;
+    if (reading.sample == kWrong) reading.value.x() += 100.0 * kScatter_m;
   const Found found = grow(problem, {"given", {{"slope_m_s", 0.4}}}, 24);
   EXPECT_TRUE(found.passed) << found.reduced_chi2;
-  EXPECT_THAT(found.strays_s, testing::ElementsAre(kStep_s * kWrong));
+  EXPECT_THAT(found.strays_s, testing::ElementsAre(kRow_s * kWrong));
   // Where every sample is right none is left out.
   const Found all = grow(problem_of(sum, kMany), {"given", {{"slope_m_s", 0.4}}}, 24);
   EXPECT_TRUE(all.passed) << all.reduced_chi2;

@@ -16,7 +16,8 @@
 namespace trochoid::fitting {
 namespace {
 
-constexpr double kFriction = 0.2, kGravity_m_s2 = 9.81, kSigma_m = 5e-5, kStep_s = 1.0 / 240;
+constexpr double kFriction = 0.2, kGravity_m_s2 = 9.81, kPuckSigma_m = 5e-5,
+                 kPuckFrame_s = 1.0 / 240;
 
 data::Scene puck_scene() {
   data::Scene scene;
@@ -37,8 +38,8 @@ class Throw {
   Throw& slide(const Eigen::Vector2d& velocity_m_s, double duration_s) {
     const double deceleration = friction_ * kGravity_m_s2, speed = velocity_m_s.norm();
     const Eigen::Vector2d from = at_;
-    for (int i = 1; i <= std::lround(duration_s / kStep_s); ++i) {
-      const double t = kStep_s * i;
+    for (int i = 1; i <= std::lround(duration_s / kPuckFrame_s); ++i) {
+      const double t = kPuckFrame_s * i;
       const double moving = std::min(t, speed > 0.0 ? speed / deceleration : 0.0);
       if (speed > 0.0)
         at_ = from + velocity_m_s / speed * (speed * moving - 0.5 * deceleration * moving * moving);
@@ -53,8 +54,8 @@ class Throw {
   // A hand speeds it up.
   Throw& push(const Eigen::Vector2d& acceleration_m_s2, double duration_s) {
     const Eigen::Vector2d from = at_;
-    for (int i = 1; i <= std::lround(duration_s / kStep_s); ++i) {
-      const double t = kStep_s * i;
+    for (int i = 1; i <= std::lround(duration_s / kPuckFrame_s); ++i) {
+      const double t = kPuckFrame_s * i;
       at_ = from + 0.5 * acceleration_m_s2 * t * t;
       add();
     }
@@ -65,14 +66,14 @@ class Throw {
  private:
   void add() {
     data::TrackSample sample;
-    sample.t_s = kStep_s * static_cast<double>(track_.samples.size());
+    sample.t_s = kPuckFrame_s * static_cast<double>(track_.samples.size());
     sample.centre_m = at_ + Eigen::Vector2d(normal_(generator_), normal_(generator_));
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPuckSigma_m * kPuckSigma_m;
     track_.samples.push_back(sample);
   }
   double friction_ = kFriction;
   std::mt19937_64 generator_;
-  std::normal_distribution<double> normal_{0.0, kSigma_m};
+  std::normal_distribution<double> normal_{0.0, kPuckSigma_m};
   Eigen::Vector2d at_ = Eigen::Vector2d::Zero();
   data::Track track_;
 };
@@ -84,7 +85,7 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
   ASSERT_TRUE(fit.converged) << fit.reason;
   ASSERT_EQ(fit.arcs.size(), 2u);
   // The cut itself may lie a frame or two early, and a sample on either side of it is left out.
-  constexpr double kFewFrames_s = 4.0 * kStep_s;
+  constexpr double kFewFrames_s = 4.0 * kPuckFrame_s;
   EXPECT_NEAR(fit.arcs[0].from_s, 0.2, kFewFrames_s);
   EXPECT_NEAR(fit.arcs[0].to_s, 0.5, kFewFrames_s);
   EXPECT_NEAR(fit.arcs[1].from_s, 0.5, kFewFrames_s);
@@ -99,7 +100,7 @@ TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
   thrown.slide({0.0, 0.0}, 0.2).slide({1.0, 0.3}, 0.3).slide({-0.2, 0.5}, 0.6);
   data::Track track = thrown.track();
   constexpr double kOff = 5.0;  // sigma; of more of them, or farther ones, another stretch is made
-  for (std::size_t i = 114; i < 117; ++i) track.samples[i].centre_m.y() += kOff * kSigma_m;
+  for (std::size_t i = 114; i < 117; ++i) track.samples[i].centre_m.y() += kOff * kPuckSigma_m;
   const data::Fit fit = fitting::fit(std::span(&track, 1), puck_scene());
   ASSERT_EQ(fit.arcs.size(), 2u);
   EXPECT_THAT(fit.warnings,
@@ -161,7 +162,7 @@ TEST(PuckFit, KeepsItsPromiseWithFewSamples) {
   scene.fit.fixed["w3_rad_s"] = 0.0;  // known not to turn
   for (int i = 0; i < kDraws; ++i) {
     Throw thrown(1000 + i);
-    thrown.slide({1.0, 0.3}, 8.0 * kStep_s);
+    thrown.slide({1.0, 0.3}, 8.0 * kPuckFrame_s);
     const data::Fit fit = fitting::fit(std::span(&thrown.track(), 1), scene);
     const data::FitParameter* friction = fit.find("friction");
     if (friction == nullptr) continue;
@@ -202,7 +203,7 @@ struct Turning {
       values.insert({name, at});
     const auto predictor = model::make_predictor(scene);
     std::vector<double> t_s;
-    for (int i = 0; i <= samples; ++i) t_s.push_back(i * kStep_s);
+    for (int i = 0; i <= samples; ++i) t_s.push_back(i * kPuckFrame_s);
     model::PredictRequest request;
     request.t_s = t_s;
     request.observables.push_back(model::Observable::psi_rad);
@@ -212,10 +213,10 @@ struct Turning {
     for (int i = 0; i < samples; ++i) {
       const Eigen::Vector3d at = run.segment<3>(3 * i);
       data::TrackSample sample;
-      sample.t_s = kStep_s * static_cast<double>(track.samples.size());
+      sample.t_s = kPuckFrame_s * static_cast<double>(track.samples.size());
       sample.centre_m =
-          at.head<2>() + kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
-      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+          at.head<2>() + kPuckSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+      sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPuckSigma_m * kPuckSigma_m;
       sample.psi = data::MeasuredAngle{at[2] + 0.02 * normal(generator), 0.02};
       track.samples.push_back(sample);
     }

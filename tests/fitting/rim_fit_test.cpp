@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "choose/softness.hpp"
+#include "common.hpp"
 #include "judge/draft.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -69,12 +70,6 @@ Case noisy(const std::string& name, double until_s, double sigma_m, std::size_t 
   return made;
 }
 
-double pull(const data::Fit& fit, const std::string& name, double truth) {
-  const data::FitParameter* parameter = fit.find(name);
-  if (parameter == nullptr) return INFINITY;
-  return std::abs(parameter->value - truth) / parameter->sigma;
-}
-
 // Planted in s08 and s10 alike.
 std::map<std::string, double> losses_of_the_sliding_disc() {
   return {{"air_linear_N_m_s[1]", 1e-6},
@@ -82,9 +77,6 @@ std::map<std::string, double> losses_of_the_sliding_disc() {
           {"rolling_friction_m", 5e-5},
           {"pivoting_friction_m", 3e-4}};
 }
-
-// 4 sigma of a few numbers: once in some thousand seeds.
-constexpr double kFar = 4.0;
 
 TEST(RimFit, FindsARollingDiscFromItsPathAlone) {
   const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
@@ -729,7 +721,7 @@ Fallen fallen_disc(double theta_rad, double w2_rad_s, double w3_rad_s, double ro
   return made;
 }
 
-data::Fit fit_of(const Fallen& made) {
+data::Fit fit_fallen(const Fallen& made) {
   data::Scene scene = made.scene;
   scene.start = {};
   scene.model.rolling_friction_m = 1e-4;
@@ -737,7 +729,7 @@ data::Fit fit_of(const Fallen& made) {
 }
 
 TEST(FlatEnd, IsPartOfTheTrack) {
-  const data::Fit fit = fit_of(fallen_disc(0.6, 18.0, 1.5, 1e-3, 5.0, 9));
+  const data::Fit fit = fit_fallen(fallen_disc(0.6, 18.0, 1.5, 1e-3, 5.0, 9));
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_EQ(fit.verdict, data::FitVerdict::good);
   EXPECT_LT(pull(fit, "rolling_friction_m", 1e-3), kFar);
@@ -753,7 +745,7 @@ TEST(FlatEnd, TheDipInWhichItCameToLieIsFound) {
                           fallen_disc(0.77, 25.3, -1.0, 1.85e-3, 1.9, 504),
                           fallen_disc(0.75, 25.5, -1.5, 1.57e-3, 2.9, 528)};
   for (const Fallen& disc : discs) {
-    const data::Fit fit = fit_of(disc);
+    const data::Fit fit = fit_fallen(disc);
     ASSERT_TRUE(fit.converged) << fit.reason;
     EXPECT_THAT(name(fit.verdict), testing::StartsWith("good")) << fit.verdict_words;
     EXPECT_LT(fit.chi2 / fit.dof, 1.2);
@@ -779,7 +771,7 @@ TEST(FlatEnd, ItsErrorBarsHoldTheTruth) {
     const double w2_rad_s = std::sqrt(4.0 * 9.81 / 0.0375 * std::sin(theta_rad));
     const double w3_rad_s = -1.5 + 3.0 * uniform(generator);
     const double friction_m = 1e-3 * (1.0 + 0.6 * uniform(generator));
-    const data::Fit fit = fit_of(
+    const data::Fit fit = fit_fallen(
         fallen_disc(theta_rad, w2_rad_s, w3_rad_s, friction_m, 3.0 + uniform(generator), draw));
     ASSERT_TRUE(fit.converged) << draw << ": " << fit.reason;
     EXPECT_LT(fit.chi2 / fit.dof, 1.2) << draw;

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -22,18 +23,8 @@ namespace trochoid::fitting {
 namespace {
 
 data::Scene top_with_drag() {
-  data::Scene scene;
-  scene.support.kind = data::SupportKind::pivot;
-  scene.support.pivot_m = Eigen::Vector3d::Zero();
-  scene.model.name = "top";
+  data::Scene scene = top();
   scene.model.drag_transverse_N_m_s = scene.model.drag_spin_N_m_s = 1e-6;
-  return scene;
-}
-
-data::Scene top() {
-  data::Scene scene = top_with_drag();
-  scene.model.drag_transverse_N_m_s.reset();
-  scene.model.drag_spin_N_m_s.reset();
   return scene;
 }
 

@@ -14,7 +14,7 @@
 namespace trochoid::fitting {
 namespace {
 
-constexpr double kFriction = 0.3;
+constexpr double kSlidingFriction = 0.3;
 
 data::Scene sliding_disc() {
   data::Scene scene;
@@ -24,7 +24,7 @@ data::Scene sliding_disc() {
   body.thickness_m = 0.005;
   body.mass_kg = 0.06;
   scene.model.name = "sliding";
-  scene.model.friction = kFriction;
+  scene.model.friction = kSlidingFriction;
   return scene;
 }
 
@@ -95,7 +95,7 @@ TEST(RimStarts, OneOfASlidingBodySlipsAsItDoes) {
            std::abs(std::remainder(off("phi_rad"), 2.0 * std::numbers::pi)) <= kHalfTwelfth &&
            its.norm() > 0.5 * slip.norm() && its.norm() < 2.0 * slip.norm() &&
            its.dot(slip) > 0.9 * its.norm() * slip.norm() && start.values.contains("friction") &&
-           std::abs(start.values.at("friction") / kFriction - 1.0) < 0.3;
+           std::abs(start.values.at("friction") / kSlidingFriction - 1.0) < 0.3;
   };
   EXPECT_TRUE(std::any_of(starts.begin(), starts.end(), is_it));
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "common.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -13,9 +14,9 @@
 namespace trochoid::fitting {
 namespace {
 
-constexpr double kSigma_m = 1e-4, kSigma_rad = 2e-3, kFrame_s = 1.0 / 60.0;
+constexpr double kFrameSigma_m = 1e-4, kSigma_rad = 2e-3, kFrame_s = 1.0 / 60.0;
 constexpr double kRows = 1080.0, kScale_px_per_m = 5000.0;
-constexpr int kSamples = 240;
+constexpr int kFrames = 240;
 constexpr double kA_1_s2 = 20.0, kB_1_s = 9.0, kL_m = 0.1;
 
 data::Scene scene() {
@@ -27,12 +28,12 @@ data::Scene scene() {
   return scene;
 }
 
-struct Seen {
+struct TopSeen {
   double x_m, y_m, phi_rad;
 };
 
 // A nutating top at any instant after the first tenth of a second.
-Seen top_at(double t_s) {
+TopSeen top_at(double t_s) {
   static const auto predictor = model::make_predictor(scene());
   static const Eigen::VectorXd values = [] {
     Eigen::VectorXd v(predictor->parameters().size());
@@ -63,17 +64,17 @@ data::Track filmed(double readout_s, double delay_s, bool angles) {
   std::mt19937_64 generator(5);
   std::normal_distribution<double> normal;
   data::Track track;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kFrames; ++i) {
     const double stamp_s = i * kFrame_s;
     double taken_s = stamp_s;  // at the row it is then seen in
     for (int round = 0; round < 20; ++round)
       taken_s = stamp_s + readout_s * row_of(top_at(taken_s).y_m) / (kRows - 1.0);
-    const Seen seen = top_at(taken_s);
+    const TopSeen seen = top_at(taken_s);
     data::TrackSample sample;
     sample.t_s = stamp_s;
-    sample.centre_m = {seen.x_m + kSigma_m * normal(generator),
-                       seen.y_m + kSigma_m * normal(generator)};
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    sample.centre_m = {seen.x_m + kFrameSigma_m * normal(generator),
+                       seen.y_m + kFrameSigma_m * normal(generator)};
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kFrameSigma_m * kFrameSigma_m;
     sample.centre_px = {0.0, row_of(seen.y_m)};
     if (angles)
       sample.phi = {top_at(taken_s + delay_s).phi_rad + kSigma_rad * normal(generator), kSigma_rad};
@@ -81,19 +82,6 @@ data::Track filmed(double readout_s, double delay_s, bool angles) {
   }
   return track;
 }
-
-data::Fit fit_of(const data::Track& track, const data::Scene& with) {
-  return fit(std::span(&track, 1), with);
-}
-
-double pull(const data::Fit& fit, const std::string& name, double truth) {
-  const data::FitParameter* parameter = fit.find(name);
-  if (parameter == nullptr) return INFINITY;
-  return std::abs(parameter->value - truth) / parameter->sigma;
-}
-
-// 4 sigma of a few numbers: once in some thousand seeds.
-constexpr double kFar = 4.0;
 
 TEST(Timing, FindsTheReadoutOfARollingShutter) {
   constexpr double kReadout_s = 0.012;

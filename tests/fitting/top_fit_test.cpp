@@ -5,6 +5,7 @@
 #include <map>
 #include <random>
 
+#include "common.hpp"
 #include "problem/prepare.hpp"
 #include "start/strategy.hpp"
 #include "trochoid/data/error.hpp"
@@ -79,13 +80,6 @@ data::Track track_of(const Planted& planted) {
 data::Fit fit_one(const data::Track& track, const data::Scene& scene = top_scene(),
                   const FitOptions& options = {}) {
   return fit(std::span(&track, 1), scene, options);
-}
-
-// Deviation from the truth in the fit's own sigmas.
-double pull(const data::Fit& result, const std::string& name, double truth) {
-  const data::FitParameter* parameter = result.find(name);
-  if (parameter == nullptr) return INFINITY;
-  return std::abs(parameter->value - truth) / parameter->sigma;
 }
 
 TEST(TopFit, FindsTheThesisCaseWithoutAGuess) {
@@ -322,9 +316,6 @@ TEST(TopFit, AdmitsThatSteadyPrecessionHidesTheTop) {
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("no nutation")));
   EXPECT_TRUE(fit_one(track_of({})).find("l_m")->identifiable);
 }
-
-// 4 sigma of a few numbers: once in some thousand seeds.
-constexpr double kFar = 4.0;
 
 // Nutation of a tenth of a millimetre at thirty turns a second, in twice that noise: no integral
 // over the path sees it, its line in the spectrum does.

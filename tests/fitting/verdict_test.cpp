@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "common.hpp"
 #include "judge/adequacy.hpp"
 #include "problem/prepare.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -17,17 +18,9 @@
 namespace trochoid::fitting {
 namespace {
 
-constexpr double kSigma_m = 2e-4;
-constexpr int kSamples = 180;
+constexpr double kUsualSigma_m = 2e-4;
+constexpr int kUsualSamples = 180;
 constexpr double kRate_Hz = 60.0;
-
-data::Scene top() {
-  data::Scene scene;
-  scene.model.name = "top";
-  scene.support.kind = data::SupportKind::pivot;
-  scene.support.pivot_m = Eigen::Vector3d::Zero();
-  return scene;
-}
 
 data::Scene rolling_disc() {
   data::Scene scene;
@@ -49,7 +42,7 @@ Noise white(double sigma_m, std::uint64_t seed) {
   };
 }
 
-data::Track track_of(const Path& path, Noise noise, int samples = kSamples) {
+data::Track track_of(const Path& path, Noise noise, int samples = kUsualSamples) {
   data::Track track;
   for (int i = 0; i < samples; ++i) {
     data::TrackSample sample;
@@ -57,14 +50,10 @@ data::Track track_of(const Path& path, Noise noise, int samples = kSamples) {
     sample.centre_m = path(sample.t_s);
     sample.centre_m.x() += noise();
     sample.centre_m.y() += noise();
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kUsualSigma_m * kUsualSigma_m;
     track.samples.push_back(sample);
   }
   return track;
-}
-
-data::Fit fit_of(const data::Track& track, const data::Scene& scene) {
-  return fit(std::span(&track, 1), scene);
 }
 
 const std::map<std::string, double> kNutating{
@@ -72,7 +61,7 @@ const std::map<std::string, double> kNutating{
 
 // A nutating top, 2.5 nutations in the three seconds.
 Path nutating_top(const std::map<std::string, double>& given = kNutating,
-                  const data::Scene& scene = top(), int samples = kSamples) {
+                  const data::Scene& scene = top(), int samples = kUsualSamples) {
   const auto predictor = model::make_predictor(scene);
   const Eigen::VectorXd values = values_with(*predictor, given);
   std::vector<double> t_s;
@@ -86,13 +75,13 @@ Path nutating_top(const std::map<std::string, double>& given = kNutating,
 }
 
 TEST(Verdict, IsGoodForATopInWhiteNoise) {
-  const data::Fit fit = fit_of(track_of(nutating_top(), white(kSigma_m, 1)), top());
+  const data::Fit fit = fit_of(track_of(nutating_top(), white(kUsualSigma_m, 1)), top());
   EXPECT_TRUE(fit.converged);
   EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
 }
 
 TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
-  Noise noise = [white = white(0.5 * kSigma_m, 2), x = 0.0, y = 0.0]() mutable {
+  Noise noise = [white = white(0.5 * kUsualSigma_m, 2), x = 0.0, y = 0.0]() mutable {
     std::swap(x, y);  // two coordinates, each with a memory of ten samples
     return x = 0.9 * x + white();
   };
@@ -107,9 +96,9 @@ TEST(Verdict, NamesCorrelatedResidualsAndWhatTheyCost) {
 TEST(Verdict, DoesNotTakeAWobbleForNoise) {
   const auto wobbling = [path = nutating_top()](double t) -> Eigen::Vector2d {
     const double phase = 2.0 * M_PI * kRate_Hz * t / 7.0;
-    return path(t) + 0.9 * kSigma_m * Eigen::Vector2d(std::cos(phase), std::sin(phase));
+    return path(t) + 0.9 * kUsualSigma_m * Eigen::Vector2d(std::cos(phase), std::sin(phase));
   };
-  const data::Fit fit = fit_of(track_of(wobbling, white(kSigma_m, 7)), top());
+  const data::Fit fit = fit_of(track_of(wobbling, white(kUsualSigma_m, 7)), top());
   EXPECT_TRUE(fit.converged);
   EXPECT_LT(fit.whiteness_p, 1e-3);
   EXPECT_EQ(fit.verdict, data::FitVerdict::good_correlated) << fit.verdict_words;
@@ -125,7 +114,7 @@ TEST(Verdict, IsDoubtfulWhereHalvesOfTheRecordAskForOtherParameters) {
   auto truth = kNutating;
   truth["gamma3_quadratic"] = 0.004;
   const data::Track track =
-      track_of(nutating_top(truth, quadratic, kLong), white(kSigma_m, 13), kLong);
+      track_of(nutating_top(truth, quadratic, kLong), white(kUsualSigma_m, 13), kLong);
   const data::Fit right = fit_of(track, quadratic), wrong = fit_of(track, linear);
   EXPECT_EQ(right.verdict, data::FitVerdict::good) << right.verdict_words;
   EXPECT_LT(wrong.noise_scale, 1.5);
@@ -136,9 +125,10 @@ TEST(Verdict, IsDoubtfulWhereHalvesOfTheRecordAskForOtherParameters) {
 // Residuals of three times the noise, whose sigmas somebody stated: followed, but not explained.
 TEST(Verdict, IsDoubtfulWhereTheModelLeavesSeveralTimesTheNoise) {
   const auto drifting = [path = nutating_top()](double t) -> Eigen::Vector2d {
-    return path(t) + 5.0 * kSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
+    return path(t) +
+           5.0 * kUsualSigma_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
   };
-  const data::Fit fit = fit_of(track_of(drifting, white(kSigma_m, 8)), top());
+  const data::Fit fit = fit_of(track_of(drifting, white(kUsualSigma_m, 8)), top());
   EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("does not explain it"));
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("times their noise"));
@@ -177,10 +167,10 @@ TEST(Verdict, IsUnexplainedWhereACutShortSearchLeavesMoreThanTheNoise) {
     const auto drifting = [path = nutating_top(), drift_m](double t) -> Eigen::Vector2d {
       return path(t) + drift_m * Eigen::Vector2d(std::cos(9.7 * t), std::cos(11.3 * t + 1.0));
     };
-    return verdict_at(track_of(drifting, white(kSigma_m, 8)), kNutating, cut_short);
+    return verdict_at(track_of(drifting, white(kUsualSigma_m, 8)), kNutating, cut_short);
   };
-  EXPECT_EQ(verdict(2.0 * kSigma_m, true), data::FitVerdict::unexplained);
-  EXPECT_EQ(verdict(2.0 * kSigma_m, false), data::FitVerdict::good);
+  EXPECT_EQ(verdict(2.0 * kUsualSigma_m, true), data::FitVerdict::unexplained);
+  EXPECT_EQ(verdict(2.0 * kUsualSigma_m, false), data::FitVerdict::good);
   EXPECT_EQ(verdict(0.0, true), data::FitVerdict::good);
 }
 
@@ -194,13 +184,13 @@ Path pushed(double from_s) {
 }
 
 TEST(Verdict, IsUnexplainedWhereTheModelGivesUpAPartOfThePath) {
-  const data::Fit fit = fit_of(track_of(pushed(2.4), white(kSigma_m, 10)), top());
+  const data::Fit fit = fit_of(track_of(pushed(2.4), white(kUsualSigma_m, 10)), top());
   EXPECT_EQ(fit.verdict, data::FitVerdict::unexplained) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("left out of the fit"));
 }
 
 TEST(Verdict, IsDoubtfulWhereTheModelGivesUpAFewPositionsOfThePath) {
-  const data::Fit fit = fit_of(track_of(pushed(2.75), white(kSigma_m, 10)), top());
+  const data::Fit fit = fit_of(track_of(pushed(2.75), white(kUsualSigma_m, 10)), top());
   EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
 }
 
@@ -209,13 +199,13 @@ TEST(Verdict, IsGoodForASimulatedTrackWithoutNoise) {
   data::Track track = track_of(nutating_top(), [] { return 0.0; });
   for (data::TrackSample& sample : track.samples) sample.covariance_m2.setConstant(NAN);
   std::set<int> many;
-  for (int i = 0; i < kSamples; i += 4) many.insert(i);
+  for (int i = 0; i < kUsualSamples; i += 4) many.insert(i);
   EXPECT_EQ(verdict_at(track, kNutating, false, many), data::FitVerdict::good);
 }
 
 // Of a short track one or two are soon a tenth.
 TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
-  data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 12));
   std::vector<data::TrackSample> few;
   for (std::size_t i = 0; i < track.samples.size(); i += 10) few.push_back(track.samples[i]);
   track.samples = few;
@@ -227,7 +217,7 @@ TEST(Verdict, StandsWhereOneOrTwoPositionsAreGivenUp) {
 data::Fit with_samples_off(int from, int to) {
   std::set<int> off;
   for (int i = from; i < to; ++i) off.insert(i);
-  const data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  const data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 12));
   return fit_at(track, kNutating, false, off, kStandsOut);
 }
 
@@ -237,7 +227,7 @@ TEST(Verdict, IsDoubtfulWhereTheModelMissesWhereTheRecordBeginsOrEnds) {
   EXPECT_EQ(first.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(first.verdict_words, testing::HasSubstr("12 of the 12 first positions"));
   EXPECT_THAT(first.verdict_words, testing::HasSubstr("the state given for 0 s"));
-  const data::Fit last = with_samples_off(kSamples - 12, kSamples);
+  const data::Fit last = with_samples_off(kUsualSamples - 12, kUsualSamples);
   EXPECT_EQ(last.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(last.verdict_words, testing::HasSubstr("12 of the 12 last positions"));
   EXPECT_EQ(with_samples_off(90, 102).verdict, data::FitVerdict::good);
@@ -247,7 +237,7 @@ TEST(Verdict, IsDoubtfulWhereTheModelMissesWhereTheRecordBeginsOrEnds) {
 TEST(Verdict, IsDoubtfulWhereHalfOfTheFirstPositionsAreMissed) {
   std::set<int> every_other;
   for (int i = 0; i < 20; i += 2) every_other.insert(i);
-  const data::Track track = track_of(nutating_top(), white(kSigma_m, 12));
+  const data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 12));
   EXPECT_EQ(fit_at(track, kNutating, false, every_other, kStandsOut).verdict,
             data::FitVerdict::doubtful);
 }
@@ -262,7 +252,7 @@ TEST(Verdict, StandsAndIsRemarkedOnWhereATrackerMayHaveMissedTheFirstFewPosition
 
 // Glitches anywhere in the picture are the tracker's, however many.
 TEST(Verdict, IsGoodWhereTheTrackerTookOtherThingsForTheBody) {
-  data::Track track = track_of(nutating_top(), white(kSigma_m, 11));
+  data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 11));
   for (std::size_t i = 5; i < track.samples.size(); i += 8)
     track.samples[i].centre_m = Eigen::Vector2d(0.3, -0.2 + 0.002 * static_cast<double>(i % 7));
   const data::Fit fit = fit_of(track, top());
@@ -274,7 +264,7 @@ TEST(Verdict, IsGoodWhereTheTrackerTookOtherThingsForTheBody) {
 TEST(Verdict, DoesNotTakeMotionBetweenTooFewFramesForNoise) {
   const std::map<std::string, double> fast{
       {"a_1_s2", 2000.0}, {"b_1_s", 164.0}, {"l_m", 0.1}, {"theta_rad", 0.8}};
-  const data::Track track = track_of(nutating_top(fast), white(kSigma_m, 9));
+  const data::Track track = track_of(nutating_top(fast), white(kUsualSigma_m, 9));
   const auto verdict = [&](const std::map<std::string, double>& found) {
     return verdict_at(track, found, false);
   };
@@ -286,7 +276,7 @@ TEST(Verdict, DoesNotTakeMotionBetweenTooFewFramesForNoise) {
 
 TEST(Verdict, FindsNothingOfATopInAStraightLine) {
   const auto line = [](double t) { return Eigen::Vector2d(0.05 * t, 0.01 - 0.02 * t); };
-  const data::Fit fit = fit_of(track_of(line, white(kSigma_m, 3)), top());
+  const data::Fit fit = fit_of(track_of(line, white(kUsualSigma_m, 3)), top());
   EXPECT_FALSE(fit.converged);
   EXPECT_EQ(fit.outcome, data::FitOutcome::not_identifiable);
   EXPECT_EQ(fit.verdict, data::FitVerdict::no_feature);
@@ -296,7 +286,7 @@ TEST(Verdict, FindsNothingOfATopInAStraightLine) {
 // Without a trace of noise, and so of what its size could be compared with.
 TEST(Verdict, FindsNothingInABodyThatStandsStill) {
   data::Track track;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kUsualSamples; ++i) {
     data::TrackSample sample;
     sample.t_s = i / kRate_Hz;
     sample.centre_m = Eigen::Vector2d(0.1, 0.2);
@@ -309,7 +299,7 @@ TEST(Verdict, FindsNothingInABodyThatStandsStill) {
 
 TEST(Verdict, FindsNothingInWhiteNoise) {
   const auto nowhere = [](double) { return Eigen::Vector2d(0.0, 0.0); };
-  const data::Track track = track_of(nowhere, white(kSigma_m, 4));
+  const data::Track track = track_of(nowhere, white(kUsualSigma_m, 4));
   for (const data::Scene& scene : {top(), rolling_disc()}) {
     const data::Fit fit = fit_of(track, scene);
     EXPECT_FALSE(fit.converged) << fit.model;
@@ -322,7 +312,7 @@ TEST(Verdict, DoesNotTakeAFigureOfAnotherOriginForAMotionItKnows) {
     return Eigen::Vector2d(0.03 * std::cos(2.0 * t) + 0.01 * std::cos(5.0 * t + 1.0),
                            0.02 * std::sin(3.0 * t));
   };
-  const data::Track track = track_of(figure, white(kSigma_m, 5));
+  const data::Track track = track_of(figure, white(kUsualSigma_m, 5));
   for (const data::Scene& scene : {top(), rolling_disc()}) {
     const data::Fit fit = fit_of(track, scene);
     EXPECT_FALSE(fit.converged) << fit.model;
@@ -334,7 +324,7 @@ TEST(Verdict, IsWeakWhereParametersAreNotDetermined) {
   const auto circle = [](double t) {
     return Eigen::Vector2d(0.03 * std::cos(2.0 * t), 0.03 * std::sin(2.0 * t));
   };
-  const data::Fit fit = fit_of(track_of(circle, white(kSigma_m, 6)), top());
+  const data::Fit fit = fit_of(track_of(circle, white(kUsualSigma_m, 6)), top());
   EXPECT_EQ(fit.verdict, data::FitVerdict::weak) << fit.verdict_words;
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("not determined: a_1_s2"));
 }

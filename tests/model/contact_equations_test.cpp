@@ -20,10 +20,10 @@ constexpr double kFileDigits = 1e-11;
 // Rates of the angles are some ten times as large.
 constexpr double kRateDigits = 10.0 * kFileDigits;
 
-struct Reference {
+struct KnownMotion {
   data::Scene scene;
   data::Table table;
-  explicit Reference(const std::string& name)
+  explicit KnownMotion(const std::string& name)
       : scene(data::read_reference_case(path(name, ".json")).scene),
         table(data::read_table(path(name, ".csv"))) {}
   static std::string path(const std::string& name, const char* ending) {
@@ -47,7 +47,7 @@ RimBody body_of(const data::Scene& scene) {
 }
 
 template <int N>
-State<double, N> state_of(const Reference& file, Eigen::Index row) {
+State<double, N> state_of(const KnownMotion& file, Eigen::Index row) {
   static constexpr const char* kNames[] = {"phi", "theta", "psi", "w1", "w2", "w3", "x", "y"};
   State<double, N> y;
   for (int i = 0; i < 8; ++i) y[i] = file.at(row, kNames[i]);
@@ -55,7 +55,7 @@ State<double, N> state_of(const Reference& file, Eigen::Index row) {
 }
 
 /// State of a sliding body: the files give the velocity of the centre.
-State<double, 10> sliding_state(const Reference& file, const RimBody& body, Eigen::Index row) {
+State<double, 10> sliding_state(const KnownMotion& file, const RimBody& body, Eigen::Index row) {
   auto y = state_of<10>(file, row);
   const World<double> v{file.at(row, "vx"), file.at(row, "vy")};
   const auto node = node_from_world(v, y[Rim::phi]);
@@ -65,7 +65,7 @@ State<double, 10> sliding_state(const Reference& file, const RimBody& body, Eige
 }
 
 template <class System>
-void expect_forces(const Reference& file, Eigen::Index row, const System& system,
+void expect_forces(const KnownMotion& file, Eigen::Index row, const System& system,
                    const ContactForce<double>& force, const NodeMotion<double>& q) {
   const double phi = file.at(row, "phi");
   const double fx = force.along_n * std::cos(phi) - force.along_mh * std::sin(phi);
@@ -78,7 +78,7 @@ void expect_forces(const Reference& file, Eigen::Index row, const System& system
 }
 
 template <class System>
-void check_rolling(const Reference& file, const System& system) {
+void check_rolling(const KnownMotion& file, const System& system) {
   for (Eigen::Index row = 0; row < file.table.values.rows(); ++row) {
     const auto y = state_of<8>(file, row);
     const auto q = system.motion(y);
@@ -96,17 +96,17 @@ void check_rolling(const Reference& file, const System& system) {
 }
 
 TEST(RollingEquations, GiveTheReferenceForcesOfADisc) {
-  const Reference file("s06_roll_disc");
+  const KnownMotion file("s06_roll_disc");
   check_rolling(file, Rolling<double>{body_of(file.scene), {}});
 }
 
 TEST(RollingEquations, GiveTheReferenceForcesOfAThinHoop) {
-  const Reference file("s07_roll_hoop_thin");
+  const KnownMotion file("s07_roll_hoop_thin");
   check_rolling(file, Rolling<double>{body_of(file.scene), {}});
 }
 
 TEST(RollingEquations, GiveTheReferenceForcesOfARingInAir) {
-  const Reference file("s09_ring_retrograde_drag");
+  const KnownMotion file("s09_ring_retrograde_drag");
   Rolling<double, LinearAir> system{body_of(file.scene), {}};
   const auto& c = *file.scene.model.air_linear_N_m_s;
   system.losses.c1 = c[0];
@@ -138,7 +138,7 @@ auto force_at(const System& system, const NodeMotion<double>& q) {
 }
 
 TEST(SmoothEquations, GiveTheReferenceForces) {
-  const Reference file("s05_smooth_disc");
+  const KnownMotion file("s05_smooth_disc");
   const Sliding<double, NoFriction> system{body_of(file.scene), {}, {}};
   for (Eigen::Index row = 0; row < file.table.values.rows(); ++row) {
     const auto q = system.motion(sliding_state(file, system.body, row));
@@ -147,7 +147,7 @@ TEST(SmoothEquations, GiveTheReferenceForces) {
 }
 
 TEST(SlidingEquations, GiveTheReferenceForcesWithCouplesAndAir) {
-  const Reference file("s08_slide_disc");
+  const KnownMotion file("s08_slide_disc");
   Sliding<double, Coulomb, LinearAir, RollingFriction, PivotingFriction> system;
   system.body = body_of(file.scene);
   const auto& model = file.scene.model;
@@ -223,7 +223,7 @@ void fill_losses(System& system) {
 }
 
 TEST(PowerBalance, HoldsForARollingBodyWithEveryLoss) {
-  const Reference file("s06_roll_disc");
+  const KnownMotion file("s06_roll_disc");
   Rolling<double, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
           ContourFriction>
       system;
@@ -233,7 +233,7 @@ TEST(PowerBalance, HoldsForARollingBodyWithEveryLoss) {
 }
 
 TEST(PowerBalance, HoldsForASlidingBodyWithEveryLoss) {
-  const Reference file("s08_slide_disc");
+  const KnownMotion file("s08_slide_disc");
   Sliding<double, Coulomb, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
           PivotingFriction, ContourFriction>
       system;

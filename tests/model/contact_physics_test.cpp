@@ -3,6 +3,8 @@
 #include <cmath>
 #include <random>
 
+#include "common.hpp"
+#include "reference_cases.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/model/simulate.hpp"
@@ -12,23 +14,12 @@
 namespace trochoid::model {
 namespace {
 
-data::Scene reference_scene(const std::string& name) {
-  return data::read_reference_case(std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name +
-                                   ".json")
-      .scene;
-}
-Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
-  for (std::size_t c = 0; c < run.columns.size(); ++c)
-    if (run.columns[c] == name) return run.values.col(static_cast<Eigen::Index>(c));
-  ADD_FAILURE() << "no column " << name;
-  return Eigen::VectorXd::Zero(run.values.rows());
-}
 double largest_difference(const Trajectory& a, const Trajectory& b, const std::string& name) {
   return (column(a, name) - column(b, name)).cwiseAbs().maxCoeff();
 }
 
 /// A disc of the given thickness on the floor, 37.5 mm radius, 60 g.
-data::Scene disc(double thickness_m) {
+data::Scene disc_scene(double thickness_m) {
   data::Scene scene;
   scene.body.emplace();
   scene.body->radius_m = 0.0375;
@@ -93,7 +84,7 @@ TEST(ContactLimits, AMotionDoesNotKnowWhichFaceIsUp) {
 TEST(ContactClosedForms, ASkiddingDiscRollsAtTwoThirdsOfItsSpeed) {
   constexpr double kSpeed_m_s = 1e-6, kTime_s = 1e-6;  // threshold of sticking, and over mu g
   for (const bool hoop : {false, true}) {
-    data::Scene scene = disc(0.0);
+    data::Scene scene = disc_scene(0.0);
     if (hoop) {
       scene.body->kind = data::BodyKind::ring;
       scene.body->inner_radius_m = scene.body->radius_m;
@@ -123,7 +114,7 @@ double tilt_after(data::Scene scene, double w2, double w3) {
 // W^2 = 4 g / 5 R and 2 g / 3 R, for bodies without thickness. A small tilt then stays small.
 TEST(ContactClosedForms, UprightMotionsAreStableAboveTheirThresholds) {
   for (const bool hoop : {false, true}) {
-    data::Scene scene = disc(0.0);
+    data::Scene scene = disc_scene(0.0);
     scene.model.name = "rolling";
     if (hoop) {
       scene.body->kind = data::BodyKind::ring;
@@ -192,7 +183,7 @@ TEST(ContactInvariants, ConservativeRunsKeepThem) {
 
 /// A nearly flat spinning disc with one loss, at rest in its centre.
 data::Scene falling(double tilt_rad) {
-  data::Scene scene = disc(0.0);
+  data::Scene scene = disc_scene(0.0);
   scene.model.name = "rolling";
   scene.start.theta_rad = tilt_rad;
   const double s = std::sin(tilt_rad);
@@ -254,7 +245,7 @@ TEST(LastStage, EndsByNameWithinItsLastTenMilliseconds) {
 // Thin disc, slip across the node line towards the contact: no force fits once
 // mu > (tan + 5 / tan)/4 of the tilt, least at tan^2 = 5, where it is 1.118.
 TEST(Painleve, IsNamedWhereNoContactForceExists) {
-  data::Scene scene = disc(0.0);
+  data::Scene scene = disc_scene(0.0);
   scene.model.name = "sliding";
   scene.start.theta_rad = std::atan(std::sqrt(5.0));
   scene.start.vx_m_s = 0.0;
@@ -290,7 +281,7 @@ TEST(AnyStart, EndsByNameAndNeverGainsEnergy) {
   std::mt19937 draw(kSeed);
   std::uniform_real_distribution<double> u(0.0, 1.0);
   for (int i = 0; i < 150; ++i) {
-    data::Scene scene = disc(u(draw) < 0.3 ? 0.0 : 0.02 * u(draw));
+    data::Scene scene = disc_scene(u(draw) < 0.3 ? 0.0 : 0.02 * u(draw));
     const char* const laws[] = {"smooth", "rolling", "sliding"};
     scene.model.name = laws[i % 3];
     scene.model.friction = 0.05 + 1.2 * u(draw);

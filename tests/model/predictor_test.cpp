@@ -10,7 +10,7 @@
 namespace trochoid::model {
 namespace {
 
-constexpr const char* kDisc =
+constexpr const char* kDiscLines =
     "[body]\nradius_m = 0.04\nthickness_m = 0.004\nmass_kg = 0.1\n"
     "[start]\ntheta_rad = 0.9\nw2_rad_s = 20\nw3_rad_s = 5\nx_m = 0.3\ny_m = -0.1\n";
 constexpr const char* kPuck =
@@ -22,13 +22,13 @@ constexpr const char* kTop =
     "[body]\nkind = 'top'\nmass_kg = 0.1\nI_kg_m2 = 1e-4\nIs_kg_m2 = 1.5e-4\nl_m = 0.03\n"
     "[start]\ntheta_rad = 0.6\nomega_s_rad_s = 60\n";
 
-struct Case {
+struct BadScene {
   const char* model;
   const char* scene;
   const char* terms;
 };
 
-class EveryPredictor : public testing::TestWithParam<Case> {
+class EveryPredictor : public testing::TestWithParam<BadScene> {
  protected:
   EveryPredictor()
       : predictor_(
@@ -65,11 +65,12 @@ TEST_P(EveryPredictor, KeepsToTheLimitOfSteps) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, EveryPredictor,
-                         testing::Values(Case{"top", kTop, ""}, Case{"top-euler", kTop, ""},
-                                         Case{"smooth", kDisc, ""}, Case{"rolling", kDisc, ""},
-                                         Case{"sliding", kDisc, "friction = 0.2\n"},
-                                         Case{"puck", kPuck, "friction = 0.02\n"},
-                                         Case{"pivot", kPinned, "spin_down_dry_rad_s2 = 2\n"}),
+                         testing::Values(BadScene{"top", kTop, ""}, BadScene{"top-euler", kTop, ""},
+                                         BadScene{"smooth", kDiscLines, ""},
+                                         BadScene{"rolling", kDiscLines, ""},
+                                         BadScene{"sliding", kDiscLines, "friction = 0.2\n"},
+                                         BadScene{"puck", kPuck, "friction = 0.02\n"},
+                                         BadScene{"pivot", kPinned, "spin_down_dry_rad_s2 = 2\n"}),
                          [](const auto& instance) {
                            std::string name = instance.param.model;
                            std::erase(name, '-');

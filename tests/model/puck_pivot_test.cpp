@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "common.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "trochoid/model/puck.hpp"
@@ -95,13 +96,6 @@ data::Scene puck_scene() {
   return scene;
 }
 
-double column(const Trajectory& run, Eigen::Index row, const std::string& name) {
-  for (std::size_t c = 0; c < run.columns.size(); ++c)
-    if (run.columns[c] == name) return run.values(row, static_cast<Eigen::Index>(c));
-  ADD_FAILURE() << "no column " << name;
-  return NAN;
-}
-
 // At 1e-9 of its first speed a puck counts as at rest: what is left would take less than that [s].
 constexpr double kRest_s = 1e-8;
 constexpr double kPath_m = 1e-11;    // tolerance 1e-12, of some dozen steps
@@ -120,9 +114,9 @@ TEST(Puck, StopsLikeABlockWhenItDoesNotSpin) {
   for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
     const double t = std::min(0.01 * static_cast<double>(n), rest_s);
     const double s = t - 0.5 * a * t * t;
-    EXPECT_NEAR(column(run, n, "x_m"), 0.1 + 0.8 * s, kPath_m);
-    EXPECT_NEAR(column(run, n, "y_m"), -0.05 + 0.6 * s, kPath_m);
-    EXPECT_EQ(column(run, n, "psi_rad"), 0.3);
+    EXPECT_NEAR(column(run, "x_m")[n], 0.1 + 0.8 * s, kPath_m);
+    EXPECT_NEAR(column(run, "y_m")[n], -0.05 + 0.6 * s, kPath_m);
+    EXPECT_EQ(column(run, "psi_rad")[n], 0.3);
   }
 }
 
@@ -140,8 +134,8 @@ TEST(Puck, SpinsDownUniformlyInPlace) {
   const Trajectory run = simulate(scene);
   const double a = 0.2 * 9.81 * 4.0 / (3.0 * 0.03), rest_s = 30.0 / a;
   EXPECT_NEAR(run.events.at(0).t_s, rest_s, kRest_s);
-  EXPECT_NEAR(column(run, 100, "psi_rad"), 0.3 - 450.0 / a, kAngle_rad);
-  EXPECT_EQ(column(run, 100, "x_m"), 0.1);
+  EXPECT_NEAR(column(run, "psi_rad")[100], 0.3 - 450.0 / a, kAngle_rad);
+  EXPECT_EQ(column(run, "x_m")[100], 0.1);
 }
 
 // The uniform disc comes to rest in both motions at once, with e -> 0.653 [Farkas2003].
@@ -213,7 +207,7 @@ TEST(Puck, StaysWhereItIsWhenItStartsAtRest) {
   const Trajectory run = simulate(scene);
   EXPECT_EQ(run.outcome, Outcome::at_rest);
   EXPECT_EQ(run.values.rows(), 101);
-  EXPECT_EQ(column(run, 100, "x_m"), 0.1);
+  EXPECT_EQ(column(run, "x_m")[100], 0.1);
 }
 
 data::Scene pivot_scene() {
@@ -244,7 +238,7 @@ TEST(Pivot, FollowsTheClosedFormUntilItStops) {
            t2;
   };
   for (Eigen::Index n = 0; n < run.values.rows(); ++n)
-    EXPECT_NEAR(column(run, n, "psi_rad"), angle(std::min(0.1 * static_cast<double>(n), rest_s)),
+    EXPECT_NEAR(column(run, "psi_rad")[n], angle(std::min(0.1 * static_cast<double>(n), rest_s)),
                 kPivot_rad);
 }
 
@@ -255,7 +249,7 @@ TEST(Pivot, StopsDryInTheParabolasTime) {
   const Trajectory run = simulate(scene);
   constexpr double kExact = 1e-12;  // a parabola is exact for the method: rounding is left
   EXPECT_NEAR(run.events.at(0).t_s, 10.0, kExact);
-  EXPECT_NEAR(column(run, 200, "psi_rad"), -200.0, 1000.0 * kExact);
+  EXPECT_NEAR(column(run, "psi_rad")[200], -200.0, 1000.0 * kExact);
 }
 
 TEST(Pivot, NeverStopsWithoutDryFriction) {
@@ -263,7 +257,7 @@ TEST(Pivot, NeverStopsWithoutDryFriction) {
   scene.model.spin_down_viscous_1_s = 2.0;
   const Trajectory run = simulate(scene);
   EXPECT_EQ(run.outcome, Outcome::reached_end);
-  EXPECT_NEAR(column(run, 200, "psi_rad"), 20.0, 10.0 * kPivot_rad);  // as it creeps to its limit
+  EXPECT_NEAR(column(run, "psi_rad")[200], 20.0, 10.0 * kPivot_rad);  // as it creeps to its limit
 }
 
 // The pendulum's period for an amplitude A is 4 K(sin(A/2))/omega; a body of known mass tells its
@@ -284,9 +278,9 @@ TEST(Pivot, SwingsLikeAPendulumWithAWeightBesideItsAxis) {
   const Trajectory run = simulate(scene);
   EXPECT_EQ(run.outcome, Outcome::reached_end);
   for (Eigen::Index n = 0; n < run.values.rows(); ++n) {
-    EXPECT_NEAR(column(run, n, "psi_rad"), n % 2 == 0 ? kAmplitude_rad : -kAmplitude_rad,
+    EXPECT_NEAR(column(run, "psi_rad")[n], n % 2 == 0 ? kAmplitude_rad : -kAmplitude_rad,
                 kPivot_rad);
-    EXPECT_NEAR(column(run, n, "energy_J") / column(run, 0, "energy_J"), 1.0, kEnergy);
+    EXPECT_NEAR(column(run, "energy_J")[n] / column(run, "energy_J")[0], 1.0, kEnergy);
   }
 }
 
@@ -314,7 +308,7 @@ TEST(Pivot, StopsWhereDryFrictionHoldsTheWeight) {
     at = near;
   }
   constexpr double kSwings = 10.0;  // each hands its error on to the next
-  EXPECT_NEAR(column(run, run.values.rows() - 1, "psi_rad"), at, kSwings * kPivot_rad);
+  EXPECT_NEAR(column(run, "psi_rad")[run.values.rows() - 1], at, kSwings * kPivot_rad);
 }
 
 // dw/dt = -d/(1 + k w): w + k w^2/2 falls linearly in time.
@@ -328,7 +322,7 @@ TEST(Pivot, WeakensWithSpeedAsItsLawSays) {
   constexpr double kStop_s = 1e-8;  // a hundred local errors, of a stop within ten seconds
   EXPECT_NEAR(run.events.at(0).t_s, whole / kDry, kStop_s);
   for (const Eigen::Index n : {20, 60, 90}) {
-    const double w = column(run, n, "w3_rad_s");
+    const double w = column(run, "w3_rad_s")[n];
     const double expected = whole - kDry * 0.1 * static_cast<double>(n);
     EXPECT_NEAR(w + 0.5 * k * w * w, expected, 10.0 * kPivot_rad);  // rates of up to 80 rad/s
   }

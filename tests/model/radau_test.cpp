@@ -16,7 +16,7 @@
 namespace trochoid::model {
 namespace {
 
-constexpr double kRounding = 1e-14;  // of a few dozen operations on numbers of order 1
+constexpr double kRoundingOfSums = 1e-14;  // of a few dozen operations on numbers of order 1
 
 /// v' = -k (v - sin a t) + a cos a t, (IV.15.1) of [HairerWanner1996], and the way it makes:
 /// v = sin a t + v(0) exp(-k t),  x = (1 - cos a t)/a + v(0) (1 - exp(-k t))/k.
@@ -63,16 +63,16 @@ TEST(RadauCoefficients, TransformTheCollocationMethodOfTheirNodes) {
   for (int q = 1; q <= 5; ++q) {
     double sum = 0.0;
     for (int j = 0; j < 3; ++j) sum += method(2, j) * std::pow(c[j], q - 1);
-    EXPECT_NEAR(sum, 1.0 / q, kRounding) << "order " << q;
+    EXPECT_NEAR(sum, 1.0 / q, kRoundingOfSums) << "order " << q;
   }
   Eigen::Matrix3d forth, back;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) forth(i, j) = radau::kT[i][j], back(i, j) = radau::kInverseT[i][j];
-  EXPECT_LT((forth * back - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), kRounding);
+  EXPECT_LT((forth * back - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), kRoundingOfSums);
   Eigen::Matrix3d blocks = Eigen::Matrix3d::Zero();
   blocks(0, 0) = radau::kReal;
   blocks.bottomRightCorner<2, 2>() << radau::kRe, -radau::kIm, radau::kIm, radau::kRe;
-  constexpr double kInverted = 10.0 * kRounding;  // the method's condition costs a digit
+  constexpr double kInverted = 10.0 * kRoundingOfSums;  // the method's condition costs a digit
   EXPECT_LT((back * method.inverse() * forth - blocks).cwiseAbs().maxCoeff(), kInverted);
 }
 
@@ -85,7 +85,7 @@ TEST(SmallLu, SolvesRealAndComplexSystemsThatNeedPivots) {
   lu.solve(side);
   const double b[3] = {3.0, -1.0, 2.0};
   for (int i = 0; i < 3; ++i)
-    EXPECT_NEAR(real[i][0] * x[0] + real[i][1] * x[1] + real[i][2] * x[2], b[i], kRounding);
+    EXPECT_NEAR(real[i][0] * x[0] + real[i][1] * x[1] + real[i][2] * x[2], b[i], kRoundingOfSums);
 
   const Complex complex[2][2] = {{{0.0, 0.0}, {1.0, 2.0}}, {{2.0, -1.0}, {0.5, 0.0}}};
   SmallLu<Complex, 2> wide;
@@ -98,7 +98,7 @@ TEST(SmallLu, SolvesRealAndComplexSystemsThatNeedPivots) {
     for (int j = 0; j < 2; ++j)
       sum += std::complex(complex[i][j].re, complex[i][j].im) * std::complex(re[j], im[j]);
     EXPECT_LT(std::abs(sum - (i == 0 ? std::complex(1.0, 0.0) : std::complex(0.0, 3.0))),
-              kRounding);
+              kRoundingOfSums);
   }
 
   const double singular[2][2] = {{1.0, 2.0}, {2.0, 4.0}};
@@ -154,7 +154,7 @@ TEST(Radau, DifferentiatesAsExactlyAsItIntegrates) {
   plain.start(0.0, {{start, 0.0}});
   while (plain.t_s() < end_s) ASSERT_EQ(plain.step(end_s), StepEnd::accepted);
   EXPECT_EQ(plain.counts().steps, stepper.counts().steps);
-  EXPECT_NEAR(plain.y()[0], v.value, kRounding);
+  EXPECT_NEAR(plain.y()[0], v.value, kRoundingOfSums);
 }
 
 TEST(Radau, StopsOnAnEvent) {

@@ -14,11 +14,17 @@ struct Reference {
   [[nodiscard]] Eigen::VectorXd column(const char* name) const { return table.column(name); }
 };
 
+inline std::filesystem::path reference_path(const std::string& name, const char* ending) {
+  return std::filesystem::path(TROCHOID_SOURCE_DIR) / "data" / "reference" / (name + ending);
+}
+
+inline data::Scene reference_scene(const std::string& name) {
+  return data::read_reference_case(reference_path(name, ".json")).scene;
+}
+
 inline Reference reference(const std::string& name) {
-  const std::filesystem::path folder =
-      std::filesystem::path(TROCHOID_SOURCE_DIR) / "data" / "reference";
-  return {data::read_reference_case(folder / (name + ".json")),
-          data::read_table(folder / (name + ".csv"))};
+  return {data::read_reference_case(reference_path(name, ".json")),
+          data::read_table(reference_path(name, ".csv"))};
 }
 
 }  // namespace trochoid::model

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "common.hpp"
+#include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -15,20 +17,6 @@ namespace {
 
 constexpr Observable kEverything[] = {Observable::x_m, Observable::y_m, Observable::theta_rad,
                                       Observable::phi_rad, Observable::psi_rad};
-
-std::string reference_path(const std::string& name, const char* ending) {
-  return std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ending;
-}
-data::Scene reference_scene(const std::string& name) {
-  return data::read_reference_case(reference_path(name, ".json")).scene;
-}
-
-Eigen::VectorXd defaults(const Predictor& predictor) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(predictor.parameters().size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i)
-    values[i] = predictor.parameters()[static_cast<std::size_t>(i)].value;
-  return values;
-}
 
 struct Errors {
   double theta_rad = 0.0, phi_rad = 0.0, xy_m = 0.0;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "common.hpp"
+#include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -11,18 +13,6 @@
 namespace trochoid::model {
 namespace {
 
-std::string reference_path(const std::string& name, const char* ending) {
-  return std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ending;
-}
-data::Scene reference_scene(const std::string& name) {
-  return data::read_reference_case(reference_path(name, ".json")).scene;
-}
-Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
-  for (std::size_t c = 0; c < run.columns.size(); ++c)
-    if (run.columns[c] == name) return run.values.col(static_cast<Eigen::Index>(c));
-  ADD_FAILURE() << "no column " << name;
-  return Eigen::VectorXd::Zero(run.values.rows());
-}
 /// Runs a scene on the thinned reference's own times, which are multiples of 1/rate.
 struct Compared {
   Trajectory run;
@@ -48,11 +38,11 @@ Compared compare(const std::string& name, double tolerance = 1e-13) {
   return {simulate(scene), data::read_table(reference_path(name, ".csv"))};
 }
 
-struct Case {
+struct ReferenceBounds {
   const char* name;
   double angle, length, energy;  ///< reached, with a margin of ten
 };
-class RimReference : public testing::TestWithParam<Case> {};
+class RimReference : public testing::TestWithParam<ReferenceBounds> {};
 
 TEST_P(RimReference, IsReproducedInEveryColumn) {
   const Compared c = compare(GetParam().name);
@@ -71,11 +61,12 @@ TEST_P(RimReference, IsReproducedInEveryColumn) {
   EXPECT_LE(c.error("vx_m_s", "vx"), 1e3 * GetParam().length);
 }
 INSTANTIATE_TEST_SUITE_P(Rim, RimReference,
-                         testing::Values(Case{"s05_smooth_disc", 3e-8, 1e-10, 1e-10},
-                                         Case{"s06_roll_disc", 6e-11, 1e-11, 1e-13},
-                                         Case{"s07_roll_hoop_thin", 2e-11, 1e-11, 1e-13},
-                                         Case{"s08_slide_disc", 4e-11, 1e-11, 1e-13},
-                                         Case{"s09_ring_retrograde_drag", 3e-11, 1e-11, 1e-13}));
+                         testing::Values(ReferenceBounds{"s05_smooth_disc", 3e-8, 1e-10, 1e-10},
+                                         ReferenceBounds{"s06_roll_disc", 6e-11, 1e-11, 1e-13},
+                                         ReferenceBounds{"s07_roll_hoop_thin", 2e-11, 1e-11, 1e-13},
+                                         ReferenceBounds{"s08_slide_disc", 4e-11, 1e-11, 1e-13},
+                                         ReferenceBounds{"s09_ring_retrograde_drag", 3e-11, 1e-11,
+                                                         1e-13}));
 
 // The reference states its own uncertainty: 3.9e-5 rad, 2.7e-6 m, 4.2e-5 s.
 TEST(ExactCoulomb, FindsTheTwentyEventsOfTheReference) {

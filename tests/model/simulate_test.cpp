@@ -1,4 +1,5 @@
 #include "trochoid/model/simulate.hpp"
+#include "common.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +10,6 @@
 
 namespace trochoid::model {
 namespace {
-
-Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
-  for (std::size_t i = 0; i < run.columns.size(); ++i)
-    if (run.columns[i] == name) return run.values.col(static_cast<Eigen::Index>(i));
-  throw InputError("no column " + name);
-}
 
 /// A run of the reference's scene on its (thinned) grid.
 Trajectory rerun(Reference& expected, double tolerance, const std::string& integrator = "auto") {
@@ -33,11 +28,11 @@ double largest_difference(const Trajectory& run, const std::string& ours, const 
   return (a - b).cwiseAbs().maxCoeff();
 }
 
-struct Case {
+struct SameRun {
   const char* name;
   double angle_rad, path_m;  // the reference's own uncertainty, rounded up
 };
-class FollowsReference : public testing::TestWithParam<Case> {};
+class FollowsReference : public testing::TestWithParam<SameRun> {};
 
 TEST_P(FollowsReference, InAnglesRatesPathAndEnergy) {
   Reference expected = reference(GetParam().name);
@@ -57,11 +52,11 @@ TEST_P(FollowsReference, InAnglesRatesPathAndEnergy) {
   EXPECT_LT(largest_difference(run, "energy_J", expected, "energy"), 1e-10 * energy.maxCoeff());
 }
 INSTANTIATE_TEST_SUITE_P(Simulate, FollowsReference,
-                         testing::Values(Case{"s01_free_thesis", 1e-10, 0.0},
-                                         Case{"s02_free_symmetric", 1e-10, 0.0},
-                                         Case{"s03_top_thesis_base", 2e-10, 2e-11},
-                                         Case{"s04_top_loops", 2e-10, 2e-11},
-                                         Case{"s11_top_drag", 2e-10, 2e-11}),
+                         testing::Values(SameRun{"s01_free_thesis", 1e-10, 0.0},
+                                         SameRun{"s02_free_symmetric", 1e-10, 0.0},
+                                         SameRun{"s03_top_thesis_base", 2e-10, 2e-11},
+                                         SameRun{"s04_top_loops", 2e-10, 2e-11},
+                                         SameRun{"s11_top_drag", 2e-10, 2e-11}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 // Independent integrators through the same interface; 1e-11 asked, multistep methods deliver a few

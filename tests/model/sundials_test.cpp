@@ -12,14 +12,14 @@ namespace {
 
 // y'' = -y from (1, 0): y = cos t.
 template <class S>
-struct Oscillator {
+struct UndampedOscillator {
   using Scalar = S;
   static constexpr int kStates = 2;
   void derivative(double, const State<S, 2>& y, State<S, 2>& dy) const {
     dy[0] = y[1];
     dy[1] = -y[0];
   }
-  [[nodiscard]] Oscillator<double> values() const { return {}; }
+  [[nodiscard]] UndampedOscillator<double> values() const { return {}; }
 };
 
 SundialsOptions options(SundialsMethod method, double tolerance) {
@@ -39,8 +39,8 @@ TEST_P(EveryMethod, FollowsTheCosine) {
   const std::array<double, 3> times{0.0, 1.0, 5.0};
   const double tolerance = 1e-9;
   const SundialsRun run =
-      integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0, Eigen::Vector2d(1.0, 0.0), times,
-                         options(GetParam(), tolerance));
+      integrate_sundials(make_ode(UndampedOscillator<Dual<4>>{}), 0.0, Eigen::Vector2d(1.0, 0.0),
+                         times, options(GetParam(), tolerance));
   ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
   ASSERT_EQ(run.states.rows(), 3);
   const double allowed = kAddedUp * tolerance;
@@ -49,7 +49,7 @@ TEST_P(EveryMethod, FollowsTheCosine) {
 }
 
 TEST_P(EveryMethod, StopsAtAnEventAndNamesIt) {
-  Ode ode = make_ode(Oscillator<Dual<4>>{});
+  Ode ode = make_ode(UndampedOscillator<Dual<4>>{});
   ode.events = 2;
   ode.event_functions = [](double, const double* y, double* g) {
     g[0] = y[0] + 10.0;  // never
@@ -142,7 +142,7 @@ TEST(Sundials, NamesTheStepLimitInsteadOfGoingOnForEver) {
   SundialsOptions few = options(SundialsMethod::cvode_adams, 1e-12);
   few.max_steps = 3;
   const std::array<double, 1> times{100.0};
-  const SundialsRun run = integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0,
+  const SundialsRun run = integrate_sundials(make_ode(UndampedOscillator<Dual<4>>{}), 0.0,
                                              Eigen::Vector2d(1.0, 0.0), times, few);
   EXPECT_EQ(run.outcome, Outcome::step_limit);
   EXPECT_EQ(run.states.rows(), 0);
@@ -168,7 +168,7 @@ TEST(Sundials, RefusesTolerancesThatDoNotMatchTheStates) {
   SundialsOptions wrong = options(SundialsMethod::cvode_bdf, 1e-8);
   wrong.atol.resize(1);
   const std::array<double, 1> times{1.0};
-  EXPECT_THROW((void)integrate_sundials(make_ode(Oscillator<Dual<4>>{}), 0.0,
+  EXPECT_THROW((void)integrate_sundials(make_ode(UndampedOscillator<Dual<4>>{}), 0.0,
                                         Eigen::Vector2d(1.0, 0.0), times, wrong),
                InputError);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/simulate.hpp"
 
@@ -15,12 +16,6 @@ const std::filesystem::path kScenes =
 
 Trajectory run_scene(const std::string& name) {
   return simulate(data::read_scene(kScenes / (name + ".toml")));
-}
-
-Eigen::VectorXd column(const Trajectory& run, const std::string& name) {
-  const auto at = std::find(run.columns.begin(), run.columns.end(), name);
-  EXPECT_NE(at, run.columns.end()) << name;
-  return run.values.col(at - run.columns.begin());
 }
 
 TEST(ThesisScenes, AllRunToTheirEnd) {

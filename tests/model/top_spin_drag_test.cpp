@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common.hpp"
 #include "derivative_columns.hpp"
 #include "top_scene.hpp"
 #include "trochoid/data/error.hpp"
@@ -64,13 +65,6 @@ data::Scene scene_of(const OtherTop& top) {
   scene.start.dphi_rad_s = top.dphi_rad_s;
   scene.start.omega_s_rad_s = top.spin_rad_s;
   return scene;
-}
-
-Eigen::VectorXd defaults(const Predictor& predictor) {
-  Eigen::VectorXd values(predictor.parameters().size());
-  for (std::size_t i = 0; i < predictor.parameters().size(); ++i)
-    values[static_cast<Eigen::Index>(i)] = predictor.parameters()[i].value;
-  return values;
 }
 
 // scipy's DOP853 at 1e-12, in body axes with a quaternion; dry friction stops the one spin halfway.

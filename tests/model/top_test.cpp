@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "common.hpp"
 #include "derivative_columns.hpp"
 #include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
@@ -11,13 +12,6 @@
 
 namespace trochoid::model {
 namespace {
-
-Eigen::VectorXd defaults(const Predictor& predictor) {
-  Eigen::VectorXd values(predictor.parameters().size());
-  for (std::size_t i = 0; i < predictor.parameters().size(); ++i)
-    values[static_cast<Eigen::Index>(i)] = predictor.parameters()[i].value;
-  return values;
-}
 
 const std::vector<Observable> kAll{Observable::x_m, Observable::y_m, Observable::theta_rad,
                                    Observable::phi_rad, Observable::psi_rad};
@@ -53,28 +47,28 @@ ReferenceError compare_with(const std::string& name, double tolerance) {
 
 // The references state their own uncertainty: a few 1e-11 rad in the angles, 1e-12 of l in the
 // path; with a margin for ours.
-constexpr double kAngle_rad = 2e-10, kPath_m = 2e-11;
+constexpr double kTopAngle_rad = 2e-10, kTopPath_m = 2e-11;
 
 TEST(Top, FollowsTheReferenceOfTheThesisBaseCase) {
   const ReferenceError error = compare_with("s03_top_thesis_base", 1e-13);
-  EXPECT_LT(error.xy_m, kPath_m);
-  EXPECT_LT(error.theta_rad, kAngle_rad);
-  EXPECT_LT(error.phi_rad, kAngle_rad);
-  EXPECT_LT(error.psi_rad, kAngle_rad);
+  EXPECT_LT(error.xy_m, kTopPath_m);
+  EXPECT_LT(error.theta_rad, kTopAngle_rad);
+  EXPECT_LT(error.phi_rad, kTopAngle_rad);
+  EXPECT_LT(error.psi_rad, kTopAngle_rad);
 }
 TEST(Top, FollowsTheReferenceWithLoops) {
   const ReferenceError error = compare_with("s04_top_loops", 1e-13);
-  EXPECT_LT(error.xy_m, kPath_m);
-  EXPECT_LT(error.theta_rad, kAngle_rad);
-  EXPECT_LT(error.phi_rad, kAngle_rad);
-  EXPECT_LT(error.psi_rad, kAngle_rad);
+  EXPECT_LT(error.xy_m, kTopPath_m);
+  EXPECT_LT(error.theta_rad, kTopAngle_rad);
+  EXPECT_LT(error.phi_rad, kTopAngle_rad);
+  EXPECT_LT(error.psi_rad, kTopAngle_rad);
 }
 TEST(Top, FollowsTheReferenceWithDrag) {
   const ReferenceError error = compare_with("s11_top_drag", 1e-13);
-  EXPECT_LT(error.xy_m, kPath_m);
-  EXPECT_LT(error.theta_rad, kAngle_rad);
-  EXPECT_LT(error.phi_rad, kAngle_rad);
-  EXPECT_LT(error.psi_rad, 10.0 * kAngle_rad);  // psi turns through 800 rad
+  EXPECT_LT(error.xy_m, kTopPath_m);
+  EXPECT_LT(error.theta_rad, kTopAngle_rad);
+  EXPECT_LT(error.phi_rad, kTopAngle_rad);
+  EXPECT_LT(error.psi_rad, 10.0 * kTopAngle_rad);  // psi turns through 800 rad
 }
 
 // Quadruple-precision values at t = 60 s of the base case (order-40 Taylor series in two forms,

@@ -27,7 +27,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-constexpr int kFrames = 12, kWidth = 64, kHeight = 48;
+constexpr int kClipFrames = 12, kClipWidth = 64, kClipHeight = 48;
 
 /// A folder of this test's own that vanishes with it.
 class FrameSourceTest : public testing::Test {
@@ -48,10 +48,10 @@ class FrameSourceTest : public testing::Test {
     const fs::path path = folder_ / name;
     cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG,
                            cv::VideoWriter::fourcc(fourcc[0], fourcc[1], fourcc[2], fourcc[3]),
-                           rate_hz, cv::Size(kWidth, kHeight), true);
+                           rate_hz, cv::Size(kClipWidth, kClipHeight), true);
     EXPECT_TRUE(writer.isOpened());
-    for (int i = 0; i < kFrames; ++i)
-      writer.write(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(level(i))));
+    for (int i = 0; i < kClipFrames; ++i)
+      writer.write(cv::Mat(kClipHeight, kClipWidth, CV_8UC3, cv::Scalar::all(level(i))));
     return path;
   }
 
@@ -71,9 +71,9 @@ class FrameSourceTest : public testing::Test {
 
 TEST_F(FrameSourceTest, HandsOutEveryFrameWithItsOwnTime) {
   const auto source = open_video(write_clip("clip.mkv", "FFV1", 50.0));
-  EXPECT_EQ(source->info().width_px, kWidth);
-  EXPECT_EQ(source->info().height_px, kHeight);
-  for (int i = 0; i < kFrames; ++i) {
+  EXPECT_EQ(source->info().width_px, kClipWidth);
+  EXPECT_EQ(source->info().height_px, kClipHeight);
+  for (int i = 0; i < kClipFrames; ++i) {
     const auto frame = source->next();
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->index, i);
@@ -108,15 +108,15 @@ TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
     cv::Size size;
     cv::Point bright;  // where the stored top left corner is seen
   };
-  const cv::Size lying(kWidth, kHeight), standing(kHeight, kWidth);
+  const cv::Size lying(kClipWidth, kClipHeight), standing(kClipHeight, kClipWidth);
   const std::vector<Case> cases{
       {{1, 0, 0, 1}, lying, {5, 5}},
-      {{0, 1, -1, 0}, standing, {kHeight - 6, 5}},         // a quarter turn clockwise
-      {{-1, 0, 0, -1}, lying, {kWidth - 6, kHeight - 6}},  // upside down
-      {{0, -1, 1, 0}, standing, {5, kWidth - 6}}};         // a quarter turn back
+      {{0, 1, -1, 0}, standing, {kClipHeight - 6, 5}},             // a quarter turn clockwise
+      {{-1, 0, 0, -1}, lying, {kClipWidth - 6, kClipHeight - 6}},  // upside down
+      {{0, -1, 1, 0}, standing, {5, kClipWidth - 6}}};             // a quarter turn back
   for (const Case& c : cases) {
     const fs::path path = folder_ / "sideways.mp4";
-    cv::Mat picture(kHeight, kWidth, CV_8UC3, cv::Scalar::all(40));
+    cv::Mat picture(kClipHeight, kClipWidth, CV_8UC3, cv::Scalar::all(40));
     picture(cv::Rect(0, 0, 16, 16)).setTo(cv::Scalar::all(220));
     {
       cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG,
@@ -187,7 +187,7 @@ TEST_F(FrameSourceTest, AWindowHoldsSomeOfTheRecordingOrIsRefused) {
   EXPECT_THAT(error_of(clip, {.to = "-0.1"}), HasSubstr("to = -0.1 lies before the recording"));
   EXPECT_THAT(error_of(clip, {.from = "99"}),
               HasSubstr(fmt::format("no picture lies from = 99: frame {}, at {:g} s, is the last",
-                                    kFrames - 1, 0.1 * (kFrames - 1))));
+                                    kClipFrames - 1, 0.1 * (kClipFrames - 1))));
   EXPECT_THAT(
       error_of(clip, {.from = "f5", .to = "0.2"}),
       HasSubstr("no picture lies from = f5 to = 0.2: frame 3, at 0.3 s, lies between them"));
@@ -212,9 +212,9 @@ TEST_F(FrameSourceTest, DecodingAheadStopsWhenNobodyListens) {
 }
 
 TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
-  for (int i = 0; i < kFrames; ++i)
+  for (int i = 0; i < kClipFrames; ++i)
     cv::imwrite((folder_ / cv::format("img_%03d.png", 7 + i)).string(),
-                cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(257.0 * level(i))));
+                cv::Mat(kClipHeight, kClipWidth, CV_16UC1, cv::Scalar(257.0 * level(i))));
   EXPECT_THAT(error_of(folder_ / "img_%03d.png"), HasSubstr("rate"));
   for (const fs::path& path : {folder_ / "img_%03d.png", folder_ / "img_*.png", folder_}) {
     const auto source = open_video(path, {.frame_rate_hz = 100.0});
@@ -224,7 +224,7 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
       EXPECT_DOUBLE_EQ(frame->t_s, count / 100.0);
       ++count;
     }
-    EXPECT_EQ(count, kFrames) << path;
+    EXPECT_EQ(count, kClipFrames) << path;
   }
   // sha256sum of the pictures' own sums, one to a line: the same however the series is named.
   const std::string digest = sha256_of_recording(folder_);
@@ -238,7 +238,7 @@ TEST_F(FrameSourceTest, ImagesAreASequenceOnceTheirRateIsKnown) {
 TEST_F(FrameSourceTest, PicturesComeByTheirNumbersThoughTheseHaveNoLeadingZeros) {
   for (int i = 0; i < 12; ++i)
     cv::imwrite((folder_ / cv::format("a 50%% [1]_%d.png", 5 + i)).string(),
-                cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10.0 * i)));
+                cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(10.0 * i)));
   for (const char* series : {"", "a*_*.png"}) {
     const auto source = open_video(folder_ / series, {.frame_rate_hz = 10.0});
     for (int i = 0; i < 12; ++i) {
@@ -255,7 +255,8 @@ TEST_F(FrameSourceTest, PicturesComeByTheirNumbersThoughTheseHaveNoLeadingZeros)
 TEST_F(FrameSourceTest, APatternMeansTheImagesThatItMatches) {
   std::ofstream(folder_ / "notes.txt") << "of the day";
   EXPECT_THAT(error_of(folder_ / "n*"), HasSubstr("no images have such names"));
-  cv::imwrite((folder_ / "n1.png").string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10.0)));
+  cv::imwrite((folder_ / "n1.png").string(),
+              cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(10.0)));
   EXPECT_EQ(open_video(folder_ / "n*", {.frame_rate_hz = 10.0})->info().frames, 1);
 }
 
@@ -263,7 +264,7 @@ TEST_F(FrameSourceTest, AMissingPictureShiftsNoOthersInTime) {
   for (const int number : {98, 99, 100, 103, 104})
     for (const char* name : {"padded_%04d.png", "plain_%d.png"})
       cv::imwrite((folder_ / cv::format(name, number)).string(),
-                  cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(number)));
+                  cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(number)));
   for (const char* series :
        {"padded_%04d.png", "padded_*.png", "plain_%d.png", "plain_*.png", "plain_[0-9]*.png"}) {
     const auto source = open_video(folder_ / series, {.frame_rate_hz = 10.0});
@@ -285,7 +286,8 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
     const fs::path folder = folder_ / names.front();
     fs::create_directory(folder);
     for (const char* name : names)
-      cv::imwrite((folder / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+      cv::imwrite((folder / name).string(),
+                  cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(9)));
     const auto source = open_video(folder, {.frame_rate_hz = 10.0});
     std::vector<std::int64_t> found;
     while (const auto frame = source->next()) found.push_back(frame->index);
@@ -303,7 +305,8 @@ TEST_F(FrameSourceTest, NumbersThatCountNoFramesOnlyOrderPictures) {
 
 TEST_F(FrameSourceTest, APictureNamedUnlikeTheNumberedOnesOfItsFolderIsNoFrame) {
   for (const char* name : {"p1.png", "p2.PNG", "p4.png", "empty floor.png", "z.png"})
-    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+    cv::imwrite((folder_ / name).string(),
+                cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(9)));
   const auto source = open_video(folder_, {.frame_rate_hz = 10.0});
   EXPECT_EQ(source->info().frames, 3);
   EXPECT_EQ(source->info().missing, 1);
@@ -312,7 +315,7 @@ TEST_F(FrameSourceTest, APictureNamedUnlikeTheNumberedOnesOfItsFolderIsNoFrame) 
 }
 
 TEST_F(FrameSourceTest, APictureThatMayFillAGapOfItsSeriesStays) {
-  const cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(9));
+  const cv::Mat picture(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(9));
   for (const char* name : {"b_0001.png", "b_0002.png", "b_0003_COVER.png", "b_0004.png"})
     cv::imwrite((folder_ / name).string(), picture);
   EXPECT_EQ(open_video(folder_, {.frame_rate_hz = 10.0})->info().frames, 4);
@@ -323,14 +326,15 @@ TEST_F(FrameSourceTest, APictureThatMayFillAGapOfItsSeriesStays) {
 }
 
 TEST_F(FrameSourceTest, ASeriesCountsByItsOwnNumberAndFoldersFollowEachOther) {
-  const cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(9));
+  const cv::Mat picture(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(9));
   for (int i = 1; i < 13; ++i)
     cv::imwrite((folder_ / cv::format("cam1%d.png", i)).string(), picture);
   const auto series = open_video(folder_ / "cam1%d.png", {.frame_rate_hz = 10.0});
   EXPECT_EQ(series->info().missing, 0);
   for (const auto& [name, level] : {std::pair{"100C/p9.png", 10}, {"101C/p1.png", 20}}) {
     fs::create_directory((folder_ / name).parent_path());
-    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(level)));
+    cv::imwrite((folder_ / name).string(),
+                cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(level)));
   }
   const auto folders = open_video(folder_ / "*C" / "p*.png", {.frame_rate_hz = 10.0});
   for (const int level : {10, 20}) EXPECT_EQ(folders->next().value().luma.at<uchar>(0, 0), level);
@@ -338,7 +342,8 @@ TEST_F(FrameSourceTest, ASeriesCountsByItsOwnNumberAndFoldersFollowEachOther) {
 
 TEST_F(FrameSourceTest, TwoPicturesOfOneNumberHaveNoOrder) {
   for (const char* name : {"1.png", "01.png", "2.png"})
-    cv::imwrite((folder_ / name).string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(9)));
+    cv::imwrite((folder_ / name).string(),
+                cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(9)));
   EXPECT_THAT(error_of(folder_, {.frame_rate_hz = 10.0}),
               HasSubstr("01.png has the same number as"));
 }
@@ -363,17 +368,17 @@ void photograph(const cv::Mat& upright, int orientation, const fs::path& path) {
 
 // No two of the eight ways to hold it look alike.
 cv::Mat marked_picture() {
-  cv::Mat picture(kHeight, kWidth, CV_8UC1, cv::Scalar(40));
+  cv::Mat picture(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(40));
   picture(cv::Rect(0, 0, 16, 16)) = 220;
-  picture(cv::Rect(kWidth - 16, 0, 16, 16)) = 130;
+  picture(cv::Rect(kClipWidth - 16, 0, 16, 16)) = 130;
   return picture;
 }
 
 void expect_upright(const Frame& frame) {
-  ASSERT_EQ(frame.luma.size(), cv::Size(kWidth, kHeight));
+  ASSERT_EQ(frame.luma.size(), cv::Size(kClipWidth, kClipHeight));
   EXPECT_NEAR(frame.luma.at<uchar>(4, 4), 220, 6);
-  EXPECT_NEAR(frame.luma.at<uchar>(4, kWidth - 4), 130, 6);
-  EXPECT_NEAR(frame.luma.at<uchar>(kHeight - 4, 4), 40, 6);
+  EXPECT_NEAR(frame.luma.at<uchar>(4, kClipWidth - 4), 130, 6);
+  EXPECT_NEAR(frame.luma.at<uchar>(kClipHeight - 4, 4), 40, 6);
 }
 
 TEST_F(FrameSourceTest, PhotographsComeUprightHoweverTheCameraWasHeld) {
@@ -381,8 +386,8 @@ TEST_F(FrameSourceTest, PhotographsComeUprightHoweverTheCameraWasHeld) {
     SCOPED_TRACE(orientation);
     photograph(marked_picture(), orientation, folder_ / "held.jpg");
     const auto source = open_video(folder_ / "held.jpg");
-    EXPECT_EQ(source->info().width_px, kWidth);
-    EXPECT_EQ(source->info().height_px, kHeight);
+    EXPECT_EQ(source->info().width_px, kClipWidth);
+    EXPECT_EQ(source->info().height_px, kClipHeight);
     const auto frame = source->next();
     ASSERT_TRUE(frame);
     expect_upright(*frame);
@@ -413,7 +418,7 @@ TEST_F(FrameSourceTest, APhotographUnlikeTheFirstOfItsSeriesIsRefused) {
   EXPECT_THAT(
       error_of(series, rate),
       HasSubstr(cv::format("frame 2 (p2.jpg): the picture size changes from %d x %d to %d x %d",
-                           kWidth, kHeight, kHeight, kWidth)));
+                           kClipWidth, kClipHeight, kClipHeight, kClipWidth)));
 }
 
 TEST_F(FrameSourceTest, APictureOfASeriesThatCannotBeDecodedIsNotPassedOver) {
@@ -462,7 +467,7 @@ TEST_F(FrameSourceTest, APictureLostInsideAVideoShiftsNoOthersInTime) {
       SourceOptions options;
       if (rate_hz != 50.0) options.frame_rate_hz = rate_hz;
       const auto source = open_video(path, options);
-      for (int i = 0; i < kFrames; ++i) {
+      for (int i = 0; i < kClipFrames; ++i) {
         if (i == kLost) continue;
         const auto frame = source->next();
         ASSERT_TRUE(frame);
@@ -476,7 +481,8 @@ TEST_F(FrameSourceTest, APictureLostInsideAVideoShiftsNoOthersInTime) {
 }
 
 TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {
-  cv::imwrite((folder_ / "half.png").string(), cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)));
+  cv::imwrite((folder_ / "half.png").string(),
+              cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(90)));
   fs::rename(folder_ / "half.png", folder_ / "50%d.png");
   const auto source = open_video(folder_ / "50%d.png");
   const auto frame = source->next();

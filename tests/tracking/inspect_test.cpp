@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFrames = 60, kWidth = 240, kHeight = 200;
+constexpr int kInspectedFrames = 60, kInspectedWidth = 240, kInspectedHeight = 200;
 constexpr double kRadius_px = 40.0;
 
 /// A filmed body on a floor whose brightness changes across the picture, with camera noise.
@@ -27,12 +27,13 @@ class InspectTest : public testing::Test {
   Inspection inspected(const std::function<void(int frame, cv::Mat& picture)>& draw) const {
     cv::VideoWriter writer(path_.string(), cv::CAP_FFMPEG,
                            cv::VideoWriter::fourcc('F', 'F', 'V', '1'), 60.0,
-                           cv::Size(kWidth, kHeight), true);
+                           cv::Size(kInspectedWidth, kInspectedHeight), true);
     EXPECT_TRUE(writer.isOpened());
     cv::RNG noise(7);
-    for (int i = 0; i < kFrames; ++i) {
-      cv::Mat picture(kHeight, kWidth, CV_8UC3);
-      for (int x = 0; x < kWidth; ++x) picture.col(x).setTo(cv::Scalar::all(150.0 + 0.15 * x));
+    for (int i = 0; i < kInspectedFrames; ++i) {
+      cv::Mat picture(kInspectedHeight, kInspectedWidth, CV_8UC3);
+      for (int x = 0; x < kInspectedWidth; ++x)
+        picture.col(x).setTo(cv::Scalar::all(150.0 + 0.15 * x));
       draw(i, picture);
       cv::GaussianBlur(picture, picture, cv::Size(), 0.7);
       cv::Mat grain(picture.size(), CV_16SC3), sum;
@@ -89,12 +90,12 @@ TEST_F(InspectTest, ADiscAsDarkAsTheDarkFieldsOfItsFloorIsNoRing) {
   const Inspection seen = inspected([](int i, cv::Mat& picture) {
     constexpr int kField_px = 40;
     const cv::Scalar dark = cv::Scalar::all(95.0);
-    for (int x = 0; x < kWidth; x += kField_px)
-      for (int y = 0; y < kHeight; y += kField_px)
+    for (int x = 0; x < kInspectedWidth; x += kField_px)
+      for (int y = 0; y < kInspectedHeight; y += kField_px)
         if ((x + y) / kField_px % 2 == 0)
           cv::rectangle(picture, cv::Rect(x, y, kField_px, kField_px), dark, cv::FILLED);
     // From one dark field to the next across their common corner, slowly where all is dark.
-    const double along = 2.0 * i / kFrames,
+    const double along = 2.0 * i / kInspectedFrames,
                  eased = along - std::sin(2.0 * CV_PI * along) / (2.0 * CV_PI);
     const auto at = static_cast<float>(60.0 + kField_px * eased);
     const cv::Point2f centre(at, at);

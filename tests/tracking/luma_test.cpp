@@ -18,7 +18,7 @@ struct FrameFree {
 };
 using OwnedFrame = std::unique_ptr<AVFrame, FrameFree>;
 
-constexpr int kWidth = 7, kHeight = 5;  // odd: planes of half the size are rounded up
+constexpr int kOddWidth = 7, kOddHeight = 5;  // odd: planes of half the size are rounded up
 
 // What is coded for a pixel of the half-size planes, 0..255.
 std::uint8_t cb_at(int x, int y) {
@@ -31,13 +31,13 @@ std::uint8_t cr_at(int x, int y) {
 // A picture that says this in some format, sample by sample.
 OwnedFrame coded_as(AVPixelFormat pixel_format) {
   OwnedFrame frame(av_frame_alloc());
-  frame->format = pixel_format, frame->width = kWidth, frame->height = kHeight;
+  frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
   EXPECT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
   const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(pixel_format);
   for (const int which : {1, 2}) {
     const AVComponentDescriptor& c = format.comp[which];
-    for (int y = 0; y < AV_CEIL_RSHIFT(kHeight, format.log2_chroma_h); ++y)
-      for (int x = 0; x < AV_CEIL_RSHIFT(kWidth, format.log2_chroma_w); ++x) {
+    for (int y = 0; y < AV_CEIL_RSHIFT(kOddHeight, format.log2_chroma_h); ++y)
+      for (int x = 0; x < AV_CEIL_RSHIFT(kOddWidth, format.log2_chroma_w); ++x) {
         const int hx = x >> (1 - format.log2_chroma_w), hy = y >> (1 - format.log2_chroma_h);
         const int value = (which == 1 ? cb_at(hx, hy) : cr_at(hx, hy)) << (c.depth - 8) << c.shift;
         std::uint8_t* at =
@@ -72,12 +72,12 @@ TEST(Luma, IsReadWhereverItsBitsLie) {
   for (const AVPixelFormat pixel_format :
        {AV_PIX_FMT_GRAY8, AV_PIX_FMT_YUV420P, AV_PIX_FMT_YUV420P10LE, AV_PIX_FMT_P010LE}) {
     OwnedFrame frame(av_frame_alloc());
-    frame->format = pixel_format, frame->width = kWidth, frame->height = kHeight;
+    frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
     ASSERT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
     const AVComponentDescriptor& c = av_pix_fmt_desc_get(pixel_format)->comp[0];
     const int level = pixel_format == AV_PIX_FMT_GRAY8 ? kLevel : kLimited;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kOddHeight; ++y)
+      for (int x = 0; x < kOddWidth; ++x) {
         std::uint8_t* at = frame->data[0] + y * frame->linesize[0] + x * c.step;
         if (c.depth > 8)
           *reinterpret_cast<std::uint16_t*>(at) =
@@ -87,8 +87,8 @@ TEST(Luma, IsReadWhereverItsBitsLie) {
       }
     Scaler scaler;
     const cv::Mat luma = luma_of(*frame, scaler);
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x)
+    for (int y = 0; y < kOddHeight; ++y)
+      for (int x = 0; x < kOddWidth; ++x)
         EXPECT_NEAR(luma.at<std::uint8_t>(y, x), kLevel, 1) << av_get_pix_fmt_name(pixel_format);
   }
 }
@@ -97,7 +97,7 @@ TEST(Chroma, IsEmptyWhereThereIsNoneOfItsOwn) {
   for (const AVPixelFormat pixel_format :
        {AV_PIX_FMT_GRAY8, AV_PIX_FMT_GRAY10LE, AV_PIX_FMT_BGR24}) {
     OwnedFrame frame(av_frame_alloc());
-    frame->format = pixel_format, frame->width = kWidth, frame->height = kHeight;
+    frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
     ASSERT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
     EXPECT_TRUE(chroma_of(*frame).empty()) << av_get_pix_fmt_name(pixel_format);
   }

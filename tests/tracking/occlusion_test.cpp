@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kSample = fs::path(TROCHOID_SOURCE_DIR) / "data/samples/s1_disc_paper";
-constexpr int kFirst = 60, kFrames = 90, kCovers = 100;  // of the sample
+constexpr int kFirst = 60, kFilmed = 90, kCovers = 100;  // of the sample
 
 /// An arm from the left whose tip reaches over the disc in frame kCovers and withdraws slowly, the
 /// disc long since elsewhere.
@@ -51,7 +51,7 @@ void write_with_arm(const fs::path& clip, const Eigen::Vector2d& disc_px, double
                          100.0, {640, 480}, false);
   std::mt19937 random(5);
   cv::Mat colours, grey, picture;
-  for (int i = 0; i < kFirst + kFrames && sample.read(colours); ++i) {
+  for (int i = 0; i < kFirst + kFilmed && sample.read(colours); ++i) {
     if (i < kFirst) continue;
     cv::extractChannel(colours, grey, 1);
     grey.convertTo(picture, CV_64F);
@@ -80,7 +80,7 @@ TEST_P(AnArmInTheWay, IsNotTakenForTheDisc) {
     EXPECT_LT((sample.centre_px - truth.at(frame)).norm(), 0.5 * radius_px) << "frame " << frame;
     if (frame > kCovers + 15) ++free_of_the_arm;
   }
-  EXPECT_GE(free_of_the_arm, kFirst + kFrames - kCovers - 20) << "found again at once";
+  EXPECT_GE(free_of_the_arm, kFirst + kFilmed - kCovers - 20) << "found again at once";
 }
 
 INSTANTIATE_TEST_SUITE_P(BrightOrDark, AnArmInTheWay, testing::Values(165.0, 85.0));

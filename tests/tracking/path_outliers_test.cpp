@@ -9,23 +9,23 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr int kFrames = 30, kHit = 15;
+constexpr int kGlimpses = 30, kHitGlimpse = 15;
 constexpr double kSigmaPx = 0.05;
 
-// Centres along a bent path that breaks in frame kHit: there the body strikes something.
+// Centres along a bent path that breaks in frame kHitGlimpse: there the body strikes something.
 struct Recorded {
-  std::vector<Frame> frames{kFrames};
+  std::vector<Frame> frames{kGlimpses};
   std::vector<Glimpse> glimpses;
 
   Recorded() {
-    for (int i = 0; i < kFrames; ++i) {
+    for (int i = 0; i < kGlimpses; ++i) {
       Frame& frame = frames[static_cast<std::size_t>(i)];
       frame.index = i;
       frame.t_s = i / 100.0;
       Sighting& seen = glimpses.emplace_back(Glimpse{&frame}).seen.emplace();
       seen.rim = Ellipse::from_axes({0.0, 0.0}, 40.0, 30.0, 0.0);
       seen.accepted = 0.9;
-      const double since = i - kHit, jitter = 0.02 * (i % 3 - 1);
+      const double since = i - kHitGlimpse, jitter = 0.02 * (i % 3 - 1);
       const double y = since < 0 ? 0.03 * since * since : -6.0 * since + 0.03 * since * since;
       seen.centre_px = {100.0 + 4.0 * since + jitter, 80.0 + y};
       seen.covariance_px2 = kSigmaPx * kSigmaPx * Eigen::Matrix2d::Identity();

@@ -9,7 +9,7 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr int kFrames = 400;
+constexpr int kSmoothed = 400;
 constexpr double kRate_hz = 120.0, kSigma = 0.1;
 
 double truth(double t_s) {
@@ -22,7 +22,7 @@ struct Noisy {
   explicit Noisy(const std::function<bool(int)>& hidden) {
     std::mt19937 random(8);
     std::normal_distribution<double> noise(0.0, kSigma);
-    for (int i = 0; i < kFrames; ++i) {
+    for (int i = 0; i < kSmoothed; ++i) {
       t_s.push_back(i / kRate_hz);
       value.push_back(hidden(i) ? std::nan("") : truth(t_s.back()) + noise(random));
       sigma.push_back(hidden(i) ? std::nan("") : kSigma);
@@ -34,11 +34,11 @@ TEST(Smooth, BeatsTheMeasurementsAndKnowsByHowMuch) {
   const Noisy noisy([](int) { return false; });
   const auto smoothed = smooth(noisy.t_s, noisy.value, noisy.sigma);
   double squares = 0.0, normalised = 0.0;
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kSmoothed; ++i) {
     const auto& s = smoothed[static_cast<std::size_t>(i)];
     const double error = s.value - truth(i / kRate_hz);
-    squares += error * error / kFrames;
-    normalised += error * error / (s.sigma * s.sigma) / kFrames;
+    squares += error * error / kSmoothed;
+    normalised += error * error / (s.sigma * s.sigma) / kSmoothed;
   }
   EXPECT_LT(std::sqrt(squares), 0.4 * kSigma);
   // About thirty independent errors: a mean square of 1 +- 0.26.

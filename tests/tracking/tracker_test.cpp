@@ -13,7 +13,7 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr int kFrames = 90;
+constexpr int kDrawnFrames = 90;
 
 /// Largest distance between track and truth over the frames both have.
 double largest_error_px(const data::Track& track,
@@ -31,13 +31,13 @@ TEST(TrackVideo, FollowsADiscThatRestsFirstAndLast) {
     const double t = std::clamp(i - 30, 0, 40);
     return Eigen::Vector2d(50.0 + 2.6 * t, 60.0 + 0.9 * t);
   };
-  write_clip(folder / "clip.mkv", drawn_floor(220, 160, 150.0), kFrames, 2.0,
+  write_clip(folder / "clip.mkv", drawn_floor(220, 160, 150.0), kDrawnFrames, 2.0,
              [&](cv::Mat& picture, int i) {
                draw_disc(picture, truth(i).x(), truth(i).y(), 16.0, 16.0, 0.0, 50.0);
              });
   const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt);
   ASSERT_EQ(result.file.tracks.size(), 1u);
-  EXPECT_EQ(result.file.tracks[0].samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(result.file.tracks[0].samples.size(), static_cast<std::size_t>(kDrawnFrames));
   EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 0.2);
   EXPECT_FALSE(result.file.tracks[0].samples[0].has_metres()) << "no scale is known";
 }
@@ -91,7 +91,7 @@ TEST(TrackVideo, TwoDiscsKeepTheirNamesThroughACollision) {
 
 TEST(TrackVideo, ReadsNoSpinFromTheShadingOfABodyThatTilts) {
   const ScratchFolder folder("tilting");
-  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kFrames, 2.0,
+  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kDrawnFrames, 2.0,
              [&](cv::Mat& picture, int i) {
                const double x = 30.0 + 2.2 * i, narrow = 18.0 * (0.75 + 0.2 * std::cos(0.2 * i));
                draw_disc(picture, x, 60.0, 18.0, narrow, 0.1 * i, 60.0);
@@ -108,14 +108,14 @@ TEST(TrackVideo, ABarInFrontLeavesAGapAndTheDiscIsFoundAgain) {
   const auto truth = [](int i) {
     return Eigen::Vector2d(25.0 + 2.2 * i, 60.0 + 8.0 * std::sin(0.1 * i));
   };
-  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kFrames, 2.0,
+  write_clip(folder / "clip.mkv", drawn_floor(260, 130, 170.0), kDrawnFrames, 2.0,
              [&](cv::Mat& picture, int i) {
                draw_disc(picture, truth(i).x(), truth(i).y(), 14.0, 14.0, 0.0, 60.0);
                picture.colRange(110, 142) = cv::Scalar(100.0);
              });
   const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt);
   const auto& samples = result.file.tracks.at(0).samples;
-  EXPECT_LT(samples.size(), static_cast<std::size_t>(kFrames)) << "hidden frames have no row";
+  EXPECT_LT(samples.size(), static_cast<std::size_t>(kDrawnFrames)) << "hidden frames have no row";
   EXPECT_GT(samples.back().frame, 80) << "found again behind the bar";
   EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 1.0);
 }
@@ -124,7 +124,7 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   const ScratchFolder folder("mark");
   const auto psi = [](int i) { return 0.3 + 0.11 * i; };  // seen from above, anticlockwise
   const auto x = [](int i) { return 50.0 + 1.5 * i; };
-  write_clip(folder / "clip.mkv", drawn_floor(240, 120, 60.0), kFrames, 2.0,
+  write_clip(folder / "clip.mkv", drawn_floor(240, 120, 60.0), kDrawnFrames, 2.0,
              [&](cv::Mat& picture, int i) {
                draw_disc(picture, x(i), 60.0, 24.0, 24.0, 0.0, 190.0);
                draw_disc(picture, x(i) + 14.0 * std::cos(psi(i)), 60.0 - 14.0 * std::sin(psi(i)),
@@ -136,7 +136,7 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   scene.support.kind = data::SupportKind::flat;
   const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
   const auto& samples = result.file.tracks.at(0).samples;
-  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kDrawnFrames));
   const double turns = 2.0 * std::numbers::pi;
   const double offset = samples[0].psi->value_rad - psi(0);
   EXPECT_NEAR(offset, turns * std::round(offset / turns), 0.03) << "absolute: the mark's direction";
@@ -148,7 +148,7 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
     EXPECT_NEAR(s.psi->value_rad, psi(static_cast<int>(s.frame)) + offset, 0.03);
   }
   const double length_m = (samples.back().centre_m - samples.front().centre_m).norm();
-  EXPECT_NEAR(length_m, 1.5 * (kFrames - 1) / 2000.0, 0.002 * length_m + 1e-4);
+  EXPECT_NEAR(length_m, 1.5 * (kDrawnFrames - 1) / 2000.0, 0.002 * length_m + 1e-4);
 }
 
 /// A disc that moves down and to the right.
@@ -233,7 +233,7 @@ struct TurningInPlace {
   static constexpr double kX_px = 119.5, kY_px = 64.5, kRadius_px = 48.0, kMark_px = 32.0;
   static double psi_rad(int i) { return 0.12 * i; }
   static void write(const std::filesystem::path& path) {
-    write_clip(path, drawn_floor(240, 130, 170.0), kFrames, 2.0, [](cv::Mat& picture, int i) {
+    write_clip(path, drawn_floor(240, 130, 170.0), kDrawnFrames, 2.0, [](cv::Mat& picture, int i) {
       draw_disc(picture, kX_px, kY_px, kRadius_px, kRadius_px, 0.0, 70.0);
       draw_disc(picture, kX_px + kMark_px * std::cos(psi_rad(i)),
                 kY_px - kMark_px * std::sin(psi_rad(i)), 5.0, 5.0, 0.0, 200.0);
@@ -248,14 +248,14 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFollowedByItsRimWherePointed) {
   scene.tracking.at_px = {110.0, 70.0};
   const TrackResult result = track_video(folder / "clip.mkv", scene, std::nullopt);
   const auto& samples = result.file.tracks.at(0).samples;
-  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kDrawnFrames));
   EXPECT_LT(largest_error_px(
                 result.file.tracks[0],
                 [](int) { return Eigen::Vector2d(TurningInPlace::kX_px, TurningInPlace::kY_px); }),
             0.3);
   ASSERT_TRUE(samples.front().psi && samples.back().psi);
   EXPECT_NEAR(samples.back().psi->value_rad - samples.front().psi->value_rad,
-              TurningInPlace::psi_rad(kFrames - 1), 0.05);
+              TurningInPlace::psi_rad(kDrawnFrames - 1), 0.05);
 }
 
 TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
@@ -269,7 +269,7 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
   scene.support.kind = data::SupportKind::flat;
   const TrackResult result =
       track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 130, kScale_px_m));
-  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kDrawnFrames));
   EXPECT_LT(largest_error_px(
                 result.file.tracks[0],
                 [](int) { return Eigen::Vector2d(TurningInPlace::kX_px, TurningInPlace::kY_px); }),
@@ -282,7 +282,7 @@ TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
   const ScratchFolder folder("precesses");
   constexpr double kScale_px_m = 1000.0, kRadius_px = 40.0, kTilt_rad = 0.5;
   const Eigen::Vector2d centre_px(119.5, 79.5);
-  write_clip(folder / "clip.mkv", drawn_floor(240, 160, 120.0), kFrames, 2.0,
+  write_clip(folder / "clip.mkv", drawn_floor(240, 160, 120.0), kDrawnFrames, 2.0,
              [&](cv::Mat& picture, int i) {
                const bool glints = i % 30 > 25;
                draw_disc(picture, centre_px.x(), centre_px.y(), kRadius_px,
@@ -295,7 +295,7 @@ TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
   scene.support.kind = data::SupportKind::floor;
   const TrackResult result =
       track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 160, kScale_px_m));
-  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kDrawnFrames));
   EXPECT_LT(largest_error_px(result.file.tracks[0], [&](int) { return centre_px; }), 0.5);
 }
 
@@ -388,7 +388,7 @@ TEST(TrackVideo, ADiscOnAPinShowsItsTurnByItsMark) {
       camera.table_from_image({TurningInPlace::kX_px, TurningInPlace::kY_px}, kPin_m);
   const TrackResult result = track_video(folder / "clip.mkv", scene, camera);
   const auto& samples = result.file.tracks.at(0).samples;
-  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kDrawnFrames));
   for (const auto& s : samples) {
     ASSERT_TRUE(s.psi) << s.frame;
     EXPECT_FALSE(s.phi) << s.frame;

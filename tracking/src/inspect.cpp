@@ -8,6 +8,7 @@
 #include "find/body_search.hpp"
 #include "find/recording.hpp"
 #include "link/path_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -21,7 +22,7 @@ std::vector<cv::Point> places_between(const Ellipse& rim, double from, double to
   std::vector<cv::Point> places;
   for (int ring = 0; ring < kRings; ++ring)
     for (int ray = 0; ray < kRays; ++ray) {
-      const double angle = 2.0 * CV_PI * ray / kRays, r = from + (to - from) * ring / (kRings - 1);
+      const double angle = data::kTurn * ray / kRays, r = from + (to - from) * ring / (kRings - 1);
       const Eigen::Vector2d p =
           rim.centre_px + rim.shape_px * Eigen::Vector2d(r * std::cos(angle), r * std::sin(angle));
       const cv::Point at(static_cast<int>(std::lround(p.x())),
@@ -32,14 +33,14 @@ std::vector<cv::Point> places_between(const Ellipse& rim, double from, double to
 }
 
 /// Levels between which the floor around a body mostly lies.
-struct Levels {
+struct LevelRange {
   double least = 0.0, most = 255.0;
   [[nodiscard]] bool hold(double level, double tolerance) const {
     return level > least - tolerance && level < most + tolerance;
   }
 };
 
-Levels floor_around(const cv::Mat& plate, const Ellipse& rim) {
+LevelRange floor_around(const cv::Mat& plate, const Ellipse& rim) {
   constexpr double kFrom = 1.2, kTo = 1.8, kRobust = 0.05;
   std::vector<double> levels;
   for (const cv::Point& at : places_between(rim, kFrom, kTo, plate.size()))
@@ -60,7 +61,7 @@ double median_level(const cv::Mat& luma, const std::vector<cv::Point>& places) {
 std::optional<double> floor_share(const cv::Mat& luma, const Plate& plate, const Ellipse& rim) {
   constexpr double kFewest = 0.25;  // of all
   const double tolerance = 6.0 + 3.0 * plate.noise_levels;
-  const Levels around = floor_around(plate.luma, rim);
+  const LevelRange around = floor_around(plate.luma, rim);
   const std::vector<cv::Point> body = places_between(rim, 0.88, 0.96, luma.size());
   const std::vector<cv::Point> middle = places_between(rim, 0.1, 0.4, luma.size());
   if (body.empty()) return std::nullopt;

@@ -70,8 +70,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kHeldBack = 1.0 / 3.0;
 
-// Squares of (prediction - measurement) / sigma.
-struct Squares {
+// Sum of squares of (prediction - measurement) / sigma.
+struct SumOfSquares {
   double sum = 0.0;
   int rows = 0;
   void add(double deviation) {
@@ -81,7 +81,7 @@ struct Squares {
 };
 
 void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
-                 Squares& squares) {
+                 SumOfSquares& squares) {
   if (angle_only && sample.psi) {
     const double off = wrapped(predicted[2] - sample.psi->value_rad);
     squares.add(off / sample.psi->sigma_rad);
@@ -97,10 +97,11 @@ void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predict
   squares.add(whitened.y());
 }
 
-// Squares of the samples [first, last) of a track, predicted from the fit's last arc of that track.
-Squares squares_of(const data::Track& track, int first, int last, int track_index,
-                   const data::Scene& scene, const data::Fit& fit) {
-  Squares squares;
+// Sum of squares of the samples [first, last) of a track, predicted from the fit's last arc of that
+// track.
+SumOfSquares squares_of(const data::Track& track, int first, int last, int track_index,
+                        const data::Scene& scene, const data::Fit& fit) {
+  SumOfSquares squares;
   int arc = -1;
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
     if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
@@ -145,14 +146,14 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   const data::Fit early =
       fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature, rung.settled);
   if (!usable(early)) return kInfinity;
-  Squares seen, unseen;
+  SumOfSquares seen, unseen;
   bool sigma_known = true;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
     const int split = kept_samples(first, last, kHeldBack);
     const int index = static_cast<int>(i);
-    const Squares before = squares_of(tracks[i], first, split, index, rung.scene, early);
-    const Squares after = squares_of(tracks[i], split, last, index, rung.scene, early);
+    const SumOfSquares before = squares_of(tracks[i], first, split, index, rung.scene, early);
+    const SumOfSquares after = squares_of(tracks[i], split, last, index, rung.scene, early);
     seen.sum += before.sum, seen.rows += before.rows;
     unseen.sum += after.sum, unseen.rows += after.rows;
     for (int k = first; k < last; ++k)

@@ -17,13 +17,13 @@ namespace trochoid::fitting {
 namespace {
 
 /// A quantity of the scene that is not a parameter of any fit.
-struct Given {
+struct BodyQuantity {
   const char* name;
   std::function<void(data::Scene&, double value)> set;
 };
 
-const std::array<Given, 7>& givens() {
-  static const std::array<Given, 7> all{
+const std::array<BodyQuantity, 7>& body_quantities() {
+  static const std::array<BodyQuantity, 7> all{
       {{"mass_kg", [](data::Scene& s, double v) { s.body->mass_kg = v; }},
        {"radius_m", [](data::Scene& s, double v) { s.body->radius_m = v; }},
        {"inner_radius_m", [](data::Scene& s, double v) { s.body->inner_radius_m = v; }},
@@ -41,7 +41,7 @@ bool gave_the_scale(const data::Scene& scene, const std::string& name) {
 }  // namespace
 
 void take_priors_for_given(data::Scene& scene) {
-  for (const Given& given : givens())
+  for (const BodyQuantity& given : body_quantities())
     if (const auto prior = scene.fit.prior.find(given.name);
         prior != scene.fit.prior.end() && scene.body && !gave_the_scale(scene, given.name))
       given.set(scene, prior->second.value);
@@ -51,10 +51,10 @@ namespace {
 
 // Residuals with a given quantity off by some standard deviations of its prior; empty if there is
 // no such body, or the model has no prediction for it.
-class Moved {
+class MovedResiduals {
  public:
-  Moved(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
-        const Given& given, const data::Prior& prior, double frame_time_s)
+  MovedResiduals(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
+                 const BodyQuantity& given, const data::Prior& prior, double frame_time_s)
       : problem_(problem),
         u_(u),
         scene_(scene),
@@ -100,7 +100,7 @@ class Moved {
   const Problem& problem_;
   const Eigen::VectorXd& u_;
   const data::Scene& scene_;
-  const Given& given_;
+  const BodyQuantity& given_;
   const data::Prior& prior_;
   double frame_time_s_;
 };
@@ -120,15 +120,16 @@ std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
                                const data::Scene& scene, double frame_time_s) {
   std::vector<Doubt> doubts;
   std::optional<Linearised> all;
-  for (const Given& given : givens()) {
+  for (const BodyQuantity& given : body_quantities()) {
     const auto prior = scene.fit.prior.find(given.name);
     if (prior == scene.fit.prior.end() || !scene.body || gave_the_scale(scene, given.name) ||
         problem.predictor->index_of(given.name) >= 0)
       continue;
     if (!all) all = linearise(problem, u);
     const Eigen::Index rows = problem.rows();
-    const Eigen::VectorXd by_given = Moved(problem, u, scene, given, prior->second, frame_time_s)
-                                         .derivative(all->residuals.head(rows));
+    const Eigen::VectorXd by_given =
+        MovedResiduals(problem, u, scene, given, prior->second, frame_time_s)
+            .derivative(all->residuals.head(rows));
     if (by_given.size() == 0) continue;
     doubts.push_back({given.name, follow(*all, by_given)});
   }
@@ -181,8 +182,8 @@ std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& 
   const auto& infos = problem.predictor->parameters();
   for (const auto& [name, prior] : scene.fit.prior) {
     const bool of_body =
-        std::any_of(givens().begin(), givens().end(),
-                    [&name = name](const Given& given) { return name == given.name; });
+        std::any_of(body_quantities().begin(), body_quantities().end(),
+                    [&name = name](const BodyQuantity& given) { return name == given.name; });
     const bool of_model = std::any_of(infos.begin(), infos.end(), [&name = name](const auto& info) {
       return means(name, info.name);
     });

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "judge/influence.hpp"
 #include "judge/profile.hpp"
 #include "problem/linearise.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/model/idle_keys.hpp"
 
@@ -154,7 +154,7 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
   constexpr double kLightest_kg_m3 = 5.0, kHeaviest_kg_m3 = 25e3, kThickest_radii = 20.0;
   const data::Body& body = *scene.body;
   const double volume_m3 =
-      std::numbers::pi * body.thickness_m *
+      data::kPi * body.thickness_m *
       (body.radius_m * body.radius_m - body.inner_radius_m * body.inner_radius_m);
   if (body.mass_kg && volume_m3 > 0.0)
     if (const double density = *body.mass_kg / volume_m3;

@@ -5,12 +5,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "judge/derived.hpp"
 #include "judge/one_friction.hpp"
 #include "judge/steady_top.hpp"
 #include "observe/observed.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -91,7 +91,7 @@ void warn_short_top(const Problem& problem, data::Fit& fit) {
   const auto* theta = fit.find("theta_rad");
   if (b == nullptr || rate == nullptr || theta == nullptr) return;
   const double frequency = std::abs(b->value - 2.0 * rate->value * std::cos(theta->value));
-  const double periods = problem.arcs[0].duration_s() * frequency / (2.0 * std::numbers::pi);
+  const double periods = problem.arcs[0].duration_s() * frequency / data::kTurn;
   if (periods >= 1.0) return;
   fit.warnings.push_back(fmt::format(
       "the track is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
@@ -104,7 +104,7 @@ void warn_short_rim(const Problem& problem, data::Fit& fit) {
   const auto* theta = fit.find("theta_rad");
   if (w2 == nullptr || theta == nullptr) return;
   const double rate = std::abs(w2->value) / std::max(std::sin(theta->value), 1e-6);
-  const double turns = problem.arcs[0].duration_s() * rate / (2.0 * std::numbers::pi);
+  const double turns = problem.arcs[0].duration_s() * rate / data::kTurn;
   if (turns >= 1.0) return;
   fit.warnings.push_back(fmt::format(
       "the track is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and "

@@ -1,12 +1,13 @@
 #include "observe/angles.hpp"
 
 #include <cmath>
-#include <numbers>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 
 double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2.0 * std::numbers::pi);
+  return std::remainder(angle_rad, data::kTurn);
 }
 
 double continued(double angle_rad, double from_rad) {

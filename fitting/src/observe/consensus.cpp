@@ -17,7 +17,7 @@ constexpr int kMostSkipped = 45;  // wrong samples in a row
 constexpr double kReward = 7.0;   // a sample 3.7 standard deviations off is worth nothing
 
 // Position, velocity and acceleration with their covariance, the same for both coordinates.
-struct Motion {
+struct SampleMotion {
   Eigen::Matrix<double, 3, 2> state = Eigen::Matrix<double, 3, 2>::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double gain = -std::numeric_limits<double>::infinity();  // of the chain up to here
@@ -25,7 +25,7 @@ struct Motion {
   int length = 1;  // of the chain
 };
 
-struct Path {
+struct NoisyPath {
   std::span<const double> t_s;
   const Eigen::MatrixX2d& xy_m;
   std::span<const double> sigma_m;
@@ -34,8 +34,8 @@ struct Path {
 };
 
 // First sample of a chain: nothing is known of how it moves.
-Motion begun(const Path& path, int at) {
-  Motion motion;
+SampleMotion begun(const NoisyPath& path, int at) {
+  SampleMotion motion;
   motion.state.row(0) = path.xy_m.row(at);
   motion.covariance.diagonal() << path.sigma_m[at] * path.sigma_m[at],
       path.speed_m_s * path.speed_m_s, path.acceleration_m_s2 * path.acceleration_m_s2;
@@ -52,7 +52,8 @@ double predicted_variance(const Eigen::Matrix3d& p, double tau, double jerk2_s) 
 }
 
 // What sample `at` gains when it follows `before`.
-double gain_of(const Path& path, const Motion& before, double tau, int at, double jerk2_s) {
+double gain_of(const NoisyPath& path, const SampleMotion& before, double tau, int at,
+               double jerk2_s) {
   const double noise = path.sigma_m[at] * path.sigma_m[at];
   const double variance = predicted_variance(before.covariance, tau, jerk2_s) + noise;
   const Eigen::RowVector2d off = path.xy_m.row(at) - before.state.row(0) -
@@ -65,9 +66,10 @@ double gain_of(const Path& path, const Motion& before, double tau, int at, doubl
   return kReward - 0.5 * off.squaredNorm() / variance - penalty;
 }
 
-Motion advanced(const Path& path, const Motion& before, double tau, int at, double jerk2_s) {
+SampleMotion advanced(const NoisyPath& path, const SampleMotion& before, double tau, int at,
+                      double jerk2_s) {
   const Eigen::Matrix3d move = data::white_jerk_transition(tau);
-  Motion motion;
+  SampleMotion motion;
   motion.state = move * before.state;
   motion.covariance =
       move * before.covariance * move.transpose() + jerk2_s * data::white_jerk_covariance(tau);
@@ -78,23 +80,24 @@ Motion advanced(const Path& path, const Motion& before, double tau, int at, doub
   return motion;
 }
 
-struct Chain {
+struct SampleChain {
   double gain = -std::numeric_limits<double>::infinity();
   std::vector<int> samples;
 };
 
 // Among samples [from, to).
-Chain best_chain(const Path& path, int from, int to, double jerk2_s) {
-  std::vector<Motion> motions(static_cast<std::size_t>(to));  // those before `from` stay unused
+SampleChain best_chain(const NoisyPath& path, int from, int to, double jerk2_s) {
+  std::vector<SampleMotion> motions(
+      static_cast<std::size_t>(to));  // those before `from` stay unused
   for (int at = from; at < to; ++at) {
-    Motion best = begun(path, at);
+    SampleMotion best = begun(path, at);
     for (int before = std::max(from, at - 1 - kMostSkipped); before < at; ++before) {
       const double tau = path.t_s[at] - path.t_s[before];
       const double gain = motions[before].gain + gain_of(path, motions[before], tau, at, jerk2_s);
       if (gain > best.gain) best.gain = gain, best.before = before;
     }
     if (best.before >= 0) {
-      Motion motion =
+      SampleMotion motion =
           advanced(path, motions[best.before], path.t_s[at] - path.t_s[best.before], at, jerk2_s);
       motion.gain = best.gain, motion.before = best.before;
       motion.length = motions[best.before].length + 1;
@@ -104,7 +107,7 @@ Chain best_chain(const Path& path, int from, int to, double jerk2_s) {
   }
   const auto end = std::max_element(motions.begin() + from, motions.end(),
                                     [](const auto& a, const auto& b) { return a.gain < b.gain; });
-  Chain chain{end->gain, {}};
+  SampleChain chain{end->gain, {}};
   for (int at = static_cast<int>(end - motions.begin()); at >= 0; at = motions[at].before)
     chain.samples.push_back(at);
   std::reverse(chain.samples.begin(), chain.samples.end());
@@ -113,7 +116,7 @@ Chain best_chain(const Path& path, int from, int to, double jerk2_s) {
 
 // Sizes of the second differences over steps of the samples in order; the upper ones are those of
 // wrong places.
-std::vector<double> second_differences(const Path& path) {
+std::vector<double> second_differences(const NoisyPath& path) {
   std::vector<double> sizes;
   for (Eigen::Index i = 1; i + 1 < path.xy_m.rows(); ++i) {
     const double share = (path.t_s[i] - path.t_s[i - 1]) / (path.t_s[i + 1] - path.t_s[i - 1]);
@@ -125,7 +128,7 @@ std::vector<double> second_differences(const Path& path) {
 
 // How much of the samples [from, to) chains explain with a jerk: stretches from all over them,
 // since a body may lie at rest when the record begins, or be at rest when it ends.
-double gain_with(const Path& path, int from, int to, double jerk2_s) {
+double gain_with(const NoisyPath& path, int from, int to, double jerk2_s) {
   constexpr int kStretches = 4, kLength = 250;
   if (to - from <= kStretches * kLength) return best_chain(path, from, to, jerk2_s).gain;
   double gain = 0.0;
@@ -137,7 +140,7 @@ double gain_with(const Path& path, int from, int to, double jerk2_s) {
 }
 
 // The chain through the samples [from, to), with the jerk that explains most of them.
-Chain best_chain(const Path& path, int from, int to) {
+SampleChain best_chain(const NoisyPath& path, int from, int to) {
   constexpr std::array kOverNoise{0.01, 0.05, 0.2, 1.0, 5.0, 20.0};  // it adds from step to step
   double jerk2_s = 0.0, highest = -std::numeric_limits<double>::infinity();
   for (const double over : kOverNoise) {
@@ -150,7 +153,7 @@ Chain best_chain(const Path& path, int from, int to) {
 
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
 // rest that is struck, one that begins to wobble. What lies beyond its ends is looked at by itself.
-void keep_consistent(const Path& path, int from, int to, std::vector<int>& kept) {
+void keep_consistent(const NoisyPath& path, int from, int to, std::vector<int>& kept) {
   constexpr int kMostWrong = 20, kFewest = 12;
   const std::vector<int> chain = best_chain(path, from, to).samples;
   // What hardly hangs together anywhere is not doubted.
@@ -172,7 +175,7 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
   std::vector<int> all(t_s.size());
   std::iota(all.begin(), all.end(), 0);
   if (n < 12) return all;
-  Path path{t_s, xy_m, sigma_m};
+  NoisyPath path{t_s, xy_m, sigma_m};
   const std::vector<double> bends = second_differences(path);
   constexpr double kOrdinary = 8.0;  // times a low quantile: curvature varies by a few
   if (*std::max_element(bends.begin(), bends.end()) < kOrdinary * data::quantile(bends, 0.3))

@@ -5,12 +5,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "observe/consensus.hpp"
 #include "observe/direction.hpp"
 #include "observe/smoothing.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -365,7 +365,7 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
     if (i == 0 || arc.readings[i - 1].sample != reading.sample ||
         arc.readings[i - 1].channel == Channel::position) {
       const int theta = column[static_cast<int>(Channel::theta)];
-      other_face = arc.folded && theta >= 0 && values[first + theta] > 0.5 * std::numbers::pi;
+      other_face = arc.folded && theta >= 0 && values[first + theta] > 0.5 * data::kPi;
     }
     if (shows_direction(arc, i)) {
       const Reading& turned = arc.readings[++i];
@@ -390,7 +390,7 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
     // with marks alike on both.
     if (other_face) {
       const bool turns = reading.channel == Channel::phi;
-      predicted = turns ? predicted + std::numbers::pi : std::numbers::pi - predicted;
+      predicted = turns ? predicted + data::kPi : data::kPi - predicted;
       sign = turns ? 1.0 : -1.0;
     }
     const double weight = sign * reading.whitener(0, 0);

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "observe/observed.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -350,21 +350,21 @@ void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen
   sign = Eigen::VectorXd::Ones(values.size());
   const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
   if (theta < 0 || phi < 0) return;
-  const double turn = 2.0 * std::numbers::pi;
+  const double turn = data::kTurn;
   double tilt = std::fmod(values[theta], turn);
   if (tilt < 0.0) tilt += turn;
-  const bool folded = tilt > std::numbers::pi;
+  const bool folded = tilt > data::kPi;
   values[theta] = folded ? turn - tilt : tilt;
   if (!folded) return;
   // (-theta, phi) and (theta, phi + pi) point the axis the same way; the node line turns over.
-  values[phi] += std::numbers::pi;
+  values[phi] += data::kPi;
   sign[theta] = -1.0;
   for (const char* rate : {"dtheta_rad_s", "w1_rad_s", "w2_rad_s"})
     if (const int i = predictor.index_of(rate); i >= 0) {
       values[i] = -values[i];
       sign[i] = -1.0;
     }
-  if (const int psi = predictor.index_of("psi_rad"); psi >= 0) values[psi] -= std::numbers::pi;
+  if (const int psi = predictor.index_of("psi_rad"); psi >= 0) values[psi] -= data::kPi;
 }
 
 void name_attitudes(Problem& problem) {
@@ -383,9 +383,9 @@ void name_attitudes(Problem& problem) {
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
     Eigen::VectorXd& values = problem.base[arc];
     const bool marked = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
-    if (problem.arcs[arc].folded && !marked && values[theta] > 0.5 * std::numbers::pi) {
-      values[theta] = std::numbers::pi - values[theta];
-      values[phi] += std::numbers::pi;
+    if (problem.arcs[arc].folded && !marked && values[theta] > 0.5 * data::kPi) {
+      values[theta] = data::kPi - values[theta];
+      values[phi] += data::kPi;
       for (const char* rate : {"w1_rad_s", "w3_rad_s"})  // along axes that turn round
         if (const int i = predictor.index_of(rate); i >= 0) values[i] = -values[i];
     }

@@ -5,6 +5,7 @@
 
 #include "observe/smoothing.hpp"
 #include "problem/problem.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -52,10 +53,10 @@ double channel_scale(const Problem& problem, const RawResiduals& raw, Channel ch
     // Variance of what lies within kInlier sigmas.
     constexpr double kHalfSquare = 0.5 * kInlier * kInlier;
     const double beyond = std::exp(-kHalfSquare);
-    const double kept = planar ? 2.0 * (1.0 - beyond * (1.0 + kHalfSquare)) / (1.0 - beyond)
-                               : 1.0 - 2.0 * kInlier * beyond /
-                                           (std::sqrt(2.0 * std::numbers::pi) *
-                                            std::erf(kInlier / std::numbers::sqrt2));
+    const double kept =
+        planar ? 2.0 * (1.0 - beyond * (1.0 + kHalfSquare)) / (1.0 - beyond)
+               : 1.0 - 2.0 * kInlier * beyond /
+                           (std::sqrt(2.0 * data::kPi) * std::erf(kInlier / std::numbers::sqrt2));
     scale = std::sqrt(squares / std::max(1.0, kept * inliers));
   }
   const double rows = static_cast<double>(lengths.size()) * (planar ? 2.0 : 1.0);

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "start/starts.hpp"
+#include "trochoid/data/angle.hpp"
 
 // A fast top precesses slowly and trembles: nutation with the frequency nu near b, too small and
 // too fast for integrals over the path, but a line in its spectrum.
@@ -78,10 +78,9 @@ double highest_of_scan(const Slow& slow, double from, double to, double step) {
 double strongest_line(const Slow& slow) {
   const auto n = static_cast<double>(slow.t_s.size());
   const double duration_s = slow.t_s[slow.t_s.size() - 1];
-  const double least =
-      std::max(3.0 * std::abs(slow.rate_rad_s), 8.0 * std::numbers::pi / duration_s);
-  const double most = std::numbers::pi * (n - 1.0) / duration_s;
-  const double quarter = 0.25 * 2.0 * std::numbers::pi / duration_s;  // of a line's width
+  const double least = std::max(3.0 * std::abs(slow.rate_rad_s), 8.0 * data::kPi / duration_s);
+  const double most = data::kPi * (n - 1.0) / duration_s;
+  const double quarter = 0.25 * data::kTurn / duration_s;  // of a line's width
   const double coarse = highest_of_scan(slow, least, most, 2.0 * quarter);
   double best = 0.0, highest = 0.0;
   for (const double nu : {coarse - quarter, coarse, coarse + quarter})

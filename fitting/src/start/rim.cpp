@@ -2,17 +2,15 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/model/steady.hpp"
 
 namespace trochoid::fitting {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 // An angle, and the same smoothed where there is enough of it.
 struct SmoothAngle : AngleSeries {
@@ -143,7 +141,7 @@ std::pair<double, double> robust_line(const AngleSeries& series, int count, doub
 // the rate that aligns twice the angles best, then the side that more of them are on.
 std::pair<double, double> robust_turning(const AngleSeries& series, int count, double t_s) {
   const double span_s = series.t_s[count - 1] - series.t_s[0];
-  const double fastest = 0.5 * kPi * (count - 1) / span_s;
+  const double fastest = 0.5 * data::kPi * (count - 1) / span_s;
   constexpr int kPerPeak = 8;  // rates looked at over the width of a peak
   const int steps = kPerPeak * count;
   const auto aligned = [&](double rate, double times) {
@@ -158,7 +156,7 @@ std::pair<double, double> robust_turning(const AngleSeries& series, int count, d
     if (size > best) best = size, turning = rate;
   }
   double azimuth = 0.5 * std::arg(aligned(turning, 2.0));
-  if ((aligned(turning, 1.0) * std::polar(1.0, -azimuth)).real() < 0.0) azimuth += kPi;
+  if ((aligned(turning, 1.0) * std::polar(1.0, -azimuth)).real() < 0.0) azimuth += data::kPi;
   return {azimuth, turning};
 }
 
@@ -167,7 +165,7 @@ double readings_a_turn(const AngleSeries& series) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < series.angle_rad.size(); ++i)
     steps.push_back(std::abs(series.angle_rad[i] - series.angle_rad[i - 1]));
-  return 2.0 * kPi / std::max(median(std::move(steps)), 1e-9);
+  return data::kTurn / std::max(median(std::move(steps)), 1e-9);
 }
 
 std::vector<Start> from_angles(const ArcData& arc, const model::RimBody& body, bool slides,
@@ -183,7 +181,7 @@ std::vector<Start> from_angles(const ArcData& arc, const model::RimBody& body, b
   const double balanced = spin_by_couples(body, arc, theta, phi, motion);
   const auto add = [&](const std::pair<double, double>& tilt, const std::pair<double, double>& turn,
                        double share) {
-    const double leaning = std::clamp(tilt.first, 0.03, kPi - 0.03), azimuth = turn.first;
+    const double leaning = std::clamp(tilt.first, 0.03, data::kPi - 0.03), azimuth = turn.first;
     const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
     std::vector<double> spins{spin_by_velocity(motion, body, azimuth, w2)};
     if (slow && turn.second != 0.0)
@@ -206,7 +204,7 @@ std::vector<Start> from_positions(const model::RimBody& body, const Motion& moti
   const double heading = std::atan2(motion.velocity_m_s.y(), motion.velocity_m_s.x());
   for (double theta = 0.15; theta < 1.5; theta += 0.15)
     for (int direction = 0; direction < 12; ++direction) {
-      const double delta = 2.0 * kPi * direction / 12;
+      const double delta = data::kTurn * direction / 12;
       const double vn = speed * std::cos(delta), vt = speed * std::sin(delta);
       const double z = model::tilt(body, theta).z;
       std::vector<double> rates{0.8 * motion.turning_rad_s, motion.turning_rad_s,
@@ -235,7 +233,7 @@ std::vector<Start> from_slip(const model::RimBody& body, const Motion& motion) {
   for (double theta = 0.15; theta < 1.5; theta += 0.15)
     for (int direction = 0; direction < 12; ++direction)
       for (const double share : {0.1, 0.2, 0.4, 0.8}) {
-        const double phi = heading - 2.0 * kPi * direction / 12;
+        const double phi = heading - data::kTurn * direction / 12;
         const Eigen::Vector2d along(std::cos(phi), std::sin(phi)), across(-along.y(), along.x());
         const Eigen::Vector2d slip =
             -share * std::sqrt(body.g * body.R) / brake_m_s2 * motion.acceleration_m_s2;
@@ -268,7 +266,7 @@ std::vector<Start> from_spin(const model::RimBody& body, const Motion& motion) {
       const double pull = body.A * W * W * s * c + body.g * (body.h * s - body.R * c);
       const double w2 = W * s, w3 = pull / (body.C * w2);
       if (!std::isfinite(w3)) continue;
-      const double phi = body.R * w3 < body.h * w2 ? heading : heading + kPi;
+      const double phi = body.R * w3 < body.h * w2 ? heading : heading + data::kPi;
       starts.push_back(state(motion, theta, phi, 0.0, w2, w3, "spin"));
       starts.back().values["friction"] = std::clamp(brake_m_s2 / body.g, 0.03, 0.9);
     }

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -15,7 +15,7 @@ constexpr int kShortestWindow = 24, kFewestSamples = 16;
 // Samples of the first window for a body on its rim. Angles say enough of it within a turn and a
 // half of the node line; a start carries no further where a slow camera takes few pictures a turn.
 int shortest_window(const ArcData& arc, int otherwise) {
-  constexpr double kTurn = 2.0 * std::numbers::pi, kTurns = 1.5;
+  constexpr double kTurns = 1.5;
   constexpr int kLeast = 12;
   std::vector<double> rates_rad_s;
   const Reading* before = nullptr;
@@ -28,7 +28,7 @@ int shortest_window(const ArcData& arc, int otherwise) {
   }
   const double turned = median(std::move(rates_rad_s)) * arc.duration_s();
   if (!(turned > 0.0)) return otherwise;
-  const double samples = kTurns * kTurn / turned * static_cast<double>(arc.t_s.size());
+  const double samples = kTurns * data::kTurn / turned * static_cast<double>(arc.t_s.size());
   return static_cast<int>(std::clamp<double>(samples, kLeast, otherwise));
 }
 

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -40,7 +40,7 @@ Found shoot_over(const Problem& problem, const Problem& started, double over_nut
   Problem own = started;
   const ArcData& arc = problem.arcs[0];
   const double b = std::abs(own.base[0][own.predictor->index_of("b_1_s")]);
-  const double nutations = arc.duration_s() * b / (2.0 * std::numbers::pi);
+  const double nutations = arc.duration_s() * b / data::kTurn;
   const int all = static_cast<int>(arc.t_s.size());
   const double share = std::min(1.0, over_nutations / std::max(nutations, 1e-9));
   const int window = std::clamp(static_cast<int>(share * all), std::min(24, all), all);

@@ -2,11 +2,11 @@
 #include <cmath>
 #include <deque>
 #include <functional>
-#include <numbers>
 
 #include "observe/angles.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -41,7 +41,7 @@ SpinDifference spin_difference(const Problem& problem, int arc, int psi, int ome
     if (reading.channel != Channel::psi) continue;
     const int row = 2 * reading.sample;
     double measured = reading.value.x();
-    if (data.folded && still[row] > 0.5 * std::numbers::pi) measured = std::numbers::pi - measured;
+    if (data.folded && still[row] > 0.5 * data::kPi) measured = data::kPi - measured;
     difference.angle_rad.push_back(measured - still[row + 1]);
     difference.turn_s.push_back(turning[row + 1] - still[row + 1]);
   }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "observe/direction.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -60,7 +60,7 @@ bool nods_between_samples(const Problem& problem, const Eigen::VectorXd& u) {
       std::abs(value("b_1_s") - 2.0 * value("dphi_rad_s") * std::cos(value("theta_rad")));
   const ArcData& arc = problem.arcs[0];
   const double gaps = std::max(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
-  return rate_rad_s * arc.duration_s() > std::numbers::pi * gaps;
+  return rate_rad_s * arc.duration_s() > data::kPi * gaps;
 }
 
 }  // namespace
@@ -175,7 +175,7 @@ double null_chi2(const Reading& tilt, const Reading& precession, double typical_
   const Eigen::Vector2d weights = weights_of_direction(tilt, precession);
   double chi2 = 0.0;
   for (int i = 0; i < kAround; ++i) {
-    const double phi = precession.value.x() + 2.0 * std::numbers::pi * i / kAround;
+    const double phi = precession.value.x() + data::kTurn * i / kAround;
     const Departure off =
         departure({tilt.value.x(), precession.value.x()}, {typical_rad, phi}, folded);
     chi2 += weights.cwiseProduct(off.way).squaredNorm() / kAround;
@@ -186,7 +186,6 @@ double null_chi2(const Reading& tilt, const Reading& precession, double typical_
 }  // namespace
 
 double null_chi2(const ArcData& arc) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
   double chi2 = 0.0;
   Eigen::RowVector2d mean = Eigen::RowVector2d::Zero();
   double tilt = 0.0;
@@ -204,7 +203,7 @@ double null_chi2(const ArcData& arc) {
     else if (reading.channel == Channel::theta)
       chi2 += weight * std::pow(reading.value.x() - tilt / tilts, 2);
     else
-      chi2 += weight * kTurn * kTurn / 12.0;
+      chi2 += weight * data::kTurn * data::kTurn / 12.0;
   }
   return chi2;
 }

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CalibrateOptions {
   std::vector<fs::path> inputs;
   std::string pattern = "9x6", dictionary = "4X4_50", floor;
   double square_mm = 0.0, marker_mm = 0.0, floor_height_mm = 0.0, radius_mm = 0.0;
@@ -33,7 +33,7 @@ struct Options {
   bool json = false;
 };
 
-tracking::BoardPattern pattern_of(const Options& options) {
+tracking::BoardPattern pattern_of(const CalibrateOptions& options) {
   tracking::BoardPattern pattern;
   char rest = 0;
   if (std::sscanf(options.pattern.c_str(), "%dx%d%c", &pattern.columns, &pattern.rows, &rest) != 2)
@@ -110,7 +110,7 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
 }
 
 // Pictures and videos, those of folders and patterns one by one.
-std::vector<fs::path> inputs_of(const Options& options) {
+std::vector<fs::path> inputs_of(const CalibrateOptions& options) {
   std::vector<fs::path> files;
   for (const fs::path& input : options.inputs) {
     const std::vector<fs::path> some = fs::is_directory(input)
@@ -137,7 +137,7 @@ fs::path floor_among(const std::vector<fs::path>& files, const fs::path& floor) 
 }
 
 // All pictures and videos, that of the floor first if it is one.
-std::vector<fs::path> files_of(const Options& options) {
+std::vector<fs::path> files_of(const CalibrateOptions& options) {
   std::vector<fs::path> files = inputs_of(options);
   const fs::path floor = floor_among(files, options.floor);
   std::error_code ignored;
@@ -164,7 +164,7 @@ std::vector<fs::path> each_once(const std::vector<fs::path>& files) {
   return chosen;
 }
 
-Views look_at_inputs(const Options& options, const tracking::BoardPattern& pattern) {
+Views look_at_inputs(const CalibrateOptions& options, const tracking::BoardPattern& pattern) {
   Views views;
   Progress progress("calibrate", "files");
   std::vector<fs::path> files = each_once(files_of(options));
@@ -228,7 +228,7 @@ std::size_t worst_view(const tracking::Calibration& result) {
   return worst;
 }
 
-std::size_t floor_view(const Options& options, const Views& views) {
+std::size_t floor_view(const CalibrateOptions& options, const Views& views) {
   if (options.floor.empty()) return 0;
   for (std::size_t i = 0; i < views.found.size(); ++i)
     if (views.found[i].name == views.floor) return i;
@@ -257,19 +257,19 @@ std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const c
   return out;
 }
 
-tracking::FloorPoints floor_points(const Options& options) {
+tracking::FloorPoints floor_points(const CalibrateOptions& options) {
   constexpr Eigen::Index kFewest = 4;
   return {points(options.floor_points, "x_m", "y_m", kFewest),
           points(options.floor_points, "x_px", "y_px", kFewest)};
 }
 
-std::vector<Eigen::Vector2d> circle_points(const Options& options) {
+std::vector<Eigen::Vector2d> circle_points(const CalibrateOptions& options) {
   constexpr Eigen::Index kFewest = 6;
   return points(options.circle_points, "x_px", "y_px", kFewest);
 }
 
 // The table frame from whatever says where the floor is; a sentence about it.
-std::string place_floor(const Options& options, const Views& views, data::Camera& camera) {
+std::string place_floor(const CalibrateOptions& options, const Views& views, data::Camera& camera) {
   const double height_m = 1e-3 * options.floor_height_mm;
   if (!options.floor_points.empty()) {
     const tracking::FloorPoints floor = floor_points(options);
@@ -289,7 +289,7 @@ std::string place_floor(const Options& options, const Views& views, data::Camera
 }
 
 // The corners found and, twenty times enlarged, how far the camera puts them elsewhere.
-void draw_check(const Options& options, const Views& views, data::Camera camera) {
+void draw_check(const CalibrateOptions& options, const Views& views, data::Camera camera) {
   constexpr double kEnlarged = 20.0;
   const std::size_t shown = floor_view(options, views);
   const tracking::BoardView& view = views.found[shown];
@@ -311,7 +311,7 @@ void draw_check(const Options& options, const Views& views, data::Camera camera)
   write_picture(picture, options.picture);
 }
 
-void tell(const Options& options, const Views& views, const tracking::Calibration& result,
+void tell(const CalibrateOptions& options, const Views& views, const tracking::Calibration& result,
           const std::string& floor) {
   const std::size_t worst = worst_view(result);
   const double worst_px = result.view_rms_px[worst];
@@ -347,7 +347,7 @@ void tell(const Options& options, const Views& views, const tracking::Calibratio
 }
 
 // Before the pictures, which take time to look at.
-void check_points(const Options& options) {
+void check_points(const CalibrateOptions& options) {
   if (!options.floor_points.empty()) (void)floor_points(options);
   if (options.circle_points.empty()) return;
   (void)circle_points(options);
@@ -355,7 +355,7 @@ void check_points(const Options& options) {
     throw InputError("--circle-points needs --radius-mm, the radius of the circle");
 }
 
-void check_names(const Options& options) {
+void check_names(const CalibrateOptions& options) {
   std::vector<fs::path> inputs = files_of(options);
   inputs.push_back(options.floor_points);
   inputs.push_back(options.circle_points);
@@ -363,7 +363,7 @@ void check_names(const Options& options) {
   if (!options.picture.empty()) check_picture_name(options.picture);
 }
 
-void run(const Options& options) {
+void run(const CalibrateOptions& options) {
   check_names(options);
   check_points(options);
   const tracking::BoardPattern pattern = pattern_of(options);
@@ -391,7 +391,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command =
       app.add_subcommand("calibrate", "Find a camera from pictures of a board, and the floor");
   command

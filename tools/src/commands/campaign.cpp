@@ -21,20 +21,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CampaignOptions {
   std::string manifest, part;
   int jobs = 0;
   bool summary_only = false, again = false, json = false;
 };
 
 /// "3/10": the third tenth of the items, for one job of an array on a cluster.
-struct Part {
+struct CampaignPart {
   std::size_t number = 1, of = 1;
   [[nodiscard]] bool has(std::size_t index) const { return index % of == number - 1; }
 };
 
-std::optional<Part> part_named(const std::string& text) {
-  Part part;
+std::optional<CampaignPart> part_named(const std::string& text) {
+  CampaignPart part;
   char rest = 0;
   if (std::sscanf(text.c_str(), "%zu/%zu%c", &part.number, &part.of, &rest) != 2 ||
       part.number < 1 || part.number > part.of || text.find('-') != std::string::npos)
@@ -50,15 +50,17 @@ CLI::Validator part_name() {
           "K/N"};
 }
 
-std::vector<const CampaignItem*> share_of(const Campaign& campaign, const Options& options) {
-  const Part part = part_named(options.part).value_or(Part{});
+std::vector<const CampaignItem*> share_of(const Campaign& campaign,
+                                          const CampaignOptions& options) {
+  const CampaignPart part = part_named(options.part).value_or(CampaignPart{});
   std::vector<const CampaignItem*> share;
   for (std::size_t i = 0; i < campaign.items.size(); ++i)
     if (part.has(i)) share.push_back(&campaign.items[i]);
   return share;
 }
 
-std::vector<const CampaignItem*> items_to_run(const Campaign& campaign, const Options& options) {
+std::vector<const CampaignItem*> items_to_run(const Campaign& campaign,
+                                              const CampaignOptions& options) {
   std::vector<const CampaignItem*> open = share_of(campaign, options);
   if (!options.again)
     std::erase_if(open, [&](const CampaignItem* item) {
@@ -127,7 +129,7 @@ void summarise(const Campaign& campaign, bool json) {
 }
 
 /// One job of an array does not know what the others have left: it answers for its own share only.
-void tell_share(const Campaign& campaign, const Options& options) {
+void tell_share(const Campaign& campaign, const CampaignOptions& options) {
   Tally tally;
   for (const CampaignItem* item : share_of(campaign, options)) {
     const auto record = current_record(campaign, *item);
@@ -136,7 +138,7 @@ void tell_share(const Campaign& campaign, const Options& options) {
   tell(tally, "", options.json);
 }
 
-void run(const Options& options) {
+void run(const CampaignOptions& options) {
   const Campaign campaign = read_campaign(options.manifest);
   std::vector<const CampaignItem*> items;
   if (!options.summary_only) items = items_to_run(campaign, options);
@@ -159,7 +161,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_campaign_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CampaignOptions>();
   CLI::App* command =
       app.add_subcommand("campaign", "Run many recordings; resume where it was interrupted");
   command->add_option("manifest", options->manifest, "Recordings and scenes (docs/campaigns.md)")

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <string>
 
@@ -16,6 +15,7 @@
 #include "common/progress.hpp"
 #include "common/recording_name.hpp"
 #include "common/validators.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/inspect.hpp"
@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using tracking::Inspection;
 
-struct Options {
+struct InitOptions {
   fs::path video, output;
   double radius_mm = 0.0;
   std::optional<double> rate_hz;
@@ -93,9 +93,9 @@ std::string body_words(const Inspection& seen, const Measures& body) {
   text += "# mass_kg = 0.03           # from the balance; needed for forces and losses\n";
   text += "# mark = { distance_m = 0.02, size_m = 0.003 }   # a dot on the face shows the spin\n";
   if (seen.body)
-    text += fmt::format(
-        "# seen {:.0f} px in radius, tilted up to about {:.0f} degrees\n", seen.body->radius_px,
-        std::acos(std::min(1.0, seen.body->least_axis_ratio)) * 180.0 / std::numbers::pi);
+    text += fmt::format("# seen {:.0f} px in radius, tilted up to about {:.0f} degrees\n",
+                        seen.body->radius_px,
+                        data::degrees(std::acos(std::min(1.0, seen.body->least_axis_ratio))));
   return text;
 }
 
@@ -151,12 +151,11 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
         "# the outline is always {:.3f} as wide as long: the camera may look down at {:.0f} "
         "degrees\n"
         "# from the vertical; calibrate it\n",
-        seen.body->usual_axis_ratio,
-        std::acos(seen.body->usual_axis_ratio) * 180.0 / std::numbers::pi);
+        seen.body->usual_axis_ratio, data::degrees(std::acos(seen.body->usual_axis_ratio)));
   return text;
 }
 
-std::string scene_text(const Options& options, const Inspection& seen, double radius_mm) {
+std::string scene_text(const InitOptions& options, const Inspection& seen, double radius_mm) {
   std::string text = fmt::format(
       "# {}: what a first look tells. Read it, correct it, then\n#   trochoid run {} --scene {}\n",
       options.video.filename().string(), shell_quoted(options.video.string()),
@@ -175,7 +174,7 @@ std::string scene_text(const Options& options, const Inspection& seen, double ra
   return text;
 }
 
-void tell_json(const Options& options, const Inspection& seen) {
+void tell_json(const InitOptions& options, const Inspection& seen) {
   nlohmann::ordered_json summary{{"scene", options.output.string()},
                                  {"frame_rate_hz", seen.video.frame_rate_hz},
                                  {"found", seen.body.has_value()}};
@@ -186,7 +185,7 @@ void tell_json(const Options& options, const Inspection& seen) {
   print_json(summary);
 }
 
-void run(Options options) {
+void run(InitOptions options) {
   if (options.output.empty()) options.output = recording_name(options.video) + ".toml";
   check_output(options.output, {options.video});
   if (fs::exists(options.output) && !options.force)
@@ -212,7 +211,7 @@ void run(Options options) {
 }  // namespace
 
 void add_init_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InitOptions>();
   CLI::App* command =
       app.add_subcommand("init", "Write a scene file from a first look at a recording");
   command->add_option("video", options->video, "Recording")->required()->transform(without_slash());

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ManualOptions {
   fs::path folder;
 };
 
@@ -126,7 +126,7 @@ std::string completion(const CLI::App& app) {
       TROCHOID_VERSION, cases, everywhere);
 }
 
-void run(const CLI::App& app, const Options& options) {
+void run(const CLI::App& app, const ManualOptions& options) {
   const fs::path man = options.folder / "man1";
   make_folder(man);
   data::write_text(main_page(app), man / "trochoid.1");
@@ -139,7 +139,7 @@ void run(const CLI::App& app, const Options& options) {
 }  // namespace
 
 void add_manual_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ManualOptions>();
   CLI::App* command =
       app.add_subcommand("manual", "Write man pages and bash completion into a folder");
   command->add_option("folder", options->folder, "Folder to make")->required();

@@ -23,14 +23,14 @@
 namespace trochoid::tools {
 namespace {
 
-struct Options {
+struct OverlayCommandOptions {
   std::string video, track, fit, scene, camera, output, still, from, to;
   double slow = 0.0;
   int fit_track = 0;
   bool json = false;
 };
 
-OverlayInput read_inputs(const Options& options) {
+OverlayInput read_inputs(const OverlayCommandOptions& options) {
   OverlayInput input;
   input.video = options.video;
   input.tracks = data::read_track(options.track);
@@ -50,7 +50,7 @@ OverlayInput read_inputs(const Options& options) {
   return input;
 }
 
-void run(const Options& options) {
+void run(const OverlayCommandOptions& options) {
   check_outputs({options.output, options.still},
                 {options.video, options.track, options.fit, options.scene, options.camera});
   if (!options.still.empty()) check_picture_name(options.still);
@@ -84,7 +84,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_overlay_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<OverlayCommandOptions>();
   CLI::App* command =
       app.add_subcommand("overlay", "Draw observed and predicted path into the recording");
   command->add_option("video", options->video, "Recording the track was made from")

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "commands.hpp"
 #include "common/json_summary.hpp"
@@ -17,6 +16,7 @@
 #include "common/validators.hpp"
 #include "draw/encoded_file.hpp"
 #include "draw/render_picture.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/io.hpp"
@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 constexpr int kPerFrame = 16;  // samples of the motion per frame
 
-struct Options {
+struct RenderOptions {
   std::string scene;
   fs::path output, camera;
   double rate_hz = 0.0, until_s = 0.0;
@@ -105,7 +105,8 @@ data::Camera camera_over(const Motion& motion, const data::Body& body, int width
   return camera;
 }
 
-data::Camera camera_of(const Options& options, const data::Scene& scene, const Motion& motion) {
+data::Camera camera_of(const RenderOptions& options, const data::Scene& scene,
+                       const Motion& motion) {
   if (!options.camera.empty()) return data::read_camera(options.camera);
   if (auto camera = data::camera_of(scene, options.width_px, options.height_px)) return *camera;
   return camera_over(motion, *scene.body, options.width_px, options.height_px);
@@ -156,7 +157,7 @@ nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& mo
     json["markers"].push_back({{"kind", "dot"},
                                {"r_m", mark.distance_m},
                                {"radius_m", mark.size_m},
-                               {"angle_deg", mark.angle_rad * 180.0 / std::numbers::pi},
+                               {"angle_deg", data::degrees(mark.angle_rad)},
                                {"faces", faces}});
   }
   json["dynamics"] = {
@@ -192,14 +193,14 @@ Targets targets_of(const fs::path& output, bool lossless) {
   return {output, beside(".truth.csv"), beside(".camera.json"), beside(".object.json")};
 }
 
-void check_targets(const Options& options, const Targets& targets) {
+void check_targets(const RenderOptions& options, const Targets& targets) {
   if (is_folder(options.output)) check_folder(options.output);
   if (is_folder(options.output) && !fs::exists(options.output)) return;
   for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
     check_output(file, {options.scene, options.camera});
 }
 
-RenderStyle style_of(const Options& options) {
+RenderStyle style_of(const RenderOptions& options) {
   RenderStyle style = options.style;
   style.shadow = !options.no_shadow;
   if (options.body >= 0.0) style.body.setConstant(static_cast<float>(options.body));
@@ -220,7 +221,7 @@ void check_rate(const std::string& scene, double rate_hz, const fs::path& video)
 }
 
 // The scene with what the options set in it; run.rate_hz is the video's.
-data::Scene scene_to_draw(const Options& options, const Targets& targets) {
+data::Scene scene_to_draw(const RenderOptions& options, const Targets& targets) {
   data::Scene scene = load_scene(options.scene);
   if (!scene.body || !(scene.body->radius_m > 0.0))
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
@@ -242,7 +243,7 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
   return {run, scene.run.rate_hz};
 }
 
-data::Camera recording_camera(const Options& options, const data::Scene& scene,
+data::Camera recording_camera(const RenderOptions& options, const data::Scene& scene,
                               const Motion& motion) {
   data::Camera camera = camera_of(options, scene, motion);
   if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
@@ -288,7 +289,7 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
   constexpr int kFirst = 8;  // they tell what one takes
   for (int frame = 0; frame < frames; ++frame) {
     const double t_s = frame / rate_hz;
-    const double brightness = 1.0 + style.flicker * std::sin(2.0 * std::numbers::pi * 100.0 * t_s);
+    const double brightness = 1.0 + style.flicker * std::sin(data::kTurn * 100.0 * t_s);
     const auto poses = exposed_poses(motion, t_s, rate_hz, style);
     video.write(renderer.picture(renderer.light(poses), frame, brightness));
     truth += truth_row(frame, t_s, motion.at(t_s), camera);
@@ -318,7 +319,8 @@ void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Cam
                      scene.tracking.objects));
 }
 
-void tell(const Options& options, const Targets& targets, const data::Camera& camera, int frames) {
+void tell(const RenderOptions& options, const Targets& targets, const data::Camera& camera,
+          int frames) {
   if (options.json)
     return print_json({{"video", targets.video.string()},
                        {"truth", targets.truth.string()},
@@ -333,8 +335,8 @@ void tell(const Options& options, const Targets& targets, const data::Camera& ca
 }
 
 // All files of the recording, whole.
-void write(const Options& options, const data::Scene& scene, const Motion& motion,
-           const data::Camera& camera, int frames, const Targets& targets) {
+void write_recording(const RenderOptions& options, const data::Scene& scene, const Motion& motion,
+                     const data::Camera& camera, int frames, const Targets& targets) {
   EncodedFile video(targets.video, {camera.width_px, camera.height_px}, scene.run.rate_hz,
                     options.lossless ? coding::kLossless : coding::h264(options.quality));
   const std::string truth = draw(motion, scene, camera, style_of(options), frames, video);
@@ -356,21 +358,21 @@ fs::path folder_to_make(fs::path output) {
 }
 
 // A folder that was not there comes to be with all files in it or not at all.
-void write_with_folder(const Options& options, const data::Scene& scene, const Motion& motion,
+void write_with_folder(const RenderOptions& options, const data::Scene& scene, const Motion& motion,
                        const data::Camera& camera, int frames, const Targets& targets) {
   const fs::path outermost = folder_to_make(options.output);
-  if (outermost.empty()) return write(options, scene, motion, camera, frames, targets);
+  if (outermost.empty()) return write_recording(options, scene, motion, camera, frames, targets);
   PendingFolder pending(outermost);
   const fs::path folder =
       (pending.path() / options.output.lexically_relative(outermost)).lexically_normal();
   pending.told_by_its_name([&] {
     make_folder(folder);
-    write(options, scene, motion, camera, frames, targets_in(folder, options.lossless));
+    write_recording(options, scene, motion, camera, frames, targets_in(folder, options.lossless));
   });
   pending.commit();
 }
 
-void run(const Options& options) {
+void run(const RenderOptions& options) {
   const Targets targets = targets_of(options.output, options.lossless);
   check_targets(options, targets);
   const data::Scene scene = scene_to_draw(options, targets);
@@ -383,7 +385,7 @@ void run(const Options& options) {
   tell(options, targets, camera, frames);
 }
 
-void add_look_options(CLI::App& command, Options& options) {
+void add_look_options(CLI::App& command, RenderOptions& options) {
   RenderStyle& style = options.style;
   command.add_option("--body", options.body, "Brightness of the body, 0..1")
       ->check(number_within(0.0, 1.0));
@@ -412,7 +414,7 @@ void add_look_options(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_render_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RenderOptions>();
   CLI::App* command =
       app.add_subcommand("render", "Make a recording of a simulated scene, with its truth");
   command

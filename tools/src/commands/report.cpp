@@ -17,12 +17,12 @@
 namespace trochoid::tools {
 namespace {
 
-struct Options {
+struct ReportOptions {
   std::string folder, track, fit, output, path_svg;
   bool json = false;
 };
 
-ReportInput inputs(const Options& options) {
+ReportInput inputs(const ReportOptions& options) {
   if (options.folder.empty() == options.track.empty())
     throw InputError("report: give either the folder of a run or --track (with --fit)");
   if (!options.folder.empty()) return read_run_folder(options.folder);
@@ -38,7 +38,7 @@ ReportInput inputs(const Options& options) {
   return input;
 }
 
-void run(const Options& options) {
+void run(const ReportOptions& options) {
   check_outputs({options.output, options.path_svg}, {options.track, options.fit});
   if (const std::string ending = std::filesystem::path(options.output).extension().string();
       ending != ".html" && ending != ".htm")
@@ -59,7 +59,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_report_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand(
       "report", "Write one HTML page that shows a run and opens without a network");
   command->add_option("folder", options->folder, "Folder a run has made");

@@ -35,7 +35,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct RunOptions {
   TrackInputs inputs;
   TrackChoices choices;
   std::string output, model;
@@ -62,16 +62,16 @@ struct Run {
   }
 };
 
-fs::path folder_of(const Options& options) {
+fs::path folder_of(const RunOptions& options) {
   if (!options.output.empty()) return options.output;
   return recording_name(options.inputs.video) + ".trochoid";
 }
 
-std::string stem_of(const Options& options) {
+std::string stem_of(const RunOptions& options) {
   return recording_name(options.inputs.video);
 }
 
-Run prepared(const Options& options) {
+Run prepared(const RunOptions& options) {
   Run run;
   const TrackInputs& inputs = options.inputs;
   if (!inputs.scene.empty()) run.scene = data::read_scene(inputs.scene);
@@ -85,7 +85,7 @@ Run prepared(const Options& options) {
   return run;
 }
 
-void track(Run& run, const Options& options) {
+void track(Run& run, const RunOptions& options) {
   Progress progress("track");
   tracking::TrackOptions how = track_options(run.scene, options.choices);
   how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
@@ -93,7 +93,7 @@ void track(Run& run, const Options& options) {
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
 }
 
-fitting::FitOptions fit_options(const Options& options, Progress& progress) {
+fitting::FitOptions fit_options(const RunOptions& options, Progress& progress) {
   fitting::FitOptions how;
   how.free_pivot = options.free_pivot;
   how.seed = options.seed;
@@ -106,7 +106,7 @@ fitting::FitOptions fit_options(const Options& options, Progress& progress) {
 }
 
 // A scene that names its model must be able to feed it; one that does not is fitted if it can be.
-void fit(Run& run, const Options& options) {
+void fit(Run& run, const RunOptions& options) {
   if (!has_metres(run.tracked.file)) {
     run.no_fit_reason =
         "there is no scale; give the body's radius, a scale or a camera file in a scene";
@@ -145,7 +145,7 @@ data::Scene kept_scene(const Run& run) {
   return kept;
 }
 
-void write_data(Run& run, const Options& options, const fs::path& folder) {
+void write_data(Run& run, const RunOptions& options, const fs::path& folder) {
   const std::string stem = stem_of(options);
   const data::Scene kept = kept_scene(run);
   data::write_text(data::to_toml(kept), folder / "scene.toml");
@@ -162,7 +162,7 @@ void write_data(Run& run, const Options& options, const fs::path& folder) {
 }
 
 // Shows the part where something was tracked: a clip may be much longer than its motion.
-OverlayOptions overlay_options(const Run& run, const Options& options) {
+OverlayOptions overlay_options(const Run& run, const RunOptions& options) {
   constexpr double kMostlyTracked = 0.7;
   constexpr std::int64_t kLeadFrames = 20;
   const data::TrackingSettings& scene = run.scene.tracking;
@@ -183,7 +183,7 @@ OverlayOptions overlay_options(const Run& run, const Options& options) {
   return how;
 }
 
-void show(Run& run, const Options& options, const fs::path& folder) {
+void show(Run& run, const RunOptions& options, const fs::path& folder) {
   OverlayInput input;
   input.video = options.inputs.video;
   input.tracks = run.tracked.file;
@@ -197,7 +197,7 @@ void show(Run& run, const Options& options, const fs::path& folder) {
   run.overlay = write_overlay(input, how, folder / "overlay.mp4");
 }
 
-std::string command_line(const Options& options) {
+std::string command_line(const RunOptions& options) {
   std::string line = "trochoid run " + shell_quoted(options.inputs.video);
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) line += fmt::format(" {} {}", name, shell_quoted(value));
@@ -218,7 +218,7 @@ std::string command_line(const Options& options) {
   return line;
 }
 
-void write_run_file(const Run& run, const Options& options, const fs::path& folder) {
+void write_run_file(const Run& run, const RunOptions& options, const fs::path& folder) {
   nlohmann::ordered_json file;
   file["trochoid"] = TROCHOID_VERSION;
   const fs::path video = fs::absolute(options.inputs.video).lexically_normal();
@@ -237,12 +237,12 @@ void write_run_file(const Run& run, const Options& options, const fs::path& fold
   data::write_text(file.dump(1) + "\n", folder / kRunFile);
 }
 
-void write_times(const Run& run, const Options& options, const fs::path& folder) {
+void write_times(const Run& run, const RunOptions& options, const fs::path& folder) {
   data::write_text(run.times.dump(1) + "\n", folder / (stem_of(options) + ".timing.json"));
 }
 
 /// A short answer for people on stdout, or the same as JSON.
-void tell(const Run& run, const Verdict& verdict, const Options& options) {
+void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
   const fs::path folder = folder_of(options);
   if (options.json) {
     nlohmann::ordered_json summary{{"folder", folder.string()},
@@ -277,7 +277,7 @@ void tell(const Run& run, const Verdict& verdict, const Options& options) {
 }
 
 /// All files of the folder.
-Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
+Verdict write_all(Run& run, const RunOptions& options, const fs::path& folder) {
   write_data(run, options, folder);
   run.timed("overlay", [&] { show(run, options, folder); });
   write_run_file(run, options, folder);
@@ -293,7 +293,7 @@ Verdict write_all(Run& run, const Options& options, const fs::path& folder) {
   return verdict;
 }
 
-void run(const Options& options) {
+void run(const RunOptions& options) {
   Run run = prepared(options);
   check_replaceable(folder_of(options),
                     {options.inputs.video, options.inputs.scene, options.inputs.camera});
@@ -309,8 +309,8 @@ void run(const Options& options) {
     throw NotGood(fmt::format("the fit is not good: {}", run.fit->reason));
 }
 
-std::shared_ptr<Options> add_options(CLI::App& command) {
-  auto options = std::make_shared<Options>();
+std::shared_ptr<RunOptions> add_options(CLI::App& command) {
+  auto options = std::make_shared<RunOptions>();
   add_track_options(
       command, options->inputs, options->choices,
       "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "commands.hpp"
@@ -19,6 +18,7 @@
 #include "common/validators.hpp"
 #include "draw/animation.hpp"
 #include "draw/trajectory_plots.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/table.hpp"
@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SimulateOptions {
   std::string scene;
   fs::path fit, output, plots, animation;
   std::size_t arc = 0;
@@ -39,7 +39,7 @@ struct Options {
   bool list = false, steady = false, thesis = false, json = false;
 };
 
-void apply_overrides(const Options& options, data::Scene& scene) {
+void apply_overrides(const SimulateOptions& options, data::Scene& scene) {
   if (options.until_s) scene.run.until_s = *options.until_s;
   if (options.rate_hz) scene.run.rate_hz = *options.rate_hz;
   if (options.tolerance) scene.run.tolerance = *options.tolerance;
@@ -75,8 +75,7 @@ nlohmann::ordered_json steady_json(const std::vector<model::SteadyMotion>& motio
 void print_steady(const data::Scene& scene, bool as_json) {
   if (!scene.body) throw InputError("--steady needs a [body] in the scene");
   std::vector<double> tilts_rad;
-  for (int degrees = 10; degrees <= 80; degrees += 10)
-    tilts_rad.push_back(degrees * std::numbers::pi / 180.0);
+  for (int degrees = 10; degrees <= 80; degrees += 10) tilts_rad.push_back(data::radians(degrees));
   const std::vector<model::SteadyMotion> motions =
       model::steady_catalogue(*scene.body, scene.model.gravity_m_s2, tilts_rad);
   if (as_json) return print_json({{"steady", steady_json(motions)}});
@@ -88,10 +87,9 @@ void print_steady(const data::Scene& scene, bool as_json) {
     const std::string nutation =
         std::isnan(nu2) ? "-" : fmt::format("{:.4f}", std::sqrt(std::abs(nu2)));
     fmt::print("{:<7} {:<17} {:>9.1f} {:>14.4f} {:>10.4f} {:>11.5g} {:>9.4g} {:>8.4f} {:>16}  {}\n",
-               model::name(motion.floor), model::name(motion.kind),
-               motion.theta_rad * 180.0 / std::numbers::pi, motion.precession_rad_s,
-               motion.w3_rad_s, motion.circle_radius_m, motion.normal_force_N,
-               motion.friction_demand, nutation,
+               model::name(motion.floor), model::name(motion.kind), data::degrees(motion.theta_rad),
+               motion.precession_rad_s, motion.w3_rad_s, motion.circle_radius_m,
+               motion.normal_force_N, motion.friction_demand, nutation,
                std::isnan(nu2)   ? "rests on a line or a face"
                : motion.stable() ? "stable"
                                  : "unstable, grows at this rate");
@@ -99,13 +97,13 @@ void print_steady(const data::Scene& scene, bool as_json) {
 }
 
 /// "ring" of ring.toml and ring.fit.json, the name of a bundled scene.
-std::string stem_of(const Options& options) {
+std::string stem_of(const SimulateOptions& options) {
   if (!options.fit.empty()) return options.fit.stem().stem().string();
   const fs::path named(options.scene);
   return named.extension() == ".toml" ? named.stem().string() : options.scene;
 }
 
-void tell(const Options& options, const model::Trajectory& run, const fs::path& output,
+void tell(const SimulateOptions& options, const model::Trajectory& run, const fs::path& output,
           const std::vector<std::string>& pictures) {
   const std::string outcome(model::sentence(run.outcome));
   if (options.json)
@@ -138,7 +136,7 @@ void check_rows(const std::string& scene, const data::RunSettings& run) {
         scene, run.until_s, run.rate_hz, 1.0 / run.until_s));
 }
 
-void simulate_scene(const Options& options) {
+void simulate_scene(const SimulateOptions& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
   const fs::path output =
@@ -177,7 +175,7 @@ void simulate_scene(const Options& options) {
                               model::sentence(run.outcome)));
 }
 
-void run(const Options& options) {
+void run(const SimulateOptions& options) {
   if (options.list) return list_scenes(options.json);
   if (options.scene.empty() == options.fit.empty())
     throw InputError(
@@ -189,7 +187,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   CLI::App* command =
       app.add_subcommand("simulate", "Run a scene's model and write its trajectory");
   command->add_option("--scene,-s", options->scene,

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct TrackCommandOptions {
   TrackInputs inputs;
   TrackChoices choices;
   fs::path edges, smooth, output;
@@ -64,7 +64,7 @@ std::string smooth_words(const tracking::SmoothTrack& smoothed) {
 }
 
 /// How many frames showed what, for people or for scripts.
-void tell(const Options& options, const tracking::TrackResult& result,
+void tell(const TrackCommandOptions& options, const tracking::TrackResult& result,
           const std::optional<tracking::SmoothTrack>& smoothed) {
   const tracking::TrackSummary& s = result.summary;
   if (!options.json) {
@@ -95,7 +95,7 @@ void tell(const Options& options, const tracking::TrackResult& result,
   print_json(summary);
 }
 
-void run(const Options& options) {
+void run(const TrackCommandOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   check_outputs({options.output, options.edges, options.smooth, timing_file(options.output)},
                 {options.inputs.video, options.inputs.scene, options.inputs.camera});
@@ -128,7 +128,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_track_command(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrackCommandOptions>();
   CLI::App* track = app.add_subcommand("track", "Follow the moving bodies of a recording");
   add_track_options(
       *track, options->inputs, options->choices,

@@ -20,7 +20,7 @@ constexpr const char* kNotStarted = "cannot be started: ";
 /// In the child, between fork() and exec(), where nothing may be called that takes a lock.
 [[noreturn]] void end_unstarted(int error) {
   for (const char* words : {kNotStarted, strerrordesc_np(error)})
-    if (words != nullptr && write(STDERR_FILENO, words, std::strlen(words)) < 0) break;
+    if (words != nullptr && ::write(STDERR_FILENO, words, std::strlen(words)) < 0) break;
   _exit(127);
 }
 
@@ -58,7 +58,7 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
   close(pipe_ends[1]);
   if (child > 0) {
     std::array<char, 4096> buffer{};
-    for (ssize_t n = 0; (n = read(pipe_ends[0], buffer.data(), buffer.size())) > 0;)
+    for (ssize_t n = 0; (n = ::read(pipe_ends[0], buffer.data(), buffer.size())) > 0;)
       run.error_output.append(buffer.data(), static_cast<std::size_t>(n));
     int status = 0;
     rusage usage{};

@@ -19,17 +19,17 @@ std::array<int, 2> wake_up{};  // a pipe: all a signal handler may do is write t
 void on_signal(int number) {
   const int before = errno;
   const auto byte = static_cast<unsigned char>(number);
-  [[maybe_unused]] const ssize_t written = write(wake_up[1], &byte, 1);
+  [[maybe_unused]] const ssize_t written = ::write(wake_up[1], &byte, 1);
   errno = before;
 }
 
 void wait_for_signal() {
   unsigned char number = 0;
-  while (read(wake_up[0], &number, 1) != 1) {
+  while (::read(wake_up[0], &number, 1) != 1) {
   }
   data::remove_pending_and_stop();
   constexpr std::string_view kWords = "\rtrochoid: interrupted, unfinished files are removed\n";
-  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kWords.data(), kWords.size());
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
   end_by(number);
 }
 

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
+#include "common/constants.hpp"
 #include "common/fitted_scene.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -17,7 +17,6 @@ namespace trochoid::tools {
 namespace {
 
 using model::Observable;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kFinest = 8;          // grid points per frame interval, enough for a smooth curve
 constexpr int kMostPoints = 40000;  // per arc, bounds memory and time on long recordings
 
@@ -225,7 +224,7 @@ std::optional<double> spin_residual_rad(const data::TrackSample& sample, int obj
   if (!sample.psi || arc == nullptr) return std::nullopt;
   const auto pose = path.at(object, sample.t_s);
   if (!pose) return std::nullopt;
-  return std::remainder(sample.psi->value_rad - pose->psi_rad, 2.0 * std::numbers::pi);
+  return std::remainder(sample.psi->value_rad - pose->psi_rad, data::kTurn);
 }
 
 std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,

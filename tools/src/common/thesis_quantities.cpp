@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/integral.hpp"
 
 namespace trochoid::tools {
@@ -20,8 +20,7 @@ void append(data::Table& table, const std::string& name, const Array& values) {
 }
 
 Array wrapped(const Array& angle) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  return angle.unaryExpr([](double a) { return std::remainder(a, kTurn); });
+  return angle.unaryExpr([](double a) { return std::remainder(a, data::kTurn); });
 }
 
 std::optional<Eigen::Vector3d> principal_moments(const data::Scene& scene) {

@@ -15,19 +15,19 @@ namespace {
 
 constexpr int kSize_px = 640, kMargin_px = 40;
 constexpr double kFrameRate_hz = 30.0, kLongest_s = 20.0, kTail_s = 0.6;
-constexpr int kShift = 4;  // sub-pixel bits of OpenCV's drawing functions
+constexpr int kSubPixelBits = 4;  // sub-pixel bits of OpenCV's drawing functions
 const cv::Scalar kBlue(178, 114, 0), kVermillion(0, 94, 213), kGrey(200, 200, 200);
 
 /// Table to picture, equal scales.
-class View {
+class AnimationView {
  public:
-  View(const Eigen::VectorXd& x, const Eigen::VectorXd& y)
+  AnimationView(const Eigen::VectorXd& x, const Eigen::VectorXd& y)
       : centre_(0.5 * (x.minCoeff() + x.maxCoeff()), 0.5 * (y.minCoeff() + y.maxCoeff())) {
     const double span = std::max(x.maxCoeff() - x.minCoeff(), y.maxCoeff() - y.minCoeff());
     scale_ = (kSize_px - 2 * kMargin_px) / (span > 0.0 ? span : 1.0);
   }
   [[nodiscard]] cv::Point operator()(double x, double y) const {
-    const double one = 1 << kShift;
+    const double one = 1 << kSubPixelBits;
     return {static_cast<int>(std::lround((0.5 * kSize_px + scale_ * (x - centre_.x())) * one)),
             static_cast<int>(std::lround((0.5 * kSize_px - scale_ * (y - centre_.y())) * one))};
   }
@@ -53,7 +53,7 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
   const double span_s = t[t.size() - 1] - t[0];
   const double speed = std::max(1.0, span_s / kLongest_s);
   const int frames = std::max(2, static_cast<int>(span_s / speed * kFrameRate_hz));
-  const View view(x, y);
+  const AnimationView view(x, y);
 
   EncodedFile video(path, {kSize_px, kSize_px}, kFrameRate_hz, coding::kForViewing);
   Progress progress("animate");
@@ -63,13 +63,14 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
     const double now = t[0] + span_s * frame / (frames - 1);
     for (; row + 1 < t.size() && t[row + 1] <= now; ++row)
       cv::line(trace, view(x[row], y[row]), view(x[row + 1], y[row + 1]), kGrey, 1, cv::LINE_AA,
-               kShift);
+               kSubPixelBits);
     while (tail < row && t[tail] < now - kTail_s * speed) ++tail;
     cv::Mat picture = trace.clone();
     for (Eigen::Index i = tail; i < row; ++i)
-      cv::line(picture, view(x[i], y[i]), view(x[i + 1], y[i + 1]), kBlue, 2, cv::LINE_AA, kShift);
-    cv::circle(picture, view(x[row], y[row]), 6 << kShift, kVermillion, cv::FILLED, cv::LINE_AA,
-               kShift);
+      cv::line(picture, view(x[i], y[i]), view(x[i + 1], y[i + 1]), kBlue, 2, cv::LINE_AA,
+               kSubPixelBits);
+    cv::circle(picture, view(x[row], y[row]), 6 << kSubPixelBits, kVermillion, cv::FILLED,
+               cv::LINE_AA, kSubPixelBits);
     cv::putText(picture, fmt::format("t = {:.2f} s", now), {12, kSize_px - 14},
                 cv::FONT_HERSHEY_SIMPLEX, 0.55, {0, 0, 0}, 1, cv::LINE_AA);
     video.write(picture);

@@ -10,6 +10,12 @@
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tools {
+// Where a ray first meets the body, in body axes.
+struct RayHit {
+  double distance = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d at, normal;
+};
+
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -22,14 +28,8 @@ Eigen::Matrix3d attitude(const data::Pose<>& pose) {
       .toRotationMatrix();
 }
 
-// Where a ray first meets the body, in body axes.
-struct Hit {
-  double distance = kNone;
-  Eigen::Vector3d at, normal;
-};
-
 void meet_plane(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double z, double inner,
-                double outer, Hit& hit) {
+                double outer, RayHit& hit) {
   if (along.z() == 0.0) return;
   const double t = (z - from.z()) / along.z();
   if (!(t > 0.0 && t < hit.distance)) return;
@@ -41,7 +41,7 @@ void meet_plane(const Eigen::Vector3d& from, const Eigen::Vector3d& along, doubl
 
 // side +1: seen from outside, -1: the wall of a bore.
 void meet_wall(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double radius,
-               double lowest, double highest, double side, Hit& hit) {
+               double lowest, double highest, double side, RayHit& hit) {
   const double a = along.head<2>().squaredNorm(), b = from.head<2>().dot(along.head<2>());
   const double c = from.head<2>().squaredNorm() - radius * radius;
   const double root2 = b * b - a * c;
@@ -56,9 +56,10 @@ void meet_wall(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double
   }
 }
 
-Hit meet_body(const data::Body& body, const Eigen::Vector3d& from, const Eigen::Vector3d& along) {
+RayHit meet_body(const data::Body& body, const Eigen::Vector3d& from,
+                 const Eigen::Vector3d& along) {
   const double h = body.half_thickness_m();
-  Hit hit;
+  RayHit hit;
   for (const double z : {h, -h})
     meet_plane(from, along, z, body.inner_radius_m, body.radius_m, hit);
   meet_wall(from, along, body.radius_m, -h, h, 1.0, hit);
@@ -105,7 +106,7 @@ struct PictureRenderer::Posed {
 /// What a ray meets.
 struct PictureRenderer::Seen {
   bool body = false;
-  Hit hit;                  ///< in body axes
+  RayHit hit;               ///< in body axes
   Eigen::Vector3d along;    ///< of the ray, in body axes
   Eigen::Vector3d floor_m;  ///< where it would meet the floor
 };

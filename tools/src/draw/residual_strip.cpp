@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "common/constants.hpp"
 #include "draw/canvas.hpp"
 #include "draw/round_lengths.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -19,7 +20,6 @@ const cv::Scalar kTwoSigma(232, 228, 226);
 const cv::Scalar kOneSigma(212, 205, 200);
 const cv::Scalar kAxis(90, 90, 90);
 const cv::Scalar kWords(40, 40, 40);
-constexpr double kMmPerM = 1000.0;
 
 // Half height of a row: room for two sigma and all but the wildest residuals.
 double limit_mm(const std::vector<Residual>& list) {

@@ -17,7 +17,7 @@ namespace trochoid::tools {
 namespace {
 
 constexpr int kStillWidthPx = 1280;
-constexpr double kMostEnlarged = 6.0;  // beyond that a pixel of the recording is a tile
+constexpr double kMostEnlargedStill = 6.0;  // beyond that a pixel of the recording is a tile
 
 struct Box {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = Eigen::Vector2d::Constant(-1e9);
@@ -60,7 +60,7 @@ cv::Rect cutting_of(const OverlayContent& content, cv::Size frame) {
   Eigen::Vector2d size = box.high - box.low;
   const Eigen::Vector2d centre = 0.5 * (box.low + box.high);
   size = (1.25 * size.array() + 24.0).matrix();
-  size.x() = std::max({size.x(), size.y() / 1.5, kStillWidthPx / kMostEnlarged});
+  size.x() = std::max({size.x(), size.y() / 1.5, kStillWidthPx / kMostEnlargedStill});
   size.y() = std::max(size.y(), size.x() / 3.0);
   const cv::Rect wanted(cvFloor(centre.x() - 0.5 * size.x()), cvFloor(centre.y() - 0.5 * size.y()),
                         cvCeil(size.x()), cvCeil(size.y()));
@@ -145,7 +145,8 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
   const OverlayContent content(input, frame.cols, frame.rows);
   content.check_pictures(frame.cols, frame.rows, input.video.string());
   Enlargement view{cutting_of(content, frame.size()), 1.0};
-  view.factor = std::min(kMostEnlarged, static_cast<double>(kStillWidthPx) / view.cutting.width);
+  view.factor =
+      std::min(kMostEnlargedStill, static_cast<double>(kStillWidthPx) / view.cutting.width);
   cv::Mat picture = view.picture(frame);
   const double text_px = std::clamp(picture.cols / 80.0, 9.0, 16.0);
   draw_paths(picture, content, view);

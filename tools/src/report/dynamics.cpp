@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "common/constants.hpp"
 #include "common/fitted_scene.hpp"
 #include "report/parts.hpp"
 #include "trochoid/data/error.hpp"
@@ -15,8 +15,6 @@
 // What the fitted motion does that no camera sees: energy and forces.
 namespace trochoid::tools {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// One arc of the fit, simulated; nothing if the model cannot run it alone.
 std::optional<data::Table> run_arc(const data::Fit& fit, std::size_t arc, data::Scene& scene) {

@@ -2,13 +2,12 @@
 #include <cmath>
 #include <limits>
 
+#include "common/constants.hpp"
 #include "report/parts.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 void count_gaps(const data::Track& track, ReportFacts& facts) {
   for (std::size_t i = 1; i < track.samples.size(); ++i) {

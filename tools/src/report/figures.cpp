@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 
+#include "common/constants.hpp"
 #include "draw/svg.hpp"
 #include "report/parts.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/model/predictor.hpp"
 
 namespace trochoid::tools {
 namespace {
 
-constexpr double kMmPerM = 1000.0;
-constexpr std::size_t kMostPoints = 6000;  // per curve: more cannot be told apart in print
+constexpr std::size_t kMostPointsDrawn = 6000;  // per curve: more cannot be told apart in print
 
 // x-y of the samples in millimetres or pixels (then y up, as on paper), where they have one.
 std::vector<Eigen::Vector2d> observed_points(const ReportFacts& facts, const data::Track& track) {
@@ -28,7 +28,7 @@ std::vector<Eigen::Vector2d> observed_points(const ReportFacts& facts, const dat
 }
 
 std::vector<Eigen::Vector2d> every_nth(std::vector<Eigen::Vector2d> points) {
-  const std::size_t stride = points.size() / kMostPoints + 1;
+  const std::size_t stride = points.size() / kMostPointsDrawn + 1;
   if (stride == 1) return points;
   std::vector<Eigen::Vector2d> kept;
   for (std::size_t i = 0; i < points.size(); i += stride) kept.push_back(points[i]);
@@ -116,7 +116,7 @@ std::string histogram_figure(const ReportFacts& facts) {
   }
   std::vector<Eigen::Vector2d> bell;
   for (double z = -kReach; z <= kReach; z += 0.05)
-    bell.emplace_back(z, std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi));
+    bell.emplace_back(z, std::exp(-0.5 * z * z) / std::sqrt(2.0 * data::kPi));
   plot.line(bell, ink::words, 1.5);
   plot.key("normal", ink::words, true);
   return plot.text();

@@ -1,20 +1,17 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <utility>
 
+#include "common/constants.hpp"
 #include "report/parts.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tools {
 namespace {
 
 using nlohmann::json;
-constexpr double kMmPerM = 1000.0;
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostRows = 20000;  // a page with more is slow and shows no more
 
 double usual_step_s(const data::Track& track) {
@@ -25,16 +22,16 @@ double usual_step_s(const data::Track& track) {
   return data::median(std::move(steps));
 }
 
-struct Row {
+struct SampleRow {
   double t_s;
   const data::TrackSample* sample;  ///< none within a gap
 };
 
 // The samples, and the frames missing between them, so that gaps look like gaps.
-std::vector<Row> rows_of(const data::Track& track) {
+std::vector<SampleRow> rows_of(const data::Track& track) {
   const double step_s = usual_step_s(track);
   const std::size_t stride = track.samples.size() / kMostRows + 1;
-  std::vector<Row> rows;
+  std::vector<SampleRow> rows;
   for (std::size_t i = 0; i < track.samples.size(); i += stride) {
     if (i > 0 && stride == 1) {
       const double from_s = track.samples[i - 1].t_s, length_s = track.samples[i].t_s - from_s;
@@ -55,11 +52,12 @@ json number(double value) {
   return std::round(value * unit) / unit;
 }
 
-class Series {
+class ObjectSeries {
  public:
-  Series(const ReportFacts& facts, std::size_t index)
+  ObjectSeries(const ReportFacts& facts, std::size_t index)
       : facts_(facts), track_(facts.input.tracks.tracks[index]), rows_(rows_of(track_)) {
-    for (const Row& row : rows_) poses_.push_back(facts.prediction.at(track_.object, row.t_s));
+    for (const SampleRow& row : rows_)
+      poses_.push_back(facts.prediction.at(track_.object, row.t_s));
     arc_ = facts.prediction.arcs.empty() ? nullptr : &facts.prediction.arcs.front();
   }
 
@@ -68,7 +66,7 @@ class Series {
     made["name"] =
         facts_.input.tracks.tracks.size() > 1 ? "object " + std::to_string(track_.object) : "";
     made["t"] = json::array();
-    for (const Row& row : rows_) made["t"].push_back(std::round(row.t_s * 1e7) / 1e7);
+    for (const SampleRow& row : rows_) made["t"].push_back(std::round(row.t_s * 1e7) / 1e7);
     made["path"] = path();
     made["charts"] = json::array();
     for (int axis = 0; axis < 2; ++axis) made["charts"].push_back(position(axis));
@@ -206,11 +204,11 @@ class Series {
       json chart{{"label", angle.label}, {"series", json::array()}};
       if (angle.modelled)
         chart["series"].push_back(line("predicted", "line", "predicted", column([&](std::size_t i) {
-                                         return predicted[i] * kDegPerRad;
+                                         return data::degrees(predicted[i]);
                                        })));
       if (any_seen)
         chart["series"].push_back(line("observed", "dots", "observed", column([&](std::size_t i) {
-                                         return measured[i] * kDegPerRad;
+                                         return data::degrees(measured[i]);
                                        })));
       charts.push_back(std::move(chart));
     }
@@ -222,7 +220,7 @@ class Series {
     std::vector<json> charts;
     if (arc_ == nullptr || !facts_.input.fit) return charts;
     std::vector<double> times_s;
-    for (const Row& row : rows_) times_s.push_back(row.t_s);
+    for (const SampleRow& row : rows_) times_s.push_back(row.t_s);
     for (const DynamicsChart& curve :
          dynamics_of(*facts_.input.fit, facts_.input.fit_track, track_.object, times_s)) {
       json chart{{"label", curve.label}, {"series", json::array()}};
@@ -236,28 +234,27 @@ class Series {
   // A track of a body with equal faces reports folded tilts: so is the prediction shown.
   [[nodiscard]] double predicted_angle(std::size_t i, double data::Pose<>::*angle) const {
     const data::Pose<>& pose = *poses_[i];
-    const bool turned =
-        facts_.input.tracks.angles_folded && pose.theta_rad > 0.5 * std::numbers::pi;
-    if (angle == &data::Pose<>::theta_rad && turned) return std::numbers::pi - pose.theta_rad;
-    if (angle == &data::Pose<>::phi_rad && turned) return pose.phi_rad + std::numbers::pi;
+    const bool turned = facts_.input.tracks.angles_folded && pose.theta_rad > 0.5 * data::kPi;
+    if (angle == &data::Pose<>::theta_rad && turned) return data::kPi - pose.theta_rad;
+    if (angle == &data::Pose<>::phi_rad && turned) return pose.phi_rad + data::kPi;
     return pose.*angle;
   }
 
   // Whole turns between two countings of the same angle are a matter of where counting began.
   static void align(std::vector<double>& predicted, const std::vector<double>& measured) {
-    constexpr double kTurn = 2.0 * std::numbers::pi;
     std::vector<double> differences;
     for (std::size_t i = 0; i < predicted.size(); ++i)
       if (std::isfinite(measured[i] - predicted[i]))
         differences.push_back(measured[i] - predicted[i]);
     if (differences.empty()) return;
-    const double shift = kTurn * std::round(data::median(std::move(differences)) / kTurn);
+    const double shift =
+        data::kTurn * std::round(data::median(std::move(differences)) / data::kTurn);
     for (double& value : predicted) value += shift;
   }
 
   const ReportFacts& facts_;
   const data::Track& track_;
-  std::vector<Row> rows_;
+  std::vector<SampleRow> rows_;
   std::vector<std::optional<data::Pose<>>> poses_;
   const PredictedArc* arc_ = nullptr;
 };
@@ -268,7 +265,7 @@ nlohmann::json series_of(const ReportFacts& facts) {
   json made;
   made["objects"] = json::array();
   for (std::size_t i = 0; i < facts.input.tracks.tracks.size(); ++i)
-    made["objects"].push_back(Series(facts, i).object());
+    made["objects"].push_back(ObjectSeries(facts, i).object());
   json times = json::array();
   for (const double t_s : facts.input.video_t_s) times.push_back(std::round(t_s * 1e7) / 1e7);
   made["video"] = {{"rate", facts.input.video_rate_hz}, {"t", std::move(times)}};

@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ChainOptions {
   std::vector<fs::path> folders;
   int count = 20;
   std::uint64_t seed = 1;
@@ -87,7 +87,7 @@ std::vector<FitSetting> fit_settings() {
   return list;
 }
 
-FitOutcome measure(const FitSetting& setting, const Options& options) {
+FitOutcome measure(const FitSetting& setting, const ChainOptions& options) {
   constexpr double kReached_sigma = 5.0;
   FitOutcome outcome;
   std::vector<double> errors, sigmas, times_ms, integration;
@@ -144,7 +144,7 @@ Axes fit_panel(const std::vector<FitSetting>& settings, const std::vector<FitOut
   return axes;
 }
 
-Axes study_fitting(const Options& options) {
+Axes study_fitting(const ChainOptions& options) {
   const std::vector<FitSetting> settings = fit_settings();
   std::vector<FitOutcome> outcomes;
   {
@@ -173,7 +173,7 @@ Axes study_fitting(const Options& options) {
   return fit_panel(settings, outcomes);
 }
 
-void run(const Options& options) {
+void run(const ChainOptions& options) {
   for (const fs::path& folder : options.folders)
     for (const char* file : {"video.mp4", "truth.csv", "camera.json", "object.json"})
       if (!fs::exists(folder / file))
@@ -194,7 +194,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_chain(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ChainOptions>();
   CLI::App* command = study.add_subcommand(
       "chain", "What each setting of tracking and fitting buys, and what it costs");
 #ifdef TROCHOID_HAS_TRACKING

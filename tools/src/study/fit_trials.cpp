@@ -7,9 +7,9 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <span>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -135,7 +135,7 @@ Eigen::VectorXd errors_of(const MadeTrack& made, const data::Fit& fit) {
     const std::string& name = fit.covariance_names[static_cast<std::size_t>(i)];
     const data::FitParameter* parameter = fit.find(name);
     errors[i] = parameter->value - made.truth.at(name);
-    if (parameter->unit == "rad") errors[i] = std::remainder(errors[i], 2.0 * std::numbers::pi);
+    if (parameter->unit == "rad") errors[i] = std::remainder(errors[i], data::kTurn);
   }
   return errors;
 }

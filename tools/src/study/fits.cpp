@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct FitsOptions {
   MadeTrackOptions tracks;
   int count = 100;
   int draws = 0;
@@ -103,7 +103,7 @@ void write_diagram(const std::vector<FitStrategy>& strategies, const std::vector
   write_plot({axes}, path);
 }
 
-void run(const Options& options) {
+void run(const FitsOptions& options) {
   fitting::silence_solver_log();
   make_folder(options.out);
   const std::vector<FitStrategy> strategies = fit_strategies();
@@ -141,7 +141,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_fits(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FitsOptions>();
   CLI::App* command = study.add_subcommand(
       "fits", "Success, error, honesty and run time of every fitting strategy on random scenes");
   command->add_option("--model", options->tracks.model, "top, thesis, rolling or puck")

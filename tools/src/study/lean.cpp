@@ -32,11 +32,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct LeanOptions {
   fs::path out = "study-lean", video;
 };
 
-struct Row {
+struct LeanRow {
   std::string part, has;
   long operations = 0;  ///< of one right-hand side, 0 = not applicable
   double time_us = 0.0;
@@ -87,7 +87,7 @@ long rolling_operations() {
   return model::operations_of(system, y).total();
 }
 
-void add_terms(std::vector<Row>& rows) {
+void add_terms(std::vector<LeanRow>& rows) {
   using namespace model;
   const std::vector<double> t_s = times_s(2.0, 240.0);
   PredictRequest request;
@@ -109,7 +109,7 @@ void add_terms(std::vector<Row>& rows) {
 
 /// What the state has to hold, by what can change: the spin of a top without drag, the slip of a
 /// body that rolls, are no components of it.
-void add_states(std::vector<Row>& rows) {
+void add_states(std::vector<LeanRow>& rows) {
   using namespace model;
   constexpr int kEvaluations = 1000;
   const auto add = [&](const char* part, const char* has, const auto& counted, const auto& system,
@@ -139,7 +139,7 @@ void add_states(std::vector<Row>& rows) {
       State<double, 10>{{0.1, 1.0, 0.2, 0.3, 4.0, -10.0, 0.0, 0.0, 0.05, 0.02}});
 }
 
-void add_outputs(std::vector<Row>& rows) {
+void add_outputs(std::vector<LeanRow>& rows) {
   using model::Observable;
   const data::Scene scene = load_scene("thesis-base");
   const std::vector<double> t_s = times_s(60.0, 100.0), end{60.0};
@@ -181,7 +181,7 @@ double decode_us(const fs::path& video, bool colour) {
 }
 
 /// Outlines are projected into the picture as it is; no picture is ever resampled to undistort it.
-void add_undistortion(std::vector<Row>& rows) {
+void add_undistortion(std::vector<LeanRow>& rows) {
   constexpr int kPoints = 1000;
   data::Camera camera = data::Camera::overhead(1280, 720, 2000.0, 1.2);
   const auto add = [&](const char* has) {
@@ -197,7 +197,7 @@ void add_undistortion(std::vector<Row>& rows) {
   add("distortion, five terms");
 }
 
-void add_decoding(const fs::path& video, std::vector<Row>& rows) {
+void add_decoding(const fs::path& video, std::vector<LeanRow>& rows) {
   rows.push_back({"decoding, per frame", "luma", 0, decode_us(video, false)});
   rows.push_back({"decoding, per frame", "luma and colour", 0, decode_us(video, true)});
 }
@@ -215,12 +215,12 @@ int libraries() {
   return static_cast<int>(names.size());
 }
 
-void print_rows(const std::vector<Row>& rows) {
+void print_rows(const std::vector<LeanRow>& rows) {
   fmt::print("{:<27} {:<28} {:>12} {:>10} {:>9}\n", "part", "the scene has", "operations",
              "time_us", "of lean");
   double lean = 0.0;
   std::string part;
-  for (const Row& row : rows) {
+  for (const LeanRow& row : rows) {
     if (row.part != part) lean = row.time_us;
     part = row.part;
     fmt::print("{:<27} {:<28} {:>12} {:>10.1f} {:>8.2f}x\n", row.part, row.has,
@@ -229,9 +229,9 @@ void print_rows(const std::vector<Row>& rows) {
   }
 }
 
-void run(const Options& options) {
+void run(const LeanOptions& options) {
   make_folder(options.out);
-  std::vector<Row> rows;
+  std::vector<LeanRow> rows;
   add_terms(rows);
   add_states(rows);
   add_outputs(rows);
@@ -248,7 +248,7 @@ void run(const Options& options) {
   fmt::print("shared libraries loaded: {} ({})\n", libraries(), build);
   fmt::print("operations: of one right-hand side; time: fastest run, 2 s at 240 Hz of rolling\n");
   std::string csv = "part,has,operations,time_us\n";
-  for (const Row& row : rows)
+  for (const LeanRow& row : rows)
     csv += fmt::format("\"{}\",\"{}\",{},{}\n", row.part, row.has, row.operations, row.time_us);
   data::write_text(csv, options.out / "lean.csv");
 }
@@ -256,7 +256,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_lean(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LeanOptions>();
   CLI::App* command = study.add_subcommand("lean", "What a scene leaves out, and what that saves");
   command->add_option("--out", options->out, "Folder for the table")->capture_default_str();
 #ifdef TROCHOID_HAS_TRACKING

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/table.hpp"
 #include "trochoid/model/inertia.hpp"
@@ -75,8 +75,7 @@ double nutation_period_s(const TopTruth& top) {
   const double size = 2.0 * std::sqrt(std::max(-q / 3.0, 0.0));
   const double angle = std::acos(std::clamp(3.0 * r / (q * size), -1.0, 1.0)) / 3.0;
   std::array<double, 3> root{};
-  for (int k = 0; k < 3; ++k)
-    root[k] = size * std::cos(angle - 2.0 * std::numbers::pi * k / 3.0) - p2 / 3.0;
+  for (int k = 0; k < 3; ++k) root[k] = size * std::cos(angle - data::kTurn * k / 3.0) - p2 / 3.0;
   std::sort(root.begin(), root.end());
   const double lambda = std::sqrt(0.5 * top.a * (root[2] - root[0]));
   const double modulus2 = (root[1] - root[0]) / (root[2] - root[0]);
@@ -89,7 +88,7 @@ TopTruth random_top(Generator& generator) {
   top.a = top.b * top.b * log_uniform(0.015, 0.75, generator);
   top.l = log_uniform(0.01, 0.2, generator);
   top.theta = uniform(0.25, 1.2, generator);
-  top.phi = uniform(-std::numbers::pi, std::numbers::pi, generator);
+  top.phi = uniform(-data::kPi, data::kPi, generator);
   top.dtheta = 0.3 * std::abs(top.b) * uniform(-1.0, 1.0, generator);
   top.dphi = 0.3 * std::abs(top.b) * uniform(-1.0, 1.0, generator);
   return top;
@@ -167,7 +166,7 @@ double length_error(const TopTruth& top, const std::vector<double>& t_s, double 
 
 void make_top(const MadeTrackOptions& options, Generator& generator, MadeTrack& made) {
   const bool thesis = options.model == "thesis";
-  TopTruth top{0.098, 0.75, 0.1, std::numbers::pi / 3.0, 0.0, 0.0, 0.0};
+  TopTruth top{0.098, 0.75, 0.1, data::kPi / 3.0, 0.0, 0.0, 0.0};
   double duration_s = options.duration_s > 0.0 ? options.duration_s : 10.0;
   std::vector<double> t_s;
   for (bool drawn = false; !drawn;) {
@@ -220,7 +219,7 @@ void random_body(Generator& generator, data::Body& body) {
   body.radius_m = uniform(0.015, 0.05, generator);
   if (ring) body.inner_radius_m = body.radius_m * uniform(0.7, 0.95, generator);
   body.thickness_m = body.radius_m * uniform(0.05, 0.3, generator);
-  body.mass_kg = 8000.0 * std::numbers::pi * body.thickness_m *
+  body.mass_kg = 8000.0 * data::kPi * body.thickness_m *
                  (body.radius_m * body.radius_m - body.inner_radius_m * body.inner_radius_m);
 }
 
@@ -242,13 +241,12 @@ void make_rolling(const MadeTrackOptions& options, Generator& generator, MadeTra
     const double along = across * uniform(0.5, 6.0, generator);
     scene.model.air_linear_N_m_s = Eigen::Vector3d(across, across, along);
     scene.start.theta_rad = theta;
-    scene.start.phi_rad = uniform(-std::numbers::pi, std::numbers::pi, generator);
+    scene.start.phi_rad = uniform(-data::kPi, data::kPi, generator);
     scene.start.w1_rad_s = 0.05 * precession * uniform(-1.0, 1.0, generator);
     scene.start.w2_rad_s = precession * std::sin(theta);
     scene.start.w3_rad_s = precession * uniform(-0.3, 0.3, generator);
-    scene.run.until_s = options.duration_s > 0.0
-                            ? options.duration_s
-                            : 8.0 * 2.0 * std::numbers::pi / std::abs(precession);
+    scene.run.until_s =
+        options.duration_s > 0.0 ? options.duration_s : 8.0 * data::kTurn / std::abs(precession);
     const int samples =
         options.duration_s > 0.0 ? static_cast<int>(options.duration_s * options.rate_hz) : 150;
     scene.run.rate_hz = samples / scene.run.until_s;
@@ -286,11 +284,11 @@ void make_puck(const MadeTrackOptions& options, Generator& generator, MadeTrack&
   const double friction = log_uniform(0.05, 0.4, generator);
   scene.model.friction = friction;
   const double speed = log_uniform(0.2, 2.0, generator);
-  const double heading = uniform(-std::numbers::pi, std::numbers::pi, generator);
+  const double heading = uniform(-data::kPi, data::kPi, generator);
   scene.start.x_m = scene.start.y_m = 0.0;
   scene.start.vx_m_s = speed * std::cos(heading);
   scene.start.vy_m_s = speed * std::sin(heading);
-  scene.start.psi_rad = uniform(-std::numbers::pi, std::numbers::pi, generator);
+  scene.start.psi_rad = uniform(-data::kPi, data::kPi, generator);
   scene.start.w3_rad_s =
       either_sign(generator) * speed / body.radius_m * log_uniform(0.05, 3.0, generator);
   // 0.8 of the time to rest without spin; with spin it slides on a little longer.
@@ -307,7 +305,7 @@ void make_puck(const MadeTrackOptions& options, Generator& generator, MadeTrack&
                 {"w3_rad_s", *scene.start.w3_rad_s},
                 {"contact_radius_m", body.radius_m}};
   made.judged = {"friction"};
-  simulate(std::numbers::pi / 180.0, generator, made);
+  simulate(data::kPi / 180.0, generator, made);
   add_noise(made, options.noise * body.radius_m, generator);
   scene.start = {};
   scene.model.friction = 0.2;

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ReferenceOptions {
   fs::path folder;
   fs::path out;
   double tolerance = 1e-13;
@@ -153,7 +153,7 @@ void print_row(const data::ReferenceCase& item, const model::Trajectory& run,
 }
 
 /// @returns false if the run did not cover the reference.
-bool study_case(const fs::path& json, const Options& options) {
+bool study_case(const fs::path& json, const ReferenceOptions& options) {
   data::ReferenceCase item = data::read_reference_case(json);
   item.scene.run.tolerance = options.tolerance;
   const auto [run, time_ms] = timed_run(item.scene);
@@ -180,7 +180,7 @@ std::vector<fs::path> cases_in(const fs::path& folder) {
   return cases;
 }
 
-void run(const Options& options) {
+void run(const ReferenceOptions& options) {
   const std::vector<fs::path> cases = cases_in(options.folder);
   if (!options.out.empty()) make_folder(options.out);
   print_heading();
@@ -201,7 +201,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_reference(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReferenceOptions>();
   CLI::App* command = study.add_subcommand(
       "reference", "Simulate every case of a folder of reference trajectories and compare");
   command->add_option("folder", options->folder, "Folder with NAME.json beside NAME.csv")

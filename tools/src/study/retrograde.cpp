@@ -24,12 +24,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct RetrogradeOptions {
   fs::path out;
 };
 
 /// A body and one loss mechanism.
-struct Case {
+struct RetrogradeCase {
   std::string label;
   data::Scene scene;
 };
@@ -40,33 +40,33 @@ data::Scene without_losses(const char* bundled) {
   return scene;
 }
 
-Case with_air(const char* bundled, const char* body, double ratio) {
+RetrogradeCase with_air(const char* bundled, const char* body, double ratio) {
   data::Scene scene = load_scene(bundled);
   const double transverse = (*scene.model.air_linear_N_m_s)[0];
   scene.model.air_linear_N_m_s = Eigen::Vector3d(transverse, transverse, ratio * transverse);
   return {fmt::format("{}, air couple c3/c1 = {:g}", body, ratio), scene};
 }
 
-Case with_pivoting(const char* bundled, const char* body, double mu_p_m) {
+RetrogradeCase with_pivoting(const char* bundled, const char* body, double mu_p_m) {
   data::Scene scene = without_losses(bundled);
   scene.model.pivoting_friction_m = mu_p_m;
   return {fmt::format("{}, pivoting friction {:g} mm", body, 1e3 * mu_p_m), scene};
 }
 
-Case with_rolling_friction(const char* bundled, const char* body, double mu_r_m) {
+RetrogradeCase with_rolling_friction(const char* bundled, const char* body, double mu_r_m) {
   data::Scene scene = without_losses(bundled);
   scene.model.rolling_friction_m = mu_r_m;
   return {fmt::format("{}, rolling friction {:g} mm", body, 1e3 * mu_r_m), scene};
 }
 
-Case with_contour(const char* bundled, const char* body, double mu_c_m) {
+RetrogradeCase with_contour(const char* bundled, const char* body, double mu_c_m) {
   data::Scene scene = without_losses(bundled);
   scene.model.contour_friction_m = mu_c_m;
   return {fmt::format("{}, contour friction {:g} mm", body, 1e3 * mu_c_m), scene};
 }
 
-std::vector<Case> cases() {
-  std::vector<Case> list;
+std::vector<RetrogradeCase> cases() {
+  std::vector<RetrogradeCase> list;
   for (const auto& [scene, body] :
        {std::pair{"ring_retrograde", "ring"}, {"disc_prograde", "disc"}}) {
     for (const double ratio : {6.0, 4.0, 1.0}) list.push_back(with_air(scene, body, ratio));
@@ -107,7 +107,7 @@ double typical_rate(const model::MeanPath& path, int eighth) {
   return data::median(std::move(rates));
 }
 
-void print_row(const Case& item, const Turn& turn) {
+void print_row(const RetrogradeCase& item, const Turn& turn) {
   const double first = typical_rate(turn.path, 0), last = typical_rate(turn.path, 7);
   const std::string verdict = last < 0.0 ? fmt::format("retrograde, inflection at {:.2f} s",
                                                        turn.path.inflection_s().value_or(NAN))
@@ -131,7 +131,7 @@ Axes heading_panel(const char* body) {
 }
 
 /// Path of the centre of mass, its mean and the inflection, from above.
-Axes path_panel(const Case& item, const Turn& turn) {
+Axes path_panel(const RetrogradeCase& item, const Turn& turn) {
   Axes axes{
       .title = item.label, .x_label = "x [m]", .y_label = "y [m]", .equal = true, .series = {}};
   axes.series = {
@@ -154,13 +154,13 @@ Axes path_panel(const Case& item, const Turn& turn) {
   return axes;
 }
 
-void run(const Options& options) {
+void run(const RetrogradeOptions& options) {
   if (!options.out.empty()) make_folder(options.out);
   fmt::print("{:<34} {:>8} {:>8} {:>8} {:>7}  {}\n", "body and loss", "first", "last", "demand",
              "end_s",
              "mean path (its turning per precession, medians of the first and last eighth)");
   std::vector<Axes> headings{heading_panel("ring"), heading_panel("disc")}, paths;
-  for (const Case& item : cases()) {
+  for (const RetrogradeCase& item : cases()) {
     const Turn turn = follow(item.scene);
     print_row(item, turn);
     const bool disc = item.label.starts_with("disc");
@@ -179,7 +179,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_retrograde(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RetrogradeOptions>();
   CLI::App* command = study.add_subcommand(
       "retrograde", "Which bodies and which losses turn the mean path of a rolling body round");
   command->add_option("--out", options->out, "Draw heading rates and paths into this folder");

@@ -11,7 +11,6 @@
 #include <fstream>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "common/child_process.hpp"
 #include "common/scene_library.hpp"
 #include "study/high_precision.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kA = 0.098, kB = 0.75, kL = 0.1, kTheta = std::numbers::pi / 3.0;
+constexpr double kA = 0.098, kB = 0.75, kL = 0.1, kTheta = data::kPi / 3.0;
 constexpr double kEnd_s = 60.0;
 constexpr int kOutputs = 6001;
 constexpr const char *kOurs = "trochoid", *kOursWithDerivatives = "with 7 derivatives",

@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SolversOptions {
   fs::path out = "study-solvers";
   int repeats = 5;
 };
@@ -38,7 +38,7 @@ constexpr std::array<const char*, 5> kIntegrators{"dop853", "taylor", "cvode-ada
                                                   "arkode"};
 constexpr std::array<double, 6> kTolerances{1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13};
 
-struct Row {
+struct SolverRow {
   std::string scene, integrator;
   double tolerance;
   StudyRun run;
@@ -61,10 +61,10 @@ void print_machine() {
       "repeat\n");
 }
 
-void print_rows(const std::vector<Row>& rows) {
+void print_rows(const std::vector<SolverRow>& rows) {
   fmt::print("{:<14} {:<12} {:>9} {:>10} {:>12} {:>12} {:>8}  {}\n", "scene", "integrator",
              "tolerance", "error", "time_us", "evaluations", "steps", "outcome");
-  for (const Row& row : rows) {
+  for (const SolverRow& row : rows) {
     if (!row.run.refusal.empty()) continue;
     fmt::print("{:<14} {:<12} {:>9.0e} {:>10.1e} {:>12.1f} {:>12} {:>8}  {}\n", row.scene,
                row.integrator, row.tolerance, row.run.axis_error, row.run.time_us,
@@ -73,10 +73,10 @@ void print_rows(const std::vector<Row>& rows) {
   }
 }
 
-void write_csv(const std::vector<Row>& rows, const fs::path& path) {
+void write_csv(const std::vector<SolverRow>& rows, const fs::path& path) {
   std::string text =
       "scene,integrator,tolerance,axis_error,path_error_m,time_us,evaluations,steps,outcome\n";
-  for (const Row& row : rows)
+  for (const SolverRow& row : rows)
     if (row.run.refusal.empty())
       text += fmt::format("{},{},{},{},{},{},{},{},{}\n", row.scene, row.integrator, row.tolerance,
                           row.run.axis_error, row.run.path_error_m, row.run.time_us,
@@ -87,7 +87,7 @@ void write_csv(const std::vector<Row>& rows, const fs::path& path) {
 
 /// One panel per scene: error against `cost`.
 template <class Cost>
-void write_diagram(const std::vector<Row>& rows, const char* x_label, Cost cost,
+void write_diagram(const std::vector<SolverRow>& rows, const char* x_label, Cost cost,
                    const fs::path& path) {
   std::vector<Axes> panels;
   for (const char* scene : kScenes) {
@@ -100,7 +100,7 @@ void write_diagram(const std::vector<Row>& rows, const char* x_label, Cost cost,
     for (std::size_t i = 0; i < kIntegrators.size(); ++i) {
       const char* integrator = kIntegrators[i];
       std::vector<double> x, y;
-      for (const Row& row : rows)
+      for (const SolverRow& row : rows)
         if (row.scene == scene && row.integrator == integrator && row.run.refusal.empty() &&
             row.run.outcome == model::Outcome::reached_end && row.run.axis_error > 0.0) {
           x.push_back(cost(row.run));
@@ -118,8 +118,8 @@ void write_diagram(const std::vector<Row>& rows, const char* x_label, Cost cost,
   write_plot(panels, path);
 }
 
-std::vector<Row> measure(const Options& options) {
-  std::vector<Row> rows;
+std::vector<SolverRow> measure(const SolversOptions& options) {
+  std::vector<SolverRow> rows;
   Progress progress("study solvers", "runs");
   const auto total =
       static_cast<std::int64_t>(kScenes.size() * kIntegrators.size() * kTolerances.size());
@@ -140,9 +140,9 @@ std::vector<Row> measure(const Options& options) {
   return rows;
 }
 
-void run(const Options& options) {
+void run(const SolversOptions& options) {
   make_folder(options.out);
-  const std::vector<Row> rows = measure(options);
+  const std::vector<SolverRow> rows = measure(options);
   print_machine();
   print_rows(rows);
   write_csv(rows, options.out / "solvers.csv");
@@ -160,7 +160,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_solvers(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SolversOptions>();
   CLI::App* command =
       study.add_subcommand("solvers", "Error against run time for every integrator and model");
   command->add_option("--out", options->out, "Folder for the table and the diagrams")

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <string>
 
@@ -14,6 +13,7 @@
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
 #include "study/runs.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -23,13 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct StabilityOptions {
   fs::path out = "study-stability";
 };
 
-constexpr std::array<const char*, 6> kIntegrators{"auto",  "dop853",      "taylor",
-                                                  "radau", "cvode-adams", "cvode-bdf"};
-constexpr std::array<double, 2> kTolerances{1e-6, 1e-10};
+constexpr std::array<const char*, 6> kContenders{"auto",  "dop853",      "taylor",
+                                                 "radau", "cvode-adams", "cvode-bdf"};
+constexpr std::array<double, 2> kTolerancesTried{1e-6, 1e-10};
 
 struct Extreme {
   std::string name;
@@ -116,7 +116,7 @@ void add_rim_bodies(std::vector<Extreme>& list) {
   });
   for (const double tilt_deg : {1.0, 0.1})
     rolling(fmt::format("rolling: Euler disc at {:g} deg", tilt_deg), [tilt_deg](data::Scene& s) {
-      const double tilt_rad = tilt_deg * std::numbers::pi / 180.0;
+      const double tilt_rad = data::radians(tilt_deg);
       s.body->thickness_m = 0.0;
       s.start.theta_rad = tilt_rad;
       s.start.w1_rad_s = 0.0;
@@ -165,13 +165,13 @@ std::vector<Extreme> extremes() {
 /// A cell is wrong if the run claims its end but is off by ten times what it says of its own error
 /// and by more than a hundred tolerances, a start's rounding amplified included. Errors beyond
 /// those tolerances that the run does state are marked.
-struct Verdict {
+struct StabilityVerdict {
   std::string words;
   bool wrong = false;
 };
 
-Verdict judge(const StudyRun& run, double tolerance, double growth, double floor_rad,
-              bool asked_by_name) {
+StabilityVerdict judge(const StudyRun& run, double tolerance, double growth, double floor_rad,
+                       bool asked_by_name) {
   if (!run.refusal.empty())
     return {asked_by_name ? "not offered" : fmt::format("refused: {}", run.refusal),
             !asked_by_name};
@@ -209,7 +209,7 @@ std::string drift_words(const StudyRun& run) {
   return run.refusal.empty() && run.energy_drift ? fmt::format("{:.1e}", *run.energy_drift) : "-";
 }
 
-void run(const Options& options) {
+void run(const StabilityOptions& options) {
   make_folder(options.out);
   const std::vector<Extreme> list = extremes();
   std::string csv =
@@ -218,7 +218,7 @@ void run(const Options& options) {
       "energy_drift,outcome\n";
   std::string table = fmt::format("{:<40} {:>9} {:>8} {:>8} {:>8}", "scene", "tolerance", "growth",
                                   "known_to", "drift");
-  for (const char* integrator : kIntegrators) table += fmt::format("  {:<26}", integrator);
+  for (const char* integrator : kContenders) table += fmt::format("  {:<26}", integrator);
   table += '\n';
   Progress progress("study stability", "scenes");
   Truth truth;
@@ -227,16 +227,17 @@ void run(const Options& options) {
   for (const Extreme& extreme : list) {
     data::Scene scene = extreme.scene;
     if (!extreme.same_truth) truth = truth_of(extreme);
-    for (const double tolerance : kTolerances) {
+    for (const double tolerance : kTolerancesTried) {
       table +=
           fmt::format("{:<40} {:>9.0e} {:>8.1e} {:>8}", extreme.name, tolerance, truth.run.growth,
                       truth.floor_rad > 0.0 ? fmt::format("{:.0e}", truth.floor_rad) : "-");
-      for (const char* integrator : kIntegrators) {
+      for (const char* integrator : kContenders) {
         scene.run.integrator = integrator;
         scene.run.tolerance = tolerance;
         const StudyRun cell = study_run(scene, truth.run, 1);
         const bool by_name = std::string_view(integrator) != "auto";
-        const Verdict verdict = judge(cell, tolerance, truth.run.growth, truth.floor_rad, by_name);
+        const StabilityVerdict verdict =
+            judge(cell, tolerance, truth.run.growth, truth.floor_rad, by_name);
         if (!by_name) table += fmt::format(" {:>8}", drift_words(cell));
         wrong += verdict.wrong ? 1 : 0;
         ++cells;
@@ -265,7 +266,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_stability(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StabilityOptions>();
   CLI::App* command =
       study.add_subcommand("stability", "Stiff and extreme scenes: correct, refused or wrong");
   command->add_option("--out", options->out, "Folder for the table")->capture_default_str();

@@ -13,6 +13,7 @@
 #include "common/outputs.hpp"
 #include "common/scene_library.hpp"
 #include "draw/plot.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/table.hpp"
 #include "trochoid/model/simulate.hpp"
 
@@ -22,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ThesisOptions {
   fs::path out;
 };
 
@@ -91,7 +92,7 @@ void print_top(const std::string& name, const data::Scene& scene) {
       std::max({std::abs(theta[last / 2] - exact.theta_max_rad), std::abs(theta[last] - theta0),
                 std::abs(phi[last] - exact.precession_rad)});
   fmt::print("{:<18} {:>8.4g} {:>7.4g} {:>12.6f} {:>11.6f} {:>11.6f}   {:<4} {:>10.1e}\n", name,
-             top.a_1_s2, top.b_1_s, exact.theta_max_rad * 180.0 / M_PI, exact.period_s,
+             top.a_1_s2, top.b_1_s, data::degrees(exact.theta_max_rad), exact.period_s,
              exact.precession_rad, has_bump(run) ? "yes" : "no", apart);
 }
 
@@ -157,9 +158,9 @@ constexpr Quantity kSixPanels[] = {
 Eigen::VectorXd wrapped(Eigen::VectorXd angle) {
   double before = 0.0;
   for (double& value : angle) {
-    value = std::remainder(value, 2.0 * M_PI);
+    value = std::remainder(value, data::kTurn);
     const double now = value;
-    if (std::abs(now - before) > M_PI) value = std::numeric_limits<double>::quiet_NaN();
+    if (std::abs(now - before) > data::kPi) value = std::numeric_limits<double>::quiet_NaN();
     before = now;
   }
   return angle;
@@ -219,54 +220,54 @@ std::vector<Axes> projections() {
            .series = {{.label = "", .x = X, .y = run.column("z_m")}}}};
 }
 
-void write(const std::vector<Axes>& panels, const fs::path& path) {
+void write_panels(const std::vector<Axes>& panels, const fs::path& path) {
   write_plot(panels, path);
   fmt::print("{}\n", path.string());
 }
 
 void write_figures(const fs::path& folder) {
   const Quantity spin{"dpsi_rad_s", "dpsi/dt [rad/s]"}, tilt{"theta_rad", "theta [rad]"};
-  write({body_rates("thesis-free", "figure 3.1: three different moments"),
-         body_rates("thesis-free-case3", "figure 3.5: moments close to each other")},
-        folder / "thesis_free.svg");
-  write(projections(), folder / "thesis_path.svg");
-  write(six_panels({{"", "thesis-base"}}, 60.0), folder / "thesis_base.svg");
-  write({panel({{"g = 0.1", "thesis-g-0.1"},
-                {"g = 3", "thesis-g-3"},
-                {"g = 5", "thesis-g-5"},
-                {"g = 7", "thesis-g-7"},
-                {"g = 9", "thesis-g-9"},
-                {"g = 15", "thesis-g-15"}},
-               spin, "figure 3.11: the bump is there at 9 and 15, not at 7", 20.0),
-         panel({{"g = 0.1", "thesis-g-0.1"},
-                {"g = 0.3", "thesis-g-0.3"},
-                {"g = 0.5", "thesis-g-0.5"},
-                {"g = 0.7", "thesis-g-0.7"},
-                {"g = 0.8", "thesis-g-0.8"},
-                {"g = 0.9", "thesis-g-0.9"}},
-               spin, "figure 3.12: no bump up to 0.9", 20.0)},
-        folder / "thesis_gravity.svg");
-  write({panel({{"omega_s = 0.1", "thesis-spin-0.1"},
-                {"omega_s = 0.5", "thesis-base"},
-                {"omega_s = 1", "thesis-spin-1"}},
-               tilt, "figures 3.13 to 3.15: spin", 30.0),
-         panel({{"m = 0.1", "thesis-base"},
-                {"m = 0.2", "thesis-mass-0.2"},
-                {"m = 0.3", "thesis-mass-0.3"},
-                {"m = 0.4", "thesis-mass-0.4"},
-                {"m = 0.5", "thesis-mass-0.5"}},
-               tilt, "figures 3.16 and 3.17: mass", 30.0)},
-        folder / "thesis_spin_mass.svg");
-  write(six_panels({{"m or l = 0.9", "thesis-mass-0.9"},
-                    {"I = 2", "thesis-I-2"},
-                    {"I = 0.75", "thesis-I-0.75"},
-                    {"g = 0.1", "thesis-g-0.1"},
-                    {"g = 20", "thesis-g-20"}},
-                   10.0),
-        folder / "thesis_conditions.svg");
+  write_panels({body_rates("thesis-free", "figure 3.1: three different moments"),
+                body_rates("thesis-free-case3", "figure 3.5: moments close to each other")},
+               folder / "thesis_free.svg");
+  write_panels(projections(), folder / "thesis_path.svg");
+  write_panels(six_panels({{"", "thesis-base"}}, 60.0), folder / "thesis_base.svg");
+  write_panels({panel({{"g = 0.1", "thesis-g-0.1"},
+                       {"g = 3", "thesis-g-3"},
+                       {"g = 5", "thesis-g-5"},
+                       {"g = 7", "thesis-g-7"},
+                       {"g = 9", "thesis-g-9"},
+                       {"g = 15", "thesis-g-15"}},
+                      spin, "figure 3.11: the bump is there at 9 and 15, not at 7", 20.0),
+                panel({{"g = 0.1", "thesis-g-0.1"},
+                       {"g = 0.3", "thesis-g-0.3"},
+                       {"g = 0.5", "thesis-g-0.5"},
+                       {"g = 0.7", "thesis-g-0.7"},
+                       {"g = 0.8", "thesis-g-0.8"},
+                       {"g = 0.9", "thesis-g-0.9"}},
+                      spin, "figure 3.12: no bump up to 0.9", 20.0)},
+               folder / "thesis_gravity.svg");
+  write_panels({panel({{"omega_s = 0.1", "thesis-spin-0.1"},
+                       {"omega_s = 0.5", "thesis-base"},
+                       {"omega_s = 1", "thesis-spin-1"}},
+                      tilt, "figures 3.13 to 3.15: spin", 30.0),
+                panel({{"m = 0.1", "thesis-base"},
+                       {"m = 0.2", "thesis-mass-0.2"},
+                       {"m = 0.3", "thesis-mass-0.3"},
+                       {"m = 0.4", "thesis-mass-0.4"},
+                       {"m = 0.5", "thesis-mass-0.5"}},
+                      tilt, "figures 3.16 and 3.17: mass", 30.0)},
+               folder / "thesis_spin_mass.svg");
+  write_panels(six_panels({{"m or l = 0.9", "thesis-mass-0.9"},
+                           {"I = 2", "thesis-I-2"},
+                           {"I = 0.75", "thesis-I-0.75"},
+                           {"g = 0.1", "thesis-g-0.1"},
+                           {"g = 20", "thesis-g-20"}},
+                          10.0),
+               folder / "thesis_conditions.svg");
 }
 
-void run(const Options& options) {
+void run(const ThesisOptions& options) {
   if (!options.out.empty()) make_folder(options.out);
   fmt::print("{:<18} {:>8} {:>7} {:>12} {:>11} {:>11}   {:<4} {:>10}\n", "scene", "a_1_s2", "b_1_s",
              "tilt_max_deg", "nutation_s", "dphi_rad", "bump", "run apart");
@@ -284,7 +285,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_thesis(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ThesisOptions>();
   CLI::App* command = study.add_subcommand(
       "thesis", "The thesis' runs against their closed forms, and its figures drawn again");
   command->add_option("--out", options->out, "Draw the figures into this folder");

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct TrackingStudyOptions {
   std::vector<fs::path> folders;
   fs::path out = "study_tracking";
   bool baselines = false;
@@ -142,7 +142,8 @@ bool follows(const LabelScore& s) {
 
 /// Where the tracker follows something else than what was labelled (another rim of the body, say):
 /// what it makes of it when pointed at it, from the earliest of a few labelled frames that will do.
-void print_pointed(const Recording& r, const data::Table& labels, const Options& options) {
+void print_pointed(const Recording& r, const data::Table& labels,
+                   const TrackingStudyOptions& options) {
   constexpr Eigen::Index kTries = 8;
   const fs::path target = options.out / (r.name + ".pointed.track.csv");
   const Eigen::VectorXd frame = labels.column("frame"), x = labels.column("x_px"),
@@ -165,7 +166,8 @@ void print_pointed(const Recording& r, const data::Table& labels, const Options&
   fmt::print("  pointed at its labels: not followed from any of {} of them\n", kTries);
 }
 
-void print_labels(const Recording& r, const data::TrackFile& file, const Options& options) {
+void print_labels(const Recording& r, const data::TrackFile& file,
+                  const TrackingStudyOptions& options) {
   for (const fs::path& path : r.labels) {
     const data::Table labels = data::read_table(path);
     const LabelScore s = score_against_labels(file, labels, path.stem().string());
@@ -193,7 +195,7 @@ std::int64_t frames_tracked(fs::path track_file) {
 }
 
 /// False if the recording could not be tracked.
-bool study(const fs::path& folder, const Options& options) {
+bool study(const fs::path& folder, const TrackingStudyOptions& options) {
   const Recording r = recording_in(folder);
   const fs::path target = options.out / (r.name + ".track.csv");
   fmt::print("{}\n", r.name);
@@ -218,7 +220,7 @@ bool study(const fs::path& folder, const Options& options) {
   return true;
 }
 
-void run(const Options& options) {
+void run(const TrackingStudyOptions& options) {
   make_folder(options.out);
   int refused = 0;
   for (const fs::path& folder : options.folders) {
@@ -234,7 +236,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_tracking(CLI::App& study_command) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrackingStudyOptions>();
   CLI::App* command = study_command.add_subcommand(
       "tracking", "Track recordings with truth.csv or reference_*.csv and score the tracks");
   command->add_option("folders", options->folders, "Folders, one recording each")->required();

@@ -23,23 +23,23 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 3> kEfforts{"quick", "normal", "exact"};
 
 /// What of the picture is kept, and how finely.
-struct View {
+struct ReducedView {
   std::string_view name;
   int reduction;  ///< pictures of 1 / this the width
   bool cut;       ///< to where the body goes
 };
-constexpr std::array<View, 4> kViews{
+constexpr std::array<ReducedView, 4> kViews{
     {{"whole", 1, false}, {"half", 2, false}, {"quarter", 4, false}, {"cut out", 1, true}}};
 
-struct Row {
+struct ChainRow {
   std::string recording, effort;
-  View view;
+  ReducedView view;
   TruthScore score;
   double frames_per_s = 0.0, peak_mb = 0.0;
 };
 
 /// What of the original picture the smaller one shows.
-struct Part {
+struct PicturePart {
   int x_px = 0, y_px = 0, width_px = 0, height_px = 0;
   int reduction = 1;
 };
@@ -50,11 +50,11 @@ int even(double px) {
 }
 
 /// Two radii to every side of where the centre goes: the outline never comes near the border.
-Part part_of(const View& view, const data::Camera& camera, const data::Table& truth,
-             double radius_m) {
+PicturePart part_of(const ReducedView& view, const data::Camera& camera, const data::Table& truth,
+                    double radius_m) {
   const int block = 2 * view.reduction;
-  Part part{0, 0, camera.width_px / block * block, camera.height_px / block * block,
-            view.reduction};
+  PicturePart part{0, 0, camera.width_px / block * block, camera.height_px / block * block,
+                   view.reduction};
   if (!view.cut) return part;
   const double margin_px = 2.0 * radius_m * px_per_m(camera);
   const auto x = truth.column("x_px"), y = truth.column("y_px");
@@ -70,7 +70,7 @@ double shown_at(double px, int from_px, int reduction) {
   return (px - from_px + 0.5) / reduction - 0.5;
 }
 
-data::Camera seen_by(data::Camera camera, const Part& part) {
+data::Camera seen_by(data::Camera camera, const PicturePart& part) {
   camera.fx /= part.reduction;
   camera.fy /= part.reduction;
   camera.cx = shown_at(camera.cx, part.x_px, part.reduction);
@@ -81,7 +81,7 @@ data::Camera seen_by(data::Camera camera, const Part& part) {
 }
 
 /// Truth in pixels of the smaller picture.
-data::Table seen_in(data::Table truth, const Part& part) {
+data::Table seen_in(data::Table truth, const PicturePart& part) {
   for (const auto& [name, from_px] : {std::pair{"x_px", part.x_px}, {"y_px", part.y_px}}) {
     const auto place = std::find(truth.columns.begin(), truth.columns.end(), name);
     for (double& px : truth.values.col(place - truth.columns.begin()))
@@ -102,20 +102,20 @@ struct WorkFolder {
 };
 
 /// A recording with everything `track` and its judging need.
-struct Recording {
+struct ChainRecording {
   fs::path video, scene;
   data::Camera camera;
   data::Table truth;
   data::Body body;
 };
 
-Recording make_view(const fs::path& folder, const View& view, const fs::path& work) {
+ChainRecording make_view(const fs::path& folder, const ReducedView& view, const fs::path& work) {
   data::Scene scene = data::read_object(folder / "object.json");
   const data::Camera camera = data::read_camera(folder / "camera.json");
   const data::Table truth = data::read_table(folder / "truth.csv");
-  const Part part = part_of(view, camera, truth, scene.body->radius_m);
-  Recording made{folder / "video.mp4", work / "view.toml", seen_by(camera, part),
-                 seen_in(truth, part), *scene.body};
+  const PicturePart part = part_of(view, camera, truth, scene.body->radius_m);
+  ChainRecording made{folder / "video.mp4", work / "view.toml", seen_by(camera, part),
+                      seen_in(truth, part), *scene.body};
   if (view.reduction > 1 || view.cut) {
     made.video = work / "view.mkv";
     const ChildRun run = run_child(
@@ -134,14 +134,15 @@ Recording make_view(const fs::path& folder, const View& view, const fs::path& wo
   return made;
 }
 
-std::optional<Row> measure(const Recording& made, const char* effort, const fs::path& work) {
+std::optional<ChainRow> measure(const ChainRecording& made, const char* effort,
+                                const fs::path& work) {
   const fs::path track = work / "track.csv";
   fs::remove(track);
   const ChildRun run = run_child({own_path(), "track", made.video.string(), "--scene",
                                   made.scene.string(), "--effort", effort, "-o", track.string()});
   if (!fs::exists(track)) return std::nullopt;
   const data::TrackFile file = data::read_track(track);
-  Row row;
+  ChainRow row;
   row.effort = effort;
   row.score = score_against_truth(file.tracks.front(), made.truth, made.body,
                                   px_per_m(made.camera) * made.body.radius_m);
@@ -150,7 +151,7 @@ std::optional<Row> measure(const Recording& made, const char* effort, const fs::
   return row;
 }
 
-Axes diagram(const std::vector<Row>& rows) {
+Axes diagram(const std::vector<ChainRow>& rows) {
   Axes axes{.title = "Tracking: effort (quick, normal, exact), resolution, part of the picture",
             .x_label = "frames per second",
             .y_label = "rms error of the CoM [mm]",
@@ -159,7 +160,7 @@ Axes diagram(const std::vector<Row>& rows) {
             .series = {}};
   for (std::size_t i = 0; i < rows.size();) {
     std::vector<double> x, y;
-    const Row& first = rows[i];
+    const ChainRow& first = rows[i];
     for (; i < rows.size() && rows[i].recording == first.recording &&
            rows[i].view.name == first.view.name;
          ++i) {
@@ -180,7 +181,7 @@ Axes diagram(const std::vector<Row>& rows) {
 Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& out) {
   const WorkFolder folder_of_work(out / "chain");
   const fs::path& work = folder_of_work.path;
-  std::vector<Row> rows;
+  std::vector<ChainRow> rows;
   fmt::print("\n{:<18} {:<8} {:>9} {:<8} {:>11} {:>6} {:>8} {:>8} {:>9} {:>9} {:>8}\n", "recording",
              "picture", "size", "effort", "found", "wrong", "rms px", "rms mm", "tilt deg",
              "frames/s", "peak MB");
@@ -189,8 +190,8 @@ Axes study_tracking_chain(const std::vector<fs::path>& folders, const fs::path& 
       "normalised,tilt_normalised,frames_per_s,peak_mb\n";
   for (const fs::path& folder : folders) {
     const std::string name = fs::weakly_canonical(folder).filename().string();
-    for (const View& view : kViews) {
-      const Recording made = make_view(folder, view, work);
+    for (const ReducedView& view : kViews) {
+      const ChainRecording made = make_view(folder, view, work);
       const std::string size = fmt::format("{}x{}", made.camera.width_px, made.camera.height_px);
       for (const char* effort : kEfforts) {
         fmt::print("{:<18} {:<8} {:>9} {:<8} ", name, view.name, size, effort);

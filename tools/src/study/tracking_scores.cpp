@@ -5,14 +5,13 @@
 #include <complex>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <optional>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tools {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDeg = 180.0 / kPi;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// Root mean square of what was added; NaN of nothing.
@@ -34,13 +33,13 @@ struct Attitude {
 /// The one of two indistinguishable attitudes with the smaller tilt. Turned over about the axis of
 /// its mark (angle a in the body) a body shows spin pi - psi - 2 a.
 Attitude folded(Attitude a, const data::Body& body) {
-  if (!body.faces_look_alike() || a.theta <= 0.5 * kPi) return a;
+  if (!body.faces_look_alike() || a.theta <= 0.5 * data::kPi) return a;
   const double mark = body.marks.empty() ? 0.0 : body.marks.front().angle_rad;
-  return {kPi - a.theta, a.phi + kPi, kPi - a.psi - 2.0 * mark};
+  return {data::kPi - a.theta, a.phi + data::kPi, data::kPi - a.psi - 2.0 * mark};
 }
 
 double turn_difference(double a, double b) {
-  return std::remainder(a - b, 2.0 * kPi);
+  return std::remainder(a - b, data::kTurn);
 }
 
 std::map<std::int64_t, Eigen::Index> rows_by_frame(const data::Table& table) {
@@ -53,7 +52,7 @@ std::map<std::int64_t, Eigen::Index> rows_by_frame(const data::Table& table) {
 class AngleErrors {
  public:
   void add(double error_rad, double sigma_rad) {
-    degrees_.add(error_rad * kDeg);
+    degrees_.add(data::degrees(error_rad));
     normalised_.add(error_rad / sigma_rad);
   }
   [[nodiscard]] TruthScore::Angle score() const { return {degrees_.value(), normalised_.square()}; }
@@ -66,7 +65,8 @@ struct AttitudeErrors {
   AngleErrors tilt, precession, spin;
 
   void add(const data::TrackSample& sample, const Attitude& truth, const data::Body& body) {
-    if (!sample.theta || truth.theta < 15.0 / kDeg || truth.theta > 75.0 / kDeg) return;
+    if (!sample.theta || truth.theta < data::radians(15.0) || truth.theta > data::radians(75.0))
+      return;
     const Attitude ours = folded({sample.theta->value_rad, sample.phi ? sample.phi->value_rad : 0.0,
                                   sample.psi ? sample.psi->value_rad : 0.0},
                                  body);
@@ -147,8 +147,8 @@ void score_angles(LabelScore& score, const std::vector<double>& differences_deg,
                   double period_deg) {
   score.angles = static_cast<int>(differences_deg.size());
   std::complex<double> sum = 0.0;
-  for (const double d : differences_deg) sum += std::polar(1.0, 2.0 * kPi * d / period_deg);
-  score.angle_offset_deg = std::arg(sum) / (2.0 * kPi) * period_deg;
+  for (const double d : differences_deg) sum += std::polar(1.0, data::kTurn * d / period_deg);
+  score.angle_offset_deg = std::arg(sum) / data::kTurn * period_deg;
   Rms scatter;
   for (const double d : differences_deg)
     scatter.add(std::remainder(d - score.angle_offset_deg, period_deg));
@@ -180,7 +180,8 @@ LabelScore score_track(const data::Track& track, const data::Table& labels,
     if (normalised.norm() > largest) largest = normalised.norm(), score.worst_frame = frame;
     if (!angle.values_deg || std::isnan((*angle.values_deg)[row]) || !found->second->psi) continue;
     // Our spin counts anticlockwise seen from above, the labels clockwise on the screen.
-    differences_deg.push_back(-found->second->psi->value_rad * kDeg - (*angle.values_deg)[row]);
+    differences_deg.push_back(-data::degrees(found->second->psi->value_rad) -
+                              (*angle.values_deg)[row]);
   }
   if (score.found > 0) {
     score.rms = (squares / score.found).sqrt();

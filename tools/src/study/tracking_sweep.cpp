@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -17,6 +16,7 @@
 #include "common/validators.hpp"
 #include "draw/plot.hpp"
 #include "draw/render_picture.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
@@ -26,14 +26,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SweepOptions {
   int draws = 16;
   std::uint64_t seed = 1;
   fs::path output = "tracking_sweep.csv", plot;
 };
 
 // One made picture: what is varied, about a dark disc of 60 px on a plain grey floor.
-struct Case {
+struct SweepCase {
   double size_px = 60.0, tilt_deg = 45.0, noise_levels = 2.0, blur_px = 0.6, floor = 0.35;
   double texture = 0.0;
   bool shadow = false;
@@ -42,25 +42,25 @@ struct Case {
 struct Point {
   std::string factor;
   double value = 0.0;
-  Case made;
+  SweepCase made;
 };
 
 std::vector<Point> points() {
   std::vector<Point> all;
   const auto vary = [&](const char* factor, const std::vector<double>& values,
-                        const std::function<void(Case&, double)>& set) {
+                        const std::function<void(SweepCase&, double)>& set) {
     for (const double value : values) {
       all.push_back({factor, value, {}});
       set(all.back().made, value);
     }
   };
-  vary("noise_levels", {0.5, 1, 2, 4, 8}, [](Case& c, double v) { c.noise_levels = v; });
-  vary("blur_px", {0.3, 0.6, 1.0, 1.6}, [](Case& c, double v) { c.blur_px = v; });
-  vary("floor", {0.09, 0.15, 0.35, 0.8}, [](Case& c, double v) { c.floor = v; });
-  vary("size_px", {16, 30, 60, 120}, [](Case& c, double v) { c.size_px = v; });
-  vary("tilt_deg", {15, 30, 45, 60, 75}, [](Case& c, double v) { c.tilt_deg = v; });
-  vary("texture", {0.05, 0.15}, [](Case& c, double v) { c.texture = v; });
-  vary("shadow", {1}, [](Case& c, double) { c.shadow = true; });
+  vary("noise_levels", {0.5, 1, 2, 4, 8}, [](SweepCase& c, double v) { c.noise_levels = v; });
+  vary("blur_px", {0.3, 0.6, 1.0, 1.6}, [](SweepCase& c, double v) { c.blur_px = v; });
+  vary("floor", {0.09, 0.15, 0.35, 0.8}, [](SweepCase& c, double v) { c.floor = v; });
+  vary("size_px", {16, 30, 60, 120}, [](SweepCase& c, double v) { c.size_px = v; });
+  vary("tilt_deg", {15, 30, 45, 60, 75}, [](SweepCase& c, double v) { c.tilt_deg = v; });
+  vary("texture", {0.05, 0.15}, [](SweepCase& c, double v) { c.texture = v; });
+  vary("shadow", {1}, [](SweepCase& c, double) { c.shadow = true; });
   return all;
 }
 
@@ -115,7 +115,7 @@ class Lens {
 // A case with everything that does not change from draw to draw.
 class Studio {
  public:
-  Studio(const Case& made, std::uint64_t seed)
+  Studio(const SweepCase& made, std::uint64_t seed)
       : case_(made),
         seed_(seed),
         body_(disc()),
@@ -129,7 +129,7 @@ class Studio {
 
   [[nodiscard]] data::Pose<> pose(double x_px, double y_px) const {
     data::Pose<> pose;
-    pose.theta_rad = case_.tilt_deg * std::numbers::pi / 180.0;
+    pose.theta_rad = data::radians(case_.tilt_deg);
     pose.phi_rad = 0.6;
     const double scale = case_.size_px / (2.0 * kRadius_m);
     pose.centre_m = {x_px / scale, y_px / scale,
@@ -265,7 +265,7 @@ class Studio {
     return kShares * (case_.noise_levels * case_.noise_levels + kRounding) + kRounding;
   }
 
-  Case case_;
+  SweepCase case_;
   std::uint64_t seed_;
   data::Body body_;
   Overhead view_;
@@ -275,15 +275,15 @@ class Studio {
   cv::Mat plate_;
 };
 
-struct Row {
+struct SweepRow {
   double found = 0.0, bias_px = 0.0, sd_px = 0.0, bound_px = 0.0, normalised = 0.0;
   [[nodiscard]] double efficiency() const { return bound_px / sd_px; }
 };
 
-Row measure(const Point& point, const Options& options) {
+SweepRow measure(const Point& point, const SweepOptions& options) {
   const Studio studio(point.made, options.seed);
   std::mt19937_64 random(options.seed);
-  Row row;
+  SweepRow row;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero(), squares = Eigen::Vector2d::Zero();
   for (int draw = 0; draw < options.draws; ++draw) {
     const auto error = studio.measure(draw + 1, random);
@@ -336,7 +336,7 @@ void draw(const data::Table& table, const std::vector<Point>& all, const fs::pat
   write_plot(panels, path);
 }
 
-void run(const Options& options) {
+void run(const SweepOptions& options) {
   check_output(options.output, {});
   check_output(options.plot, {options.output});
   const std::vector<Point> all = points();
@@ -356,7 +356,7 @@ void run(const Options& options) {
              "bias_px", "sd_px", "bound_px", "efficiency", "normalised");
   Progress progress("sweep", "points");
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const Row row = measure(all[i], options);
+    const SweepRow row = measure(all[i], options);
     table.values.row(static_cast<Eigen::Index>(i)) << static_cast<double>(i), all[i].value,
         row.found, row.bias_px, row.sd_px, row.bound_px, row.efficiency(), row.normalised;
     fmt::print("{:<14} {:>7g} {:>3.0f}/{:<2} {:>8.4f} {:>8.4f} {:>9.4f} {:>10.2f} {:>10.2f}\n",
@@ -371,7 +371,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_study_tracking_sweep(CLI::App& study) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SweepOptions>();
   CLI::App* command = study.add_subcommand(
       "tracking-sweep",
       "Error of the measured centre against noise, blur, contrast, size and tilt, beside the "

@@ -14,7 +14,7 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr std::size_t kFewest = 3;  // views that make a camera
+constexpr std::size_t kFewestViews = 3;  // views that make a camera
 
 /// Boards in parallel planes say the same about a camera, however often they are filmed
 /// [Zhang2000].
@@ -46,11 +46,11 @@ double extent_m(const std::vector<BoardView>& views) {
 // The camera of all these views, one as good as the other. Its optics do not depend on the size of
 // the board; what OpenCV finds does, unless that is near one.
 Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_px) {
-  if (views.size() < kFewest)
+  if (views.size() < kFewestViews)
     throw InputError(
         fmt::format("{} views of the board; at least {} from different directions "
                     "make a camera",
-                    views.size(), kFewest));
+                    views.size(), kFewestViews));
   std::vector<std::vector<cv::Point3f>> board;
   std::vector<std::vector<cv::Point2f>> image;
   const double unit_m = extent_m(views);
@@ -74,11 +74,11 @@ Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_
     throw NumericalError(
         fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
   }
-  if (const std::size_t different = different_tilts(rotations); different < kFewest)
+  if (const std::size_t different = different_tilts(rotations); different < kFewestViews)
     throw NumericalError(fmt::format(
         "{} views of the board are tilted in {} direction{} only and determine no camera; at least "
         "{} are needed, better ten, tilted by 20 to 40 degrees in different directions",
-        views.size(), different, different == 1 ? "" : "s", kFewest));
+        views.size(), different, different == 1 ? "" : "s", kFewestViews));
   Calibration out;
   data::Camera& camera = out.camera;
   camera.width_px = size_px.width;
@@ -166,7 +166,7 @@ std::optional<Suspect> hardest_pull(const std::vector<BoardView>& views, const c
                                     const Calibration& all) {
   constexpr double kTooHard = 3.0;  // good views reach 1.5; boards bent by 1 mm in 160 reach 9
   constexpr std::size_t kTried = 3;
-  if (views.size() <= kFewest) return std::nullopt;
+  if (views.size() <= kFewestViews) return std::nullopt;
   std::vector<std::size_t> worst(views.size());
   std::iota(worst.begin(), worst.end(), 0U);
   std::sort(worst.begin(), worst.end(),

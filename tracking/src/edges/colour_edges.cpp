@@ -27,14 +27,12 @@ Harmonics harmonics_of(const Eigen::Vector2d& normal) {
   return {1.0, c, s, c * c - s * s, 2.0 * c * s};
 }
 
-enum Side { kInside, kOutside };
-
 // The borders of the silhouette at one moment.
-struct Silhouette {
+struct MomentOutline {
   // @param blur2_px2 of a border at rest, @param smear the body's motion from end to end of the
   // exposure, or empty, @param part of it that the moment stands for.
-  Silhouette(const std::vector<OutlineSample>& outline, double blur2_px2,
-             const PoseMotion::Step& smear, double part)
+  MomentOutline(const std::vector<OutlineSample>& outline, double blur2_px2,
+                const PoseMotion::Step& smear, double part)
       : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)},
         faces{Contour(outline, Contour::Of::near_rim), Contour(outline, Contour::Of::near_bore)} {
     for (std::size_t which = 0; which < borders.size(); ++which)
@@ -84,7 +82,7 @@ struct Pixel {
     constexpr double kShare = 0.02;
     return covered < kShare || covered > 1.0 - kShare;
   }
-  [[nodiscard]] Side side() const { return covered > 0.5 ? kInside : kOutside; }
+  [[nodiscard]] EdgeSide side() const { return covered > 0.5 ? kInside : kOutside; }
 };
 
 // The same before it is known how body and surroundings mix.
@@ -95,7 +93,7 @@ struct RawPixel {
 };
 
 // Pixels about one sample of a border.
-struct Stretch {
+struct ColourStretch {
   std::size_t sample;
   Harmonics harmonics;
   std::size_t first = 0, end = 0;   // its pixels
@@ -121,7 +119,7 @@ class ColourFit {
                                               int every);
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
   [[nodiscard]] Cover cover_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
-  void add_moment(const Silhouette& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
+  void add_moment(const MomentOutline& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
                   Cover& cover) const;
   void find_shades(const std::vector<RawPixel>& raw, double ground_luma);
   [[nodiscard]] double longest_sweep_px() const;
@@ -130,21 +128,21 @@ class ColourFit {
   void over_neighbours(std::size_t reach, const Use& use);
   void mix(const ColourWindow& colour, const std::vector<RawPixel>& raw);
 
-  [[nodiscard]] static double off_level(const Stretch& stretch, const Pixel& pixel);
-  void fit_levels(Side side);
-  bool find_noise(Side side);
+  [[nodiscard]] static double off_level(const ColourStretch& stretch, const Pixel& pixel);
+  void fit_levels(EdgeSide side);
+  bool find_noise(EdgeSide side);
   bool find_levels();
   void find_unevenness();
-  [[nodiscard]] std::optional<ColourEdge> edge_of(const Stretch& stretch) const;
+  [[nodiscard]] std::optional<ColourEdge> edge_of(const ColourStretch& stretch) const;
 
   const std::vector<OutlineSample>& outline_;
   const PoseMotion::Step& smear_;
   double part_;  // of the exposure, that a moment stands for
   double blur2_px2_;
-  Silhouette middle_;
-  std::vector<Silhouette> moments_;
+  MomentOutline middle_;
+  std::vector<MomentOutline> moments_;
   double body_;  // colour of the body, about
-  std::vector<Stretch> stretches_;
+  std::vector<ColourStretch> stretches_;
   std::vector<Pixel> pixels_;      // stretch by stretch
   std::array<double, 2> noise_{};  // sd of a pixel
 };
@@ -216,12 +214,12 @@ std::optional<ColourFit::Nearest> ColourFit::nearest(const Eigen::Vector2d& at_p
 Cover ColourFit::cover_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const {
   Cover cover;
   if (moments_.empty()) add_moment(middle_, at_px, nearest, cover);
-  for (const Silhouette& moment : moments_) add_moment(moment, at_px, nearest, cover);
+  for (const MomentOutline& moment : moments_) add_moment(moment, at_px, nearest, cover);
   return cover;
 }
 
 // Adds what one part of the exposure says. A border that is not there then hides nothing.
-void ColourFit::add_moment(const Silhouette& moment, const Eigen::Vector2d& at_px,
+void ColourFit::add_moment(const MomentOutline& moment, const Eigen::Vector2d& at_px,
                            const Nearest& nearest, Cover& cover) const {
   const NormalTable& table = NormalTable::instance();
   const Contour& own = moment.borders[nearest.border];
@@ -238,7 +236,7 @@ void ColourFit::add_moment(const Silhouette& moment, const Eigen::Vector2d& at_p
     return;
   }
   const Contour::Place place = &moment == &middle_ ? nearest.place : own.nearest(at_px);
-  const Silhouette::Sample& sample = moment.samples[nearest.border][place.at];
+  const MomentOutline::Sample& sample = moment.samples[nearest.border][place.at];
   const double face_px =
       sample.shows_wall ? moment.faces[nearest.border].nearest(at_px).off_px : 0.0;
   Taps density;
@@ -298,14 +296,14 @@ void ColourFit::over_neighbours(std::size_t reach, const Use& use) {
 void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw) {
   for (const RawPixel& pixel : raw) ++stretches_[pixel.stretch].end;
   std::size_t first = 0;
-  for (Stretch& stretch : stretches_) {
+  for (ColourStretch& stretch : stretches_) {
     first += stretch.end;
     stretch.first = stretch.end = first - stretch.end;
   }
   pixels_.resize(raw.size());
   const Eigen::Index parameters = outline_.front().motion.size();
   for (const RawPixel& from : raw) {
-    Stretch& stretch = stretches_[from.stretch];
+    ColourStretch& stretch = stretches_[from.stretch];
     const ColourMixing& mixing = colour.mixing_in(stretch.shade);
     Pixel& pixel = pixels_[stretch.end++];
     pixel.value = from.value;
@@ -323,13 +321,13 @@ void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw
   }
 }
 
-double ColourFit::off_level(const Stretch& stretch, const Pixel& pixel) {
+double ColourFit::off_level(const ColourStretch& stretch, const Pixel& pixel) {
   return pixel.value - pixel.covered * stretch.levels[kInside] - pixel.wall * stretch.wall -
          (1.0 - pixel.covered) * stretch.levels[kOutside];
 }
 
 // Robustly and beside the border only: on it, where that lies is asked.
-void ColourFit::fit_levels(Side side) {
+void ColourFit::fit_levels(EdgeSide side) {
   constexpr double kTukey = 4.685;
   constexpr double kWallShare = 0.1;  // of the colour, by which the wall may differ here and there
   constexpr int kWall = kHarmonics, kWallHarmonics = 3, kUnknowns = kHarmonics + kWallHarmonics;
@@ -338,7 +336,7 @@ void ColourFit::fit_levels(Side side) {
       1e-6 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
   for (int k = kWall; k < kUnknowns; ++k) normal(k, k) = 1.0 / std::pow(kWallShare * body_, 2);
   Unknowns right = Unknowns::Zero();
-  for (const Stretch& stretch : stretches_) {
+  for (const ColourStretch& stretch : stretches_) {
     // Columns of what a pixel shows of the face or the floor, and of its wall.
     Eigen::Matrix<double, kUnknowns, 2> columns = Eigen::Matrix<double, kUnknowns, 2>::Zero();
     columns.col(0).head<kHarmonics>() =
@@ -368,7 +366,7 @@ void ColourFit::fit_levels(Side side) {
     }
   }
   const Unknowns found = normal.ldlt().solve(right);
-  for (Stretch& stretch : stretches_) {
+  for (ColourStretch& stretch : stretches_) {
     stretch.levels[side] =
         (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics.dot(found.head<kHarmonics>());
     if (side == kInside)
@@ -377,11 +375,11 @@ void ColourFit::fit_levels(Side side) {
 }
 
 // False if hardly any pixel shows the level.
-bool ColourFit::find_noise(Side side) {
+bool ColourFit::find_noise(EdgeSide side) {
   constexpr std::size_t kFewest = 2 * kHarmonics;
   constexpr double kLeastNoise = 0.3;
   std::vector<double> off;
-  for (const Stretch& stretch : stretches_)
+  for (const ColourStretch& stretch : stretches_)
     for (std::size_t i = stretch.first; i < stretch.end; ++i)
       if (pixels_[i].is_clear() && pixels_[i].side() == side)
         off.push_back(std::abs(off_level(stretch, pixels_[i])));
@@ -395,7 +393,7 @@ bool ColourFit::find_levels() {
   constexpr double kNotYetKnown = 1e3;
   noise_.fill(kNotYetKnown);
   for (int round = 0; round < kRounds; ++round)
-    for (const Side side : {kInside, kOutside}) {
+    for (const EdgeSide side : {kInside, kOutside}) {
       fit_levels(side);
       if (!find_noise(side)) return false;
     }
@@ -406,7 +404,7 @@ bool ColourFit::find_levels() {
 // their pixels, as neighbours show: beside a shadow they do, elsewhere hardly.
 void ColourFit::find_unevenness() {
   constexpr std::size_t kReach = 4;  // to either side
-  for (const Side side : {kInside, kOutside}) {
+  for (const EdgeSide side : {kInside, kOutside}) {
     std::vector<double> beyond2(stretches_.size(), 0.0), counted(stretches_.size(), 0.0);
     for (std::size_t k = 0; k < stretches_.size(); ++k) {
       double sum = 0.0, count = 0.0;
@@ -427,7 +425,7 @@ void ColourFit::find_unevenness() {
 
 // The offset that explains the pixels of a stretch best, with levels that differ from those of the
 // whole outline as its neighbours' do; none if nothing there depends on it.
-std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
+std::optional<ColourEdge> ColourFit::edge_of(const ColourStretch& stretch) const {
   const OutlineSample& sample = outline_[stretch.sample];
   const double inner = stretch.levels[kInside], outer = stretch.levels[kOutside];
   // Of the offset and of the levels inside and outside.
@@ -459,7 +457,7 @@ std::optional<ColourEdge> ColourFit::edge_of(const Stretch& stretch) const {
   const double information = normal(0, 0);
   constexpr double kLeast = 1e-9, kLeastUneven2 = 1e-4;
   if (!(information > kLeast)) return std::nullopt;
-  for (const Side side : {kInside, kOutside})
+  for (const EdgeSide side : {kInside, kOutside})
     normal(1 + side, 1 + side) += 1.0 / std::max(kLeastUneven2, stretch.uneven2[side]);
   const Eigen::Matrix3d covariance = normal.inverse();
   const Eigen::Vector3d found = covariance * right;
@@ -488,7 +486,7 @@ std::vector<ColourEdge> ColourFit::edges(double reach_px) {
   std::vector<ColourEdge> found;
   if (pixels_.size() < kFewest || !find_levels()) return found;
   find_unevenness();
-  for (const Stretch& stretch : stretches_)
+  for (const ColourStretch& stretch : stretches_)
     if (auto edge = edge_of(stretch); edge && std::abs(edge->edge.offset_px) < reach_px)
       found.push_back(std::move(*edge));
   return found;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "edges/transfer_curve.hpp"
 #include "geometry/outline_samples.hpp"
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -30,7 +30,7 @@ std::vector<Eigen::Vector2d> circle_points(const data::Body& body, const data::C
   std::vector<Eigen::Vector2d> points;
   for (const double radius : radii_m)
     for (int i = 0; i < kAround; ++i) {
-      const double a = 2.0 * std::numbers::pi * i / kAround;
+      const double a = data::kTurn * i / kAround;
       points.push_back(camera.image_from_table<double>(
           face + radius * (std::cos(a) * along + std::sin(a) * across)));
     }

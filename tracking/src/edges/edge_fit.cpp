@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "edges/normal_table.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -53,7 +54,7 @@ NormalTable::NormalTable() {
   for (size_t i = 0; i < entries_.size(); ++i) {
     const double x = static_cast<double>(i) / kPerUnit - static_cast<double>(kRange);
     entries_[i] = {static_cast<float>(0.5 * std::erfc(-x / std::numbers::sqrt2)),
-                   static_cast<float>(std::exp(-0.5 * x * x) / std::sqrt(2.0 * std::numbers::pi))};
+                   static_cast<float>(std::exp(-0.5 * x * x) / std::sqrt(2.0 * data::kPi))};
   }
 }
 

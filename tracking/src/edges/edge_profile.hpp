@@ -48,6 +48,9 @@ class LightWindow {
   cv::Rect window_;
 };
 
+/// The two sides of an edge of the body, as indices.
+enum EdgeSide { kInside, kOutside };
+
 /// Samples of picture and background plate across an outline, s [px] growing outwards along its
 /// normal.
 struct Profile {

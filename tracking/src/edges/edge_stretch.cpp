@@ -45,8 +45,6 @@ Shading largest_shading() {
 using Noise = std::array<float, 3>;  // variance of a sample inside, outside and on the edge
 constexpr Noise kEqual{1.0f, 1.0f, 1.0f};
 
-enum Side { kInside, kOutside };
-
 // The light to one side of an edge, in units of that of the plate if there is one.
 struct Level {
   double value = 0.0, variance = 0.0;
@@ -63,7 +61,7 @@ struct Level {
 };
 
 // What one look says; shading over the most it can be.
-struct Look {
+struct CurveLook {
   bool usable = false;
   Shading most = Shading::Zero();  // shading, in levels
   double left_square = 0.0, freedom = 0.0;
@@ -97,12 +95,12 @@ class Fitting {
   void widen(double step);
   void find_noise(const std::vector<Noise>& assumed);
   void take_strips();
-  void find_levels(Side side, const std::vector<double>& noise2);
+  void find_levels(EdgeSide side, const std::vector<double>& noise2);
   [[nodiscard]] double change_of_levels(size_t i) const;
-  void find_stretches(Side side);
-  void expect_levels(Side side);
+  void find_stretches(EdgeSide side);
+  void expect_levels(EdgeSide side);
   void compare_with_rest();
-  [[nodiscard]] int surface(size_t i, Side side) const {
+  [[nodiscard]] int surface(size_t i, EdgeSide side) const {
     return side == kOutside ? profiles_[i].outside : profiles_[i].curve;
   }
   [[nodiscard]] std::vector<Noise> noise_of_neighbours() const;
@@ -120,7 +118,7 @@ class Fitting {
   std::vector<Block> blocks_;
   std::vector<size_t> first_sample_;  // of each block
   stretch::Sample* samples_;
-  std::vector<Look> looks_;
+  std::vector<CurveLook> looks_;
   std::vector<ShadingEvidence> evidence_;
   std::vector<Shading> expected_;  // empty: nothing is known
 };
@@ -229,7 +227,7 @@ void Fitting::sum(const std::vector<Noise>& noise) {
 
 // Of one look, before the noise is known.
 void Fitting::take_sums(size_t i) {
-  Look& look = looks_[i];
+  CurveLook& look = looks_[i];
   if (!look.usable) return;
   const Block& b = block_of(i);
   const size_t l = i % kLanes;
@@ -272,7 +270,7 @@ std::vector<Sum> Fitting::sums_of_neighbours(double share_of_curve, const Sum& n
 // How noisy samples are is known from a stretch of the outline, not from a single look.
 std::vector<double> Fitting::noise_of_looks() const {
   constexpr double kShare = 0.08;
-  const auto sums = sums_of_neighbours(kShare, Eigen::Array2d(0.0, 0.0), [](const Look& look) {
+  const auto sums = sums_of_neighbours(kShare, Eigen::Array2d(0.0, 0.0), [](const CurveLook& look) {
     return Eigen::Array2d(look.left_square, look.freedom);
   });
   std::vector<double> noise2(looks_.size());
@@ -286,14 +284,14 @@ void Fitting::set_evidence(const std::vector<double>& noise2) {
   for (size_t i = 0; i < looks_.size(); ++i) {
     const double information = 1.0 / noise2[i];
     evidence_[i].normal *= information, evidence_[i].right *= information;
-    Look& look = looks_[i];
+    CurveLook& look = looks_[i];
     look.blur_cross *= information;
     look.blur_normal *= information, look.blur_right *= information;
   }
 }
 
 // With the blur that goes with its shading.
-void set_shading(const ShadingEstimate& estimate, Look& look) {
+void set_shading(const ShadingEstimate& estimate, CurveLook& look) {
   look.estimate = estimate;
   look.blur_information =
       look.blur_normal - look.blur_cross.dot(estimate.covariance * look.blur_cross);
@@ -305,11 +303,11 @@ void set_shading(const ShadingEstimate& estimate, Look& look) {
 
 // By how much the edges should be wider: the median, so that shadows that end beside some of them
 // do not count.
-double blur_step(const std::vector<Look>& looks) {
+double blur_step(const std::vector<CurveLook>& looks) {
   constexpr size_t kFewest = 8;
   constexpr double kLeastInformation = 30.0, kMost = 0.3;
   std::vector<double> steps;
-  for (const Look& look : looks)
+  for (const CurveLook& look : looks)
     if (look.usable && look.blur_information > kLeastInformation)
       steps.push_back(std::clamp(look.blur_step, -kMost, kMost));
   if (steps.size() < kFewest) return 0.0;
@@ -360,7 +358,7 @@ void Fitting::find_noise(const std::vector<Noise>& assumed) {
   for (size_t b = 0; b < blocks_.size(); ++b)
     stretch::kernel().find_noise(blocks_[b], samples_ + first_sample_[b], variances(assumed, b));
   for (size_t i = 0; i < looks_.size(); ++i) {
-    Look& look = looks_[i];
+    CurveLook& look = looks_[i];
     if (!look.usable) continue;
     const Block& b = block_of(i);
     const size_t l = i % kLanes;
@@ -390,7 +388,7 @@ void Fitting::take_strips() {
 std::vector<Noise> Fitting::noise_of_neighbours() const {
   constexpr double kShare = 0.07;
   using Sums = Eigen::Array<double, 6, 1>;
-  const auto sums = sums_of_neighbours(kShare, Sums(Sums::Zero()), [](const Look& look) {
+  const auto sums = sums_of_neighbours(kShare, Sums(Sums::Zero()), [](const CurveLook& look) {
     return (Sums() << look.noise_square, look.noise_freedom).finished();
   });
   std::vector<Noise> out(looks_.size());
@@ -405,7 +403,7 @@ std::vector<Noise> Fitting::noise_of_neighbours() const {
 // The levels of a side as every look by itself knows them, and how far they are beyond the middle
 // one of their surface. That one's own error, about 1.3 of a look's over the root of their number,
 // is in no variance.
-void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
+void Fitting::find_levels(EdgeSide side, const std::vector<double>& noise2) {
   std::map<int, std::vector<double>> values;
   for (size_t i = 0; i < looks_.size(); ++i) {
     if (!looks_[i].usable) continue;
@@ -414,7 +412,7 @@ void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
     Level& level = looks_[i].levels[side];
     level.per_unit = side == kOutside ? light_of_plate(profiles_[i].profile) : 1.0;
     level.value = static_cast<double>(side == kOutside ? b.outer[l] : b.inner[l]) / level.per_unit;
-    const Look& look = looks_[i];
+    const CurveLook& look = looks_[i];
     Shading pull;
     for (int k = 0; k < kShading; ++k)
       pull[k] = look.most[k] * static_cast<double>(b.level_pull[side][k][l]);
@@ -430,13 +428,15 @@ void Fitting::find_levels(Side side, const std::vector<double>& noise2) {
       looks_[i].levels[side].beyond = looks_[i].levels[side].value - usual[surface(i, side)];
 }
 
-void Fitting::find_stretches(Side side) {
+void Fitting::find_stretches(EdgeSide side) {
   constexpr double kShare = 0.3;
   const auto sums =
-      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()), [side](const Look& look) {
-        const Level& level = look.levels[side];
-        return Eigen::Array4d(1.0, level.beyond, level.beyond * level.beyond, level.variance);
-      });
+      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()),
+                         [side](const CurveLook& look) {
+                           const Level& level = look.levels[side];
+                           return Eigen::Array4d(1.0, level.beyond, level.beyond * level.beyond,
+                                                 level.variance);
+                         });
   for (size_t i = 0; i < looks_.size(); ++i) {
     Level& level = looks_[i].levels[side];
     level.count = sums[i][0];
@@ -462,7 +462,7 @@ double Fitting::change_of_levels(size_t i) const {
 
 // What the levels of a side are by those of the whole surface, as far as a stretch of the outline
 // agrees with these.
-void Fitting::expect_levels(Side side) {
+void Fitting::expect_levels(EdgeSide side) {
   constexpr double kFewest = 8.0;
   constexpr double kLeastShare = 1e-3;  // of the level: what no surface is more even than
   // What a stretch as a whole is beyond the surface pulls all of it one way and is known far better
@@ -553,7 +553,7 @@ void Fitting::find_offsets(const std::vector<Noise>& noise) {
     const size_t l = i % kLanes;
     profiles_[i].found = b.found[l] != 0;
     if (!profiles_[i].found) continue;
-    const Look& look = looks_[i];
+    const CurveLook& look = looks_[i];
     Shading pull;
     for (int k = 0; k < kShading; ++k) pull[k] = look.most[k] * static_cast<double>(b.pull[k][l]);
     ProfileEdge& e = profiles_[i].edge;
@@ -590,7 +590,7 @@ StretchFit Fitting::run(bool weighed) {
   find_noise(equal);
   std::vector<Noise> noise = noise_of_neighbours();
   if (weighed) {
-    for (const Side side : {kInside, kOutside}) {
+    for (const EdgeSide side : {kInside, kOutside}) {
       find_levels(side, noise2);
       find_stretches(side);
       expect_levels(side);

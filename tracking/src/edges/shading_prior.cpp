@@ -3,10 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "edges/stretch_kernel.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -84,7 +84,7 @@ class Looks {
 
 // Where the normal points, in sectors.
 double sectors_round(double direction_rad, int sectors) {
-  return (direction_rad / (2.0 * std::numbers::pi) + 1.0) * sectors;
+  return (direction_rad / data::kTurn + 1.0) * sectors;
 }
 
 }  // namespace

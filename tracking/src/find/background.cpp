@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -120,11 +121,11 @@ double median_of(const cv::Mat& image) {
 
 /// Smooth estimate of the static scene from pixels that never changed, and how much those scatter
 /// about it (texture), at reduced size.
-struct Surroundings {
+struct StaticSurroundings {
   static constexpr int kFactor = 2;
   cv::Mat level, scatter;  ///< CV_32F; level < 0 where nothing static is near
 
-  static Surroundings of(const cv::Mat& plate, const cv::Mat& active) {
+  static StaticSurroundings of(const cv::Mat& plate, const cv::Mat& active) {
     const cv::Size size((plate.cols + 1) / kFactor, (plate.rows + 1) / kFactor);
     cv::Mat value, hidden, weight;
     cv::resize(plate, value, size, 0, 0, cv::INTER_AREA);
@@ -136,7 +137,7 @@ struct Surroundings {
     hidden.convertTo(weight, CV_32F);
     value.convertTo(value, CV_32F);
     const cv::Mat first = value.mul(weight), second = first.mul(value);
-    Surroundings s;
+    StaticSurroundings s;
     s.level = cv::Mat(size, CV_32F, cv::Scalar(-1.0));
     s.scatter = cv::Mat::zeros(size, CV_32F);
     // Normalised smoothing at growing width, narrowest first that sees enough.
@@ -196,7 +197,7 @@ void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat&
              const cv::Mat& restless, double noise) {
   const int count = cv::countNonZero(active);
   if (count == 0 || count > kMostStirred * static_cast<double>(active.total())) return;
-  const Surroundings around = Surroundings::of(plane, active);
+  const StaticSurroundings around = StaticSurroundings::of(plane, active);
   const cv::Mat doubtful = smoothed_mask(restless);
   // The rim of what changed changed too, by less than counts.
   cv::Mat changed;
@@ -205,8 +206,8 @@ void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat&
   for (int y = 0; y < plane.rows; ++y)
     for (int x = 0; x < plane.cols; ++x) {
       if (changed.at<std::uint8_t>(y, x) == 0) continue;
-      const int sy = std::min(y / Surroundings::kFactor, around.level.rows - 1);
-      const int sx = std::min(x / Surroundings::kFactor, around.level.cols - 1);
+      const int sy = std::min(y / StaticSurroundings::kFactor, around.level.rows - 1);
+      const int sx = std::min(x / StaticSurroundings::kFactor, around.level.cols - 1);
       const double level = around.level.at<float>(sy, sx);
       if (level < 0.0) continue;
       const double tolerance = 5.0 + 2.5 * (noise + around.scatter.at<float>(sy, sx));
@@ -372,7 +373,7 @@ void Background::clear_of(const Ellipse& rim) {
     const Eigen::Vector2f centre = (scale * rim.centre_px).cast<float>();
     const auto width = static_cast<float>(2.0 * scale * (rim.semi_major_px() + wider_px));
     const auto height = static_cast<float>(2.0 * scale * (rim.semi_minor_px() + wider_px));
-    const auto angle_deg = static_cast<float>(rim.angle_rad() * 180.0 / CV_PI);
+    const auto angle_deg = static_cast<float>(data::degrees(rim.angle_rad()));
     cv::Mat mask = cv::Mat::zeros(size, CV_8U);
     cv::ellipse(mask, cv::RotatedRect({centre.x(), centre.y()}, {width, height}, angle_deg), 255,
                 cv::FILLED);

@@ -4,10 +4,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "pose/pose_start.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
 
@@ -63,7 +63,7 @@ class RimFinder final : public BodyFinder {
     std::vector<Border> outline;
     const Eigen::Matrix2d inverse = rim.shape_px.inverse();
     for (int i = 0; i < kPoints; ++i) {
-      const double angle = 2.0 * std::numbers::pi * i / kPoints;
+      const double angle = data::kTurn * i / kPoints;
       const Eigen::Vector2d u(std::cos(angle), std::sin(angle));
       face.emplace_back(rim.centre_px + 0.85 * (rim.shape_px * u));
       outline.push_back({rim.centre_px + rim.shape_px * u, (inverse * u).normalized(),
@@ -174,7 +174,7 @@ class CylinderFinder final : public BodyFinder {
     for (const double share : {0.25, 0.5, 0.75}) {
       const double radius = body_.inner_radius_m + share * (body_.radius_m - body_.inner_radius_m);
       for (int i = 0; i < kSpokes; ++i) {
-        const double angle = 2.0 * std::numbers::pi * i / kSpokes;
+        const double angle = data::kTurn * i / kSpokes;
         face.emplace_back(camera_.image_from_table<double>(
             pose.centre_m + radius * (std::cos(angle) * node + std::sin(angle) * across)));
       }

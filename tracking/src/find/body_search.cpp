@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "find/silhouette.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
@@ -150,7 +150,7 @@ Detection rim_around(const Eigen::Vector2d& at_px, double semi_major_px, double 
   rim.box = cv::Rect(static_cast<int>(at_px.x() - semi_major_px),
                      static_cast<int>(at_px.y() - semi_minor_px),
                      static_cast<int>(2 * semi_major_px), static_cast<int>(2 * semi_minor_px));
-  rim.area_px2 = std::numbers::pi * semi_major_px * semi_minor_px;
+  rim.area_px2 = data::kPi * semi_major_px * semi_minor_px;
   return rim;
 }
 

@@ -4,12 +4,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "edges/transfer_curve.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {
@@ -20,7 +20,7 @@ const std::vector<Eigen::Vector2d>& lamp_places() {
     std::vector<Eigen::Vector2d> lamps;
     for (const double aside : {0.3, 0.5, 0.8, 1.2, 1.8, 2.6})
       for (int i = 0; i < kDirections; ++i) {
-        const double angle_rad = 2.0 * std::numbers::pi * i / kDirections;
+        const double angle_rad = data::kTurn * i / kDirections;
         lamps.emplace_back(aside * std::cos(angle_rad), aside * std::sin(angle_rad));
       }
     return lamps;
@@ -68,7 +68,7 @@ cv::Mat FloorDarkening::covered(const data::Camera& camera, const cv::Rect& box)
   const Eigen::Vector3d level = axis_.unitOrthogonal(), steep = axis_.cross(level);
   std::vector<cv::Point> rims, hull;
   for (int i = 0; i < kRimPoints; ++i) {
-    const double angle_rad = 2.0 * std::numbers::pi * i / kRimPoints;
+    const double angle_rad = data::kTurn * i / kRimPoints;
     const Eigen::Vector3d at_m =
         centre_m_ + radius_m_ * (std::cos(angle_rad) * level + std::sin(angle_rad) * steep);
     for (const double along_m : {-half_thickness_m_, half_thickness_m_}) {

@@ -3,10 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "find/body_search.hpp"
 #include "find/silhouette.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -248,7 +248,7 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
 
 void Follower::read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const {
   if (!marks_) return;
-  const double window = lost_ > 3 ? std::numbers::pi : 0.6;
+  const double window = lost_ > 3 ? data::kPi : 0.6;
   if (const auto turned = marks_->read(frame.luma, seen.rim, predicted_rad, window)) {
     seen.turned_rad = turned->angle_rad;
     seen.turned_sigma_rad = std::hypot(turned->sigma_rad, centring_rad(seen, *marks_));

@@ -1,18 +1,16 @@
 #include "find/forecast.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFirstSurprise_px = 2.0;
 
 double nearest(double angle, double reference, double period) {
@@ -42,42 +40,39 @@ void axis_straight_on(const Pose& a, const Pose& b, double ahead, Pose& pose) {
   const Eigen::Vector3d from = axis_of(a), to = axis_of(b);
   const double phi = b.phi_rad;
   set_axis((to + ahead * (to - from)).normalized(), pose);
-  pose.phi_rad = nearest(pose.phi_rad, phi, kTurn);
+  pose.phi_rad = nearest(pose.phi_rad, phi, data::kTurn);
 }
 
 Pose straight_on(const Pose& a, const Pose& b, double ahead) {
   Pose c = b;
   c.centre_m = b.centre_m + ahead * (b.centre_m - a.centre_m);
-  c.psi_rad = b.psi_rad + ahead * std::remainder(b.psi_rad - a.psi_rad, kTurn);
+  c.psi_rad = b.psi_rad + ahead * std::remainder(b.psi_rad - a.psi_rad, data::kTurn);
   if (steep(a) || steep(b)) {
     axis_straight_on(a, b, ahead, c);
     return c;
   }
-  c.theta_rad = std::clamp(b.theta_rad + ahead * (b.theta_rad - a.theta_rad), 0.0, 0.5 * kTurn);
-  c.phi_rad = b.phi_rad + ahead * std::remainder(b.phi_rad - a.phi_rad, kTurn);
+  c.theta_rad =
+      std::clamp(b.theta_rad + ahead * (b.theta_rad - a.theta_rad), 0.0, 0.5 * data::kTurn);
+  c.phi_rad = b.phi_rad + ahead * std::remainder(b.phi_rad - a.phi_rad, data::kTurn);
   return c;
-}
-
-Eigen::Vector3d turned(const Eigen::Vector3d& v, double angle_rad) {
-  return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * v;
 }
 
 /// Tilt and precession with their changes of rate; the centre's velocity turns with the precession,
 /// as it does for whatever rolls on its rim.
 Pose turning_on(const Three<Pose>& past, double t) {
   const Pose &a = past.v0, &b = past.v1, &c = past.v2;
-  const double phi_b = b.phi_rad, phi_a = nearest(a.phi_rad, phi_b, kTurn),
-               phi_c = nearest(c.phi_rad, phi_b + (phi_b - phi_a), kTurn);
+  const double phi_b = b.phi_rad, phi_a = nearest(a.phi_rad, phi_b, data::kTurn),
+               phi_c = nearest(c.phi_rad, phi_b + (phi_b - phi_a), data::kTurn);
   Pose next = c;
   const Three<double> phi{past.t0, past.t1, past.t2, phi_a, phi_b, phi_c};
   const Three<double> theta{past.t0, past.t1, past.t2, a.theta_rad, b.theta_rad, c.theta_rad};
   next.phi_rad = phi.quadratic(t);
-  next.theta_rad = std::clamp(theta.quadratic(t), 0.0, 0.5 * kTurn);
-  next.psi_rad = c.psi_rad +
-                 (t - past.t2) / (past.t2 - past.t1) * std::remainder(c.psi_rad - b.psi_rad, kTurn);
+  next.theta_rad = std::clamp(theta.quadratic(t), 0.0, 0.5 * data::kTurn);
+  next.psi_rad = c.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
+                                 std::remainder(c.psi_rad - b.psi_rad, data::kTurn);
   const Eigen::Vector3d late = (c.centre_m - b.centre_m) / (past.t2 - past.t1);
   const double between = 0.5 * (phi_c + next.phi_rad) - 0.5 * (phi_b + phi_c);
-  next.centre_m = c.centre_m + (t - past.t2) * turned(late, between);
+  next.centre_m = c.centre_m + (t - past.t2) * turned_about_vertical(late, between);
   return next;
 }
 
@@ -89,10 +84,11 @@ Pose swinging_on(const Three<Pose>& past, double t) {
   };
   Pose next = past.v2;
   set_axis(of(axis_of).quadratic(t).normalized(), next);
-  next.phi_rad = nearest(next.phi_rad, past.v2.phi_rad, kTurn);
+  next.phi_rad = nearest(next.phi_rad, past.v2.phi_rad, data::kTurn);
   next.centre_m = of([](const Pose& p) { return p.centre_m; }).quadratic(t);
-  next.psi_rad = past.v2.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
-                                       std::remainder(past.v2.psi_rad - past.v1.psi_rad, kTurn);
+  next.psi_rad =
+      past.v2.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
+                            std::remainder(past.v2.psi_rad - past.v1.psi_rad, data::kTurn);
   return next;
 }
 
@@ -110,9 +106,9 @@ double apart_px(const Sighting& a, const Sighting& b) {
 Pose nearer_face(const Pose& pose, const Pose& reference, double mark_rad) {
   if (axis_of(pose).dot(axis_of(reference)) >= 0.0) return pose;
   Pose other = pose;
-  other.theta_rad = 0.5 * kTurn - pose.theta_rad;
-  other.phi_rad = pose.phi_rad + 0.5 * kTurn;
-  other.psi_rad = 0.5 * kTurn - pose.psi_rad - 2.0 * mark_rad;
+  other.theta_rad = 0.5 * data::kTurn - pose.theta_rad;
+  other.phi_rad = pose.phi_rad + 0.5 * data::kTurn;
+  other.psi_rad = 0.5 * data::kTurn - pose.psi_rad - 2.0 * mark_rad;
   return other;
 }
 
@@ -220,7 +216,7 @@ std::optional<Sighting> Forecast::one_frame_before(const Sighting& seen) const {
   const Pose &from = before.seen.pose->pose, &to = last.seen.pose->pose;
   Sighting earlier = seen;
   Pose& pose = earlier.pose->pose;
-  pose.phi_rad -= std::remainder(to.phi_rad - from.phi_rad, kTurn);
+  pose.phi_rad -= std::remainder(to.phi_rad - from.phi_rad, data::kTurn);
   pose.theta_rad -= to.theta_rad - from.theta_rad;
   pose.centre_m -= to.centre_m - from.centre_m;
   finder_.place(earlier);

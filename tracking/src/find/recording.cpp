@@ -9,9 +9,9 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr std::size_t kSamples = Background::kSamples;
+constexpr std::size_t kBackgroundSamples = Background::kSamples;
 /// However large the pictures are: enough for the background, and more than what windows share.
-constexpr std::size_t kLeastFrames = 2 * kSamples;
+constexpr std::size_t kLeastFrames = 2 * kBackgroundSamples;
 
 std::size_t bytes_of(const Frame& frame) {
   return frame.luma.total() + 2 * frame.chroma.total();
@@ -67,9 +67,10 @@ bool Recording::advance(std::size_t keep, const std::function<void(const Frame&)
 /// A few pictures of the window that is about to go.
 void Recording::remember_window() {
   if (window_.empty() || !sampled_) return;
-  std::vector<Frame> some = spread(window_, kSamples / 4);
+  std::vector<Frame> some = spread(window_, kBackgroundSamples / 4);
   std::move(some.begin(), some.end(), std::back_inserter(elsewhere_));
-  if (elsewhere_.size() > kSamples) elsewhere_ = spread(elsewhere_, kSamples / 2);
+  if (elsewhere_.size() > kBackgroundSamples)
+    elsewhere_ = spread(elsewhere_, kBackgroundSamples / 2);
 }
 
 /// A long recording has many frames that decode alone; keeps every n-th, doubling n when full. What
@@ -85,8 +86,8 @@ void Recording::read_ahead() try {
   while (auto frame = next_of(*keys)) {
     if (count++ % stride != 0) continue;
     elsewhere_.push_back(std::move(*frame));
-    if (elsewhere_.size() < kSamples) continue;
-    elsewhere_ = spread(elsewhere_, kSamples / 2);
+    if (elsewhere_.size() < kBackgroundSamples) continue;
+    elsewhere_ = spread(elsewhere_, kBackgroundSamples / 2);
     stride *= 2;
   }
 } catch (const InputError&) {
@@ -99,10 +100,10 @@ void Recording::stop_sampling() {
 
 BackgroundSamples Recording::samples() {
   const bool all = ended_ && elsewhere_.empty();
-  std::vector<Frame> chosen = spread(window_, all ? kSamples : kSamples / 2);
+  std::vector<Frame> chosen = spread(window_, all ? kBackgroundSamples : kBackgroundSamples / 2);
   if (!all) {
     read_ahead();
-    std::vector<Frame> others = spread(elsewhere_, kSamples / 2);
+    std::vector<Frame> others = spread(elsewhere_, kBackgroundSamples / 2);
     std::move(others.begin(), others.end(), std::back_inserter(chosen));
   }
   BackgroundSamples samples;

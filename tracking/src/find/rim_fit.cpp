@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/bilinear.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -17,15 +18,7 @@ constexpr int kLevelSamples = 5;  // samples (2 px) that make the level beside a
 constexpr int kLevelGap = 3;      // samples (1.5 px) left out at the edge: optics and codec blur
 
 /// Bilinear sample; the caller keeps the point inside.
-double sample(const cv::Mat& image, double x, double y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const double fx = x - ix, fy = y - iy;
-  const std::uint8_t* p = image.ptr(iy) + ix;
-  const std::uint8_t* q = p + image.step;
-  return (1.0 - fy) * ((1.0 - fx) * p[0] + fx * p[1]) + fy * ((1.0 - fx) * q[0] + fx * q[1]);
-}
-
-struct Edge {
+struct RimEdge {
   Eigen::Vector2d point_px, normal;
   double sigma_px = 0.0;
   double step_levels = 0.0;  ///< inside minus outside
@@ -46,7 +39,8 @@ class NormalScan {
     profile_.resize(static_cast<std::size_t>(2 * (half_ + margin_) + 1));
   }
 
-  [[nodiscard]] std::optional<Edge> find(const Eigen::Vector2d& at, const Eigen::Vector2d& normal) {
+  [[nodiscard]] std::optional<RimEdge> find(const Eigen::Vector2d& at,
+                                            const Eigen::Vector2d& normal) {
     if (!read(at, normal)) return std::nullopt;
     const int best = strongest();
     if (best < 0) return std::nullopt;
@@ -62,7 +56,7 @@ class NormalScan {
       if (!(p.x() >= 0 && p.y() >= 0 && p.x() <= right && p.y() <= bottom)) return false;
     for (int i = -n; i <= n; ++i) {
       const Eigen::Vector2d p = at + i * kStep_px * normal;
-      profile_[static_cast<std::size_t>(i + n)] = sample(luma_, p.x(), p.y());
+      profile_[static_cast<std::size_t>(i + n)] = bilinear<double>(luma_, p.x(), p.y());
     }
     return true;
   }
@@ -83,8 +77,8 @@ class NormalScan {
     return best;
   }
 
-  [[nodiscard]] std::optional<Edge> refine(int i, const Eigen::Vector2d& at,
-                                           const Eigen::Vector2d& normal) const {
+  [[nodiscard]] std::optional<RimEdge> refine(int i, const Eigen::Vector2d& at,
+                                              const Eigen::Vector2d& normal) const {
     double inside = 0.0, outside = 0.0;
     for (int k = 0; k < kLevelSamples; ++k) {
       inside += profile_[static_cast<std::size_t>(i - kLevelGap - k)];
@@ -107,19 +101,19 @@ class NormalScan {
     const double offset_px = (best - margin_ - half_) * kStep_px;
     const Eigen::Vector2d point = at + offset_px * normal;
     // Bilinear samples of white noise keep about 0.7 of its deviation.
-    return Edge{.point_px = point,
-                .normal = normal,
-                .sigma_px = std::max(0.02, 0.7 * search_.noise_levels / slope),
-                .step_levels = step,
-                .in_background = scene_step(point, normal) > 0.4 * std::abs(step)};
+    return RimEdge{.point_px = point,
+                   .normal = normal,
+                   .sigma_px = std::max(0.02, 0.7 * search_.noise_levels / slope),
+                   .step_levels = step,
+                   .in_background = scene_step(point, normal) > 0.4 * std::abs(step)};
   }
 
   /// Step of the static scene across the same place, 2 px to both sides.
   [[nodiscard]] double scene_step(const Eigen::Vector2d& at, const Eigen::Vector2d& normal) const {
     if (search_.background == nullptr) return 0.0;
     const Eigen::Vector2d a = at - 2.0 * normal, b = at + 2.0 * normal;
-    return std::abs(sample(*search_.background, a.x(), a.y()) -
-                    sample(*search_.background, b.x(), b.y()));
+    return std::abs(bilinear<double>(*search_.background, a.x(), a.y()) -
+                    bilinear<double>(*search_.background, b.x(), b.y()));
   }
 
   const cv::Mat& luma_;
@@ -129,18 +123,18 @@ class NormalScan {
 };
 
 struct Rays {
-  std::vector<Edge> edges;
+  std::vector<RimEdge> edges;
   int asked = 0;
 };
 
 Rays find_edges(const cv::Mat& luma, const Ellipse& ellipse, const RimSearch& search) {
-  const double perimeter = std::numbers::pi * (ellipse.semi_major_px() + ellipse.semi_minor_px());
+  const double perimeter = data::kPi * (ellipse.semi_major_px() + ellipse.semi_minor_px());
   const int count = std::clamp(static_cast<int>(perimeter / 1.5), 36, 144);
   const Eigen::Matrix2d inverse = ellipse.shape_px.inverse();
   NormalScan scan(luma, search);
   Rays rays{.edges = {}, .asked = count};
   for (int i = 0; i < count; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / count;
+    const double angle = data::kTurn * i / count;
     const Eigen::Vector2d u(std::cos(angle), std::sin(angle));
     const Eigen::Vector2d normal = (inverse * u).normalized();
     if (const auto edge = scan.find(ellipse.centre_px + ellipse.shape_px * u, normal))
@@ -151,20 +145,20 @@ Rays find_edges(const cv::Mat& luma, const Ellipse& ellipse, const RimSearch& se
 
 /// A rim has one polarity nearly everywhere; edges of the other sign are marks, floor and shadow,
 /// unless both are common (a body of mixed brightness on a mixed floor).
-void keep_common_polarity(std::vector<Edge>& edges) {
+void keep_common_polarity(std::vector<RimEdge>& edges) {
   const auto bright =
-      std::count_if(edges.begin(), edges.end(), [](const Edge& e) { return e.step_levels > 0; });
+      std::count_if(edges.begin(), edges.end(), [](const RimEdge& e) { return e.step_levels > 0; });
   const double share = static_cast<double>(bright) / static_cast<double>(edges.size());
   if (share > 0.3 && share < 0.7) return;
-  std::erase_if(edges, [&](const Edge& e) { return (e.step_levels > 0) != (share >= 0.5); });
+  std::erase_if(edges, [&](const RimEdge& e) { return (e.step_levels > 0) != (share >= 0.5); });
 }
 
 /// Edges that the static scene shows too are not the body's, unless most are.
-void drop_scene_edges(std::vector<Edge>& edges) {
+void drop_scene_edges(std::vector<RimEdge>& edges) {
   const auto scene =
-      std::count_if(edges.begin(), edges.end(), [](const Edge& e) { return e.in_background; });
+      std::count_if(edges.begin(), edges.end(), [](const RimEdge& e) { return e.in_background; });
   if (static_cast<double>(scene) > 0.4 * static_cast<double>(edges.size())) return;
-  std::erase_if(edges, [](const Edge& e) { return e.in_background; });
+  std::erase_if(edges, [](const RimEdge& e) { return e.in_background; });
 }
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
@@ -174,7 +168,7 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 ///   parameters: centre (2), m00, m01, m11 of the shape
 class EllipseFit {
  public:
-  EllipseFit(std::vector<Edge>& edges, Ellipse start, const RimSearch& search)
+  EllipseFit(std::vector<RimEdge>& edges, Ellipse start, const RimSearch& search)
       : edges_(edges), ellipse_(std::move(start)), search_(search) {}
 
   bool solve() {
@@ -204,7 +198,7 @@ class EllipseFit {
     std::vector<Vector5> rows(edges_.size());
     std::vector<double> sizes(edges_.size());
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      Edge& edge = edges_[i];
+      RimEdge& edge = edges_[i];
       const Eigen::Vector2d q = inverse * (edge.point_px - ellipse_.centre_px);
       const double length = std::max(q.norm(), 1e-6);
       const Eigen::Vector2d gradient = inverse * q / length;
@@ -244,7 +238,7 @@ class EllipseFit {
     }
   }
 
-  std::vector<Edge>& edges_;
+  std::vector<RimEdge>& edges_;
   Ellipse ellipse_;
   const RimSearch& search_;
   Matrix5 normal_ = Matrix5::Zero();
@@ -254,9 +248,9 @@ class EllipseFit {
 
 /// How many neighbours share one independent error: 1 + 2 sum of the residuals' autocorrelation
 /// along the rim, up to its first zero. Shading and compression blocks make edges err together.
-double correlation_inflation(const std::vector<Edge>& edges) {
+double correlation_inflation(const std::vector<RimEdge>& edges) {
   std::vector<double> r;
-  for (const Edge& e : edges)
+  for (const RimEdge& e : edges)
     if (e.weight > 0.1) r.push_back(e.residual_px);
   const auto n = static_cast<std::ptrdiff_t>(r.size());
   if (n < 12) return 2.0;
@@ -274,11 +268,11 @@ double correlation_inflation(const std::vector<Edge>& edges) {
   return std::clamp(inflation, 1.0, 10.0);
 }
 
-RimFit report(const EllipseFit& fit, const std::vector<Edge>& edges, int asked) {
+RimFit report(const EllipseFit& fit, const std::vector<RimEdge>& edges, int asked) {
   RimFit result{.ellipse = fit.ellipse()};
   double sum = 0.0;
   std::vector<double> steps;
-  for (const Edge& e : edges) {
+  for (const RimEdge& e : edges) {
     if (e.weight < 0.1) continue;
     sum += e.residual_px * e.residual_px;
     steps.push_back(e.step_levels);

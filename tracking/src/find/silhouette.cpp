@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -50,8 +51,7 @@ Silhouette describe(const std::vector<cv::Point>& contour, int factor, const cv:
                      d.box.br().x >= picture.width - factor ||
                      d.box.br().y >= picture.height - factor;
   body.solidity = cv::contourArea(contour) / m.m00;
-  body.ellipticity =
-      m.m00 / (4.0 * std::numbers::pi * std::sqrt(std::max(1e-9, xx * yy - xy * xy)));
+  body.ellipticity = m.m00 / (4.0 * data::kPi * std::sqrt(std::max(1e-9, xx * yy - xy * xy)));
   for (const cv::Point& p : contour)
     body.outline_px.emplace_back(static_cast<float>(scale * p.x + shift + origin.x),
                                  static_cast<float>(scale * p.y + shift + origin.y));
@@ -125,27 +125,27 @@ bool difference_in(const Frame& frame, const Plate& background, cv::Rect box, Di
   return true;
 }
 
-using Contour = std::vector<cv::Point>;
+using Polygon = std::vector<cv::Point>;
 
-std::vector<Contour> contours_above(const cv::Mat& difference, double threshold) {
+std::vector<Polygon> contours_above(const cv::Mat& difference, double threshold) {
   constexpr double kSmallest = 12.0;  // reduced pixels; below, compression noise
   cv::Mat mask;
   cv::threshold(difference, mask, threshold, 255, cv::THRESH_BINARY);
   const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3});
   cv::morphologyEx(mask, mask, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));
   cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, disc, {-1, -1}, 2);
-  std::vector<Contour> contours;
+  std::vector<Polygon> contours;
   cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   std::erase_if(contours,
-                [](const Contour& c) { return c.size() < 8 || cv::contourArea(c) < kSmallest; });
+                [](const Polygon& c) { return c.size() < 8 || cv::contourArea(c) < kSmallest; });
   return contours;
 }
 
 /// Otsu's threshold of the differences inside a contour; nothing if they do not fall into two.
-std::optional<double> split_inside(const cv::Mat& difference, const Contour& contour) {
+std::optional<double> split_inside(const cv::Mat& difference, const Polygon& contour) {
   const cv::Rect box = cv::boundingRect(contour);
   cv::Mat inside = cv::Mat::zeros(box.size(), CV_8U);
-  cv::fillPoly(inside, std::vector<Contour>{contour}, 255, cv::LINE_8, 0, -box.tl());
+  cv::fillPoly(inside, std::vector<Polygon>{contour}, 255, cv::LINE_8, 0, -box.tl());
   std::array<double, 256> count{};
   double total = 0.0, sum = 0.0, square = 0.0;
   for (int y = 0; y < box.height; ++y)
@@ -173,12 +173,12 @@ std::optional<double> split_inside(const cv::Mat& difference, const Contour& con
 }
 
 /// The parts of a region that differ most, where its differences fall into two.
-std::vector<Contour> cores_of(const cv::Mat& difference, const Contour& region) {
+std::vector<Polygon> cores_of(const cv::Mat& difference, const Polygon& region) {
   const auto split = split_inside(difference, region);
   if (!split) return {};
   const cv::Rect part = cv::boundingRect(region);
-  std::vector<Contour> cores = contours_above(difference(part), *split);
-  for (Contour& core : cores)
+  std::vector<Polygon> cores = contours_above(difference(part), *split);
+  for (Polygon& core : cores)
     for (cv::Point& p : core) p += part.tl();
   return cores;
 }
@@ -196,7 +196,7 @@ std::vector<Silhouette> find_silhouettes(const Frame& frame, const Plate& backgr
   Difference d;
   std::vector<Silhouette> bodies;
   if (!difference_in(frame, background, box, d)) return bodies;
-  for (const Contour& contour : contours_above(d.size, d.threshold)) {
+  for (const Polygon& contour : contours_above(d.size, d.threshold)) {
     Silhouette body = describe(contour, d.factor, d.box.tl(), frame.luma.size());
     if (body.detection.area_px2 > 0.0) bodies.push_back(std::move(body));
   }
@@ -215,14 +215,14 @@ std::vector<Silhouette> find_coloured_like(const Palette& body, double gain, con
       if (!body.shows({d.now.at<std::uint8_t>(y, x), colour[0], colour[1]}, gain))
         d.size.at<std::uint8_t>(y, x) = 0;
     }
-  const std::vector<Contour> contours = contours_above(d.size, d.threshold);
+  const std::vector<Polygon> contours = contours_above(d.size, d.threshold);
   double largest = 0.0;
-  for (const Contour& contour : contours) largest = std::max(largest, cv::contourArea(contour));
+  for (const Polygon& contour : contours) largest = std::max(largest, cv::contourArea(contour));
   constexpr double kPart = 0.1;  // a speck elsewhere is none of the body
-  Contour together, hull;
+  Polygon together, hull;
   double area = 0.0;
   int parts = 0;
-  for (const Contour& contour : contours) {
+  for (const Polygon& contour : contours) {
     bodies.push_back(describe(contour, d.factor, d.box.tl(), frame.luma.size()));
     if (cv::contourArea(contour) < kPart * largest) continue;
     together.insert(together.end(), contour.begin(), contour.end());
@@ -244,7 +244,7 @@ std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
   Difference d;
   std::vector<Silhouette> bodies;
   if (!difference_in(frame, background, box, d)) return bodies;
-  const auto add = [&](const Contour& contour) {
+  const auto add = [&](const Polygon& contour) {
     Silhouette body = describe(contour, d.factor, d.box.tl(), frame.luma.size());
     if (body.detection.area_px2 <= 0.0) return;
     const bool known = std::any_of(bodies.begin(), bodies.end(), [&](const Silhouette& other) {
@@ -256,17 +256,17 @@ std::vector<Silhouette> find_bodies(const Frame& frame, const Plate& background,
     });
     if (!known) bodies.push_back(std::move(body));
   };
-  for (const Contour& contour : contours_above(d.size, d.threshold)) {
+  for (const Polygon& contour : contours_above(d.size, d.threshold)) {
     add(contour);
     // Once takes the light parts of a shadow off, twice its dark ones.
-    for (const Contour& core : cores_of(d.size, contour)) {
+    for (const Polygon& core : cores_of(d.size, contour)) {
       add(core);
-      for (const Contour& innermost : cores_of(d.size, core)) add(innermost);
+      for (const Polygon& innermost : cores_of(d.size, core)) add(innermost);
     }
   }
-  for (const Contour& contour : contours_above(d.brighter, d.threshold)) add(contour);
+  for (const Polygon& contour : contours_above(d.brighter, d.threshold)) add(contour);
   if (!d.colour.empty())
-    for (const Contour& contour : contours_above(d.colour, d.threshold)) add(contour);
+    for (const Polygon& contour : contours_above(d.colour, d.threshold)) add(contour);
   largest_first(bodies);
   return bodies;
 }

@@ -5,28 +5,20 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <numbers>
+
+#include "geometry/bilinear.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 constexpr int kRings = 8, kSpokes = 240;
 constexpr double kInnermost = 0.22, kOutermost = 0.86;  // of the rim: the edge itself is left out
-constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kSpoke_rad = kTurn / kSpokes;
+
+constexpr double kSpoke_rad = data::kTurn / kSpokes;
 
 double ring_radius(int ring) {
   return kInnermost + (kOutermost - kInnermost) * ring / (kRings - 1);
-}
-
-float sample(const cv::Mat& image, double x, double y) {
-  x = std::clamp(x, 0.0, image.cols - 1.001);
-  y = std::clamp(y, 0.0, image.rows - 1.001);
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const auto fx = static_cast<float>(x - ix), fy = static_cast<float>(y - iy);
-  const std::uint8_t* p = image.ptr(iy) + ix;
-  const std::uint8_t* q = p + image.step;
-  return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
 }
 
 float median_of(const float* begin, int count) {
@@ -78,7 +70,7 @@ SpinProfile::Polar SpinProfile::unroll(const cv::Mat& luma, const Ellipse& rim) 
           (ring_radius(ring) + part * (kOutermost - kInnermost) / (kRings - 1)) * rim.shape_px;
       for (std::size_t i = 0; i < kSpokes; ++i) {
         const Eigen::Vector2d p = rim.centre_px + shape * kDirections[i];
-        row[i] += sample(luma, p.x(), p.y()) / kAcross;
+        row[i] += bilinear_inside<float>(luma, p.x(), p.y()) / kAcross;
       }
     }
     flatten(row);
@@ -116,8 +108,8 @@ std::optional<SpinProfile> SpinProfile::from_face(const cv::Mat& luma, const Ell
       profile.power_ += row[i] * row[i];
     }
   if (profile.power_ <= 0.0F || profile.slope_power_ <= 0.0F) return std::nullopt;
-  const double face_px = std::numbers::pi * rim.shape_px.determinant() *
-                         (kOutermost * kOutermost - kInnermost * kInnermost);
+  const double face_px =
+      data::kPi * rim.shape_px.determinant() * (kOutermost * kOutermost - kInnermost * kInnermost);
   profile.independent_share_ = std::min(1.0, face_px / (kRings * kSpokes));
   profile.orient();
   return profile;

@@ -1,20 +1,15 @@
 #include "geometry/exposure.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
 using Edge = data::OutlinePoint::Edge;
-constexpr double kTurn = 2.0 * std::numbers::pi;
-
-Eigen::Vector3d turned(const Eigen::Vector3d& v, double angle_rad) {
-  return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * v;
-}
 
 // Edges that take each other's place as the body turns: the outer border, that of the bore, and
 // those between two surfaces of the body each for itself.
@@ -113,13 +108,13 @@ std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sam
 ExposureMotion::ExposureMotion(const Pose& before, const Pose& middle, double fraction) {
   constexpr double kLeastSine = 0.1;
   steep_ = std::min(std::sin(before.theta_rad), std::sin(middle.theta_rad)) < kLeastSine;
-  const double turn = std::remainder(middle.phi_rad - before.phi_rad, kTurn);
+  const double turn = std::remainder(middle.phi_rad - before.phi_rad, data::kTurn);
   tilt_rad_ = fraction * (middle.theta_rad - before.theta_rad);
   precession_rad_ = fraction * turn;
   axis_ = fraction * (axis_of(middle) - axis_of(before));
   // Whatever rolls on its rim turns its velocity as it turns its axis.
   const double half_turn = steep_ ? 0.0 : 0.5 * turn;
-  shift_m_ = fraction * turned(middle.centre_m - before.centre_m, half_turn);
+  shift_m_ = fraction * turned_about_vertical(middle.centre_m - before.centre_m, half_turn);
 }
 
 Pose ExposureMotion::at(const Pose& middle, double share) const {
@@ -131,7 +126,7 @@ Pose ExposureMotion::at(const Pose& middle, double share) const {
   }
   pose.theta_rad += share * tilt_rad_;
   pose.phi_rad += share * precession_rad_;
-  pose.centre_m += share * turned(shift_m_, 0.5 * share * precession_rad_);
+  pose.centre_m += share * turned_about_vertical(shift_m_, 0.5 * share * precession_rad_);
   return pose;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "trochoid/data/body.hpp"
 #include "trochoid/data/camera.hpp"
@@ -7,6 +7,12 @@
 #include "trochoid/data/scene.hpp"
 
 namespace trochoid::tracking {
+
+/// @returns `v` after a turn about the vertical of the table.
+[[nodiscard]] inline Eigen::Vector3d turned_about_vertical(const Eigen::Vector3d& v,
+                                                           double angle_rad) {
+  return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * v;
+}
 
 /// The ways a body can move under its support, as small motions about a pose: translations of the
 /// table frame [m], rotations about the node line and about the direction of steepest ascent [rad]

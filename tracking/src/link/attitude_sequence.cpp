@@ -5,22 +5,21 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
 #include "find/forecast.hpp"
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// A sighting with a pose, in its two readings.
-struct Node {
+struct AttitudeNode {
   std::size_t at;  ///< among the glimpses
   double t_s;
   std::array<Pose, 2> poses;  ///< as tracked, mirrored
@@ -120,7 +119,7 @@ class Chain {
   void weigh(const std::vector<std::size_t>& chosen) {
     constexpr double kPerShare = 9.0, kMost = 1.5, kNothingThere = 0.6;
     on_all_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
-      Node& node = nodes_[chosen[k]];
+      AttitudeNode& node = nodes_[chosen[k]];
       if (node.weighed || node.tilt_rad < kLeastTilt) return;
       node.weighed = true;
       const Glimpse& glimpse = glimpses_[node.at];
@@ -143,7 +142,7 @@ class Chain {
   void weigh_shadows() {
     constexpr double kOfShadow = 2.5, kMost = 1.5;
     on_all_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
-      Node& node = nodes_[i];
+      AttitudeNode& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       const Glimpse& g = glimpses_[node.at];
       const double other = measure.shadow(*g.frame, *g.seen, node.poses[1]);
@@ -151,7 +150,7 @@ class Chain {
     });
   }
 
-  [[nodiscard]] const Sighting& first_of(const Node& node) const {
+  [[nodiscard]] const Sighting& first_of(const AttitudeNode& node) const {
     return node.again ? *node.again : *glimpses_[node.at].seen;
   }
 
@@ -163,7 +162,7 @@ class Chain {
     constexpr double kLeastSd_px = 0.1;
     const double whole = least_whole();
     std::vector<double> larger_px;
-    for (Node& node : nodes_) {
+    for (AttitudeNode& node : nodes_) {
       node.speaks = node.shows + node.shadow;
       node.could = node.wall();
       if (shows_size(node, whole))
@@ -172,7 +171,7 @@ class Chain {
     }
     if (larger_px.size() < 2 * kFewest) return;
     const auto [usual_px, spread_px] = where_half_agree(std::move(larger_px));
-    for (Node& node : nodes_) {
+    for (AttitudeNode& node : nodes_) {
       if (!shows_size(node, whole)) continue;
       node.speaks += size_speaks(node, usual_px, std::max(kLeastSd_px, spread_px));
       node.could += 1.0;
@@ -180,7 +179,7 @@ class Chain {
   }
 
   /// How much its size speaks for the first reading of a node.
-  [[nodiscard]] double size_speaks(const Node& node, double usual_px, double sd_px) const {
+  [[nodiscard]] double size_speaks(const AttitudeNode& node, double usual_px, double sd_px) const {
     constexpr double kMost = 1.5;
     const Sighting &one = first_of(node), &other = *node.other;
     const double expected_px = one.rim.semi_major_px() - other.rim.semi_major_px();
@@ -201,11 +200,11 @@ class Chain {
   [[nodiscard]] double least_whole() const {
     constexpr double kOfUsual = 0.85;
     std::vector<double> accepted;
-    for (const Node& node : nodes_) accepted.push_back(first_of(node).accepted);
+    for (const AttitudeNode& node : nodes_) accepted.push_back(first_of(node).accepted);
     return kOfUsual * data::median(std::move(accepted));
   }
 
-  [[nodiscard]] bool shows_size(const Node& node, double least_accepted) const {
+  [[nodiscard]] bool shows_size(const AttitudeNode& node, double least_accepted) const {
     return node.other && std::min(first_of(node).accepted, node.other->accepted) >= least_accepted;
   }
 
@@ -240,7 +239,7 @@ class Chain {
     // By the edges alone or together with sizes and shadows, whichever is clearer.
     const double share = std::max(shows / wall, speaks / could);
     const double trust = std::clamp((share - kShared) / (kSure - kShared), 0.0, 1.0);
-    for (Node& node : nodes_) node.speaks *= trust;
+    for (AttitudeNode& node : nodes_) node.speaks *= trust;
   }
 
   /// What is too little to be sure of is still the best there is to choose by: the choice of before
@@ -274,7 +273,7 @@ class Chain {
   /// Half of what lies between two tilts.
   [[nodiscard]] double between_tilts(double one_rad, double other_rad) const {
     const auto folded = [&](double tilt) {
-      return alike_ ? std::min(tilt, std::numbers::pi - tilt) : tilt;
+      return alike_ ? std::min(tilt, data::kPi - tilt) : tilt;
     };
     return 0.5 * std::abs(folded(one_rad) - folded(other_rad));
   }
@@ -282,7 +281,7 @@ class Chain {
   /// A reading of node i measured afresh; nothing if the picture leads elsewhere.
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
                                                  std::size_t reading) const {
-    const Node& node = nodes_[i];
+    const AttitudeNode& node = nodes_[i];
     const Pose &wanted = node.poses[reading], &unwanted = node.poses[1 - reading];
     Sighting guess = *glimpses_[node.at].seen;
     guess.pose->pose = wanted;
@@ -306,7 +305,7 @@ class Chain {
     constexpr double kMost = 12.0;  // no body leaps; a pose that is off by itself costs either way
     // All else equal, the slower motion: reading every other frame mirrored goes on evenly as well.
     constexpr double kPerRadian = 0.5;
-    const Node &first = nodes_[i - 2], &second = nodes_[i - 1], &third = nodes_[i];
+    const AttitudeNode &first = nodes_[i - 2], &second = nodes_[i - 1], &third = nodes_[i];
     const double early = second.t_s - first.t_s, late = third.t_s - second.t_s;
     if (early > kMostFrames * frame_s_ || late > kMostFrames * frame_s_) return 0.0;
     const double ahead = late / early;
@@ -319,7 +318,7 @@ class Chain {
     const Eigen::Vector3d is = axis_of(pc);
     const Eigen::Vector3d straight = (to + ahead * (to - from)).normalized();
     Pose turning = pb;
-    turning.phi_rad += ahead * std::remainder(pb.phi_rad - pa.phi_rad, kTurn);
+    turning.phi_rad += ahead * std::remainder(pb.phi_rad - pa.phi_rad, data::kTurn);
     turning.theta_rad += ahead * (pb.theta_rad - pa.theta_rad);
     const double off =
         std::min(between_axes(straight, is, alike_), between_axes(axis_of(turning), is, alike_));
@@ -347,7 +346,7 @@ class Chain {
   [[nodiscard]] double lean_tells() const {
     constexpr double kErrors_rad = 0.05;
     double apart2 = 0.0;
-    for (const Node& node : nodes_)
+    for (const AttitudeNode& node : nodes_)
       apart2 += std::pow(2.0 * between_tilts(node.poses[0].theta_rad, node.poses[1].theta_rad), 2);
     const double errors2 = kErrors_rad * kErrors_rad * static_cast<double>(nodes_.size());
     return apart2 > errors2 ? 1.0 - errors2 / apart2 : 0.0;
@@ -425,7 +424,7 @@ class Chain {
     constexpr double kDoubtful = 2.0;
     std::vector<std::optional<AttitudeDoubt>> doubts(nodes_.size());
     on_all_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
-      Node& node = nodes_[i];
+      AttitudeNode& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
       auto& seen = glimpses_[node.at].seen;
       if (node.again) seen.swap(node.again);
@@ -475,7 +474,7 @@ class Chain {
   bool alike_;
   double frame_s_ = 1.0;
   double lean_tells_ = 0.0;  ///< how much of what the two tilts differ by is more than errors
-  std::vector<Node> nodes_;
+  std::vector<AttitudeNode> nodes_;
   std::vector<double> margin_;  ///< cost of the second reading beyond that of the first
 };
 

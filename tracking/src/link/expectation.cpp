@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "find/forecast.hpp"
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -17,7 +17,6 @@ namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// Where neighbours at a and b (and those before and after them) put the body at time t.
 struct Neighbours {
@@ -52,9 +51,9 @@ struct Neighbours {
       return pose;
     }
     const double turns =
-        std::round((0.5 * (early + late) * (tb - ta) - (to.phi_rad - pose.phi_rad)) / kTurn);
+        std::round((0.5 * (early + late) * (tb - ta) - (to.phi_rad - pose.phi_rad)) / data::kTurn);
     pose.theta_rad += share * (to.theta_rad - pose.theta_rad);
-    pose.phi_rad += share * (to.phi_rad - pose.phi_rad + turns * kTurn);
+    pose.phi_rad += share * (to.phi_rad - pose.phi_rad + turns * data::kTurn);
     return pose;
   }
 
@@ -92,7 +91,7 @@ struct Neighbours {
     if (step_s <= 0.0) return 0.0;
     Pose end = to.pose();
     if (alike) end = nearer_face(end, from.pose(), 0.0);
-    return std::remainder(end.phi_rad - from.pose().phi_rad, kTurn) / step_s;
+    return std::remainder(end.phi_rad - from.pose().phi_rad, data::kTurn) / step_s;
   }
 };
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -49,7 +49,7 @@ bool axis_stays(const std::vector<Glimpse>& glimpses, std::size_t i) {
 }
 
 Pose lying(Pose pose) {
-  pose.theta_rad = pose.theta_rad > 0.5 * std::numbers::pi ? std::numbers::pi : 0.0;
+  pose.theta_rad = pose.theta_rad > 0.5 * data::kPi ? data::kPi : 0.0;
   pose.phi_rad = 0.0;
   return pose;
 }

@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "trochoid/data/angle.hpp"
+
 namespace trochoid::tracking {
 namespace {
 

@@ -11,13 +11,13 @@
 
 #include "find/forecast.hpp"
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// How far a pose is from where the two before it lead: of its axis and of its centre.
 struct Miss {
@@ -25,7 +25,7 @@ struct Miss {
 };
 
 /// A frame with the body, and what it may show: first as tracked.
-struct Node {
+struct ReadingNode {
   std::size_t at;  ///< among the glimpses
   double t_s;
   std::vector<Sighting> readings;
@@ -83,7 +83,7 @@ class Readings {
       if (path() == before) break;
     }
     ReadingDoubt doubt{.tallies = tallies()};
-    for (Node& node : nodes_) {
+    for (ReadingNode& node : nodes_) {
       if (node.chosen == 0) continue;
       auto& seen = glimpses_[node.at].seen;
       node.readings[node.chosen].turned_rad = seen->turned_rad;
@@ -109,7 +109,7 @@ class Readings {
   /// What was chosen of each frame.
   [[nodiscard]] std::vector<std::size_t> path() const {
     std::vector<std::size_t> chosen;
-    for (const Node& node : nodes_) chosen.push_back(node.chosen);
+    for (const ReadingNode& node : nodes_) chosen.push_back(node.chosen);
     return chosen;
   }
 
@@ -139,7 +139,7 @@ class Readings {
     Pose off = pose;
     off.centre_m += share * (b.centre_m - from.centre_m);
     off.theta_rad += share * (b.theta_rad - from.theta_rad);
-    off.phi_rad += share * std::remainder(b.phi_rad - from.phi_rad, kTurn);
+    off.phi_rad += share * std::remainder(b.phi_rad - from.phi_rad, data::kTurn);
     return off;
   }
 
@@ -281,7 +281,7 @@ class Readings {
   [[nodiscard]] Pose led(const Pose& a, const Pose& b, double ahead) const {
     constexpr double kSteep = 0.2;  // near the vertical, precession means nothing
     const Pose from = alike_ ? nearer_face(a, b, 0.0) : a;
-    const double turn = std::remainder(b.phi_rad - from.phi_rad, kTurn);
+    const double turn = std::remainder(b.phi_rad - from.phi_rad, data::kTurn);
     Pose pose = b;
     if (std::min(std::sin(from.theta_rad), std::sin(b.theta_rad)) < kSteep) {
       set_axis((axis_of(b) + ahead * (axis_of(b) - axis_of(from))).normalized(), pose);
@@ -296,7 +296,7 @@ class Readings {
 
   /// A step of a centre that goes round with the precession, that much later.
   static Eigen::Vector3d turned(const Eigen::Vector3d& step, double turn_rad, double ahead) {
-    return Eigen::AngleAxisd(0.5 * (1.0 + ahead) * turn_rad, Eigen::Vector3d::UnitZ()) * step;
+    return turned_about_vertical(step, 0.5 * (1.0 + ahead) * turn_rad);
   }
 
   /// Straight on, and round with the precession.
@@ -308,7 +308,7 @@ class Readings {
     if (alike_) first = nearer_face(first, second, 0.0);
     const double ahead =
         (nodes_[k].t_s - nodes_[k - 1].t_s) / (nodes_[k - 1].t_s - nodes_[k - 2].t_s);
-    const double turn = std::remainder(second.phi_rad - first.phi_rad, kTurn);
+    const double turn = std::remainder(second.phi_rad - first.phi_rad, data::kTurn);
     Pose on = second;
     on.phi_rad += ahead * turn;
     on.theta_rad += ahead * (second.theta_rad - first.theta_rad);
@@ -397,7 +397,7 @@ class Readings {
   std::vector<Glimpse>& glimpses_;
   bool alike_;
   double frame_s_ = 1.0;
-  std::vector<Node> nodes_;
+  std::vector<ReadingNode> nodes_;
   std::vector<Otherwises> as_tracked_;  ///< of every kStride-th frame, beside how it was tracked
   Miss usual_{1.0, 1.0};
   bool round_ = false;  ///< the centre goes round with the precession
@@ -423,7 +423,7 @@ void place_other_readings(const BodyFinder& finder, std::size_t settled,
     for (std::size_t which = 0; which < others.size(); ++which) {
       if (!others[which]) continue;
       const Eigen::Vector2d off_m = (others[which]->centre_m - pose.centre_m).head<2>();
-      const double turn = std::remainder(others[which]->phi_rad - pose.phi_rad, kTurn);
+      const double turn = std::remainder(others[which]->phi_rad - pose.phi_rad, data::kTurn);
       PoseSpread& spread = seen.other_readings[which];
       spread.m2 = off_m * off_m.transpose();
       spread.theta_rad2 = std::pow(others[which]->theta_rad - pose.theta_rad, 2);

@@ -2,27 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 
 #include "find/forecast.hpp"
 #include "geometry/pose_motion.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// Where a body would have been one frame before `pose`, moving as between its neighbours.
 Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
   Pose earlier = pose;
-  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, kTurn);
-  const double turned = std::remainder(pose.phi_rad - before.phi_rad, kTurn) +
-                        std::remainder(after.phi_rad - pose.phi_rad, kTurn);
+  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, data::kTurn);
+  const double turned = std::remainder(pose.phi_rad - before.phi_rad, data::kTurn) +
+                        std::remainder(after.phi_rad - pose.phi_rad, data::kTurn);
   // More than half a turn in two frames.
-  earlier.phi_rad -= std::abs(turned) > 0.5 * kTurn ? 0.5 * turned : turn;
+  earlier.phi_rad -= std::abs(turned) > 0.5 * data::kTurn ? 0.5 * turned : turn;
   earlier.theta_rad -= 0.5 * (after.theta_rad - before.theta_rad);
   earlier.centre_m -= 0.5 * (after.centre_m - before.centre_m);
   return earlier;
@@ -31,7 +30,7 @@ Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
 /// As far beyond `to` as that is from `from`.
 Pose beyond(const Pose& from, const Pose& to) {
   Pose pose = to;
-  pose.phi_rad += std::remainder(to.phi_rad - from.phi_rad, kTurn);
+  pose.phi_rad += std::remainder(to.phi_rad - from.phi_rad, data::kTurn);
   pose.theta_rad += to.theta_rad - from.theta_rad;
   pose.centre_m += to.centre_m - from.centre_m;
   return pose;

@@ -134,7 +134,7 @@ std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vecto
 
 namespace {
 
-constexpr std::int64_t kFewest = 6;  // samples that tell how a body moves
+constexpr std::int64_t kFewestSamples = 6;  // samples that tell how a body moves
 
 /// Consecutive frames of one body, measured or interpolated.
 struct Stretch {
@@ -199,7 +199,7 @@ SmoothTrack smooth_track(const data::TrackFile& file) {
                     [](auto& s) { return s.frame < 0; }))
       throw TrackError("to be smoothed, a track needs the number of each sample's frame");
     for (const Stretch& stretch : stretches_of(track)) {
-      if (measured(stretch) < kFewest) {
+      if (measured(stretch) < kFewestSamples) {
         result.left_out += measured(stretch);
         continue;
       }

@@ -3,16 +3,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "link/path_scatter.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// Keeps an angle continuous, from within half a turn of zero on: of all angle + k period the one
 /// nearest to where the last two lead.
@@ -26,7 +24,7 @@ class Unwrapper {
       angle += period_ * std::round((expected - angle) / period_);
       if (t_s > last_t_) rate_ = (angle - last_) / (t_s - last_t_);
     } else {
-      angle -= 2.0 * kPi * std::ceil((angle - kPi) / (2.0 * kPi));
+      angle -= data::kTurn * std::ceil((angle - data::kPi) / data::kTurn);
     }
     last_ = angle;
     last_t_ = t_s;
@@ -70,7 +68,8 @@ void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const Metr
 void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold,
                       double mark_rad) {
   double theta = pose.pose.theta_rad, phi = pose.pose.phi_rad, psi = pose.pose.psi_rad;
-  if (fold && theta > 0.5 * kPi) theta = kPi - theta, phi += kPi, psi = kPi - psi - 2.0 * mark_rad;
+  if (fold && theta > 0.5 * data::kPi)
+    theta = data::kPi - theta, phi += data::kPi, psi = data::kPi - psi - 2.0 * mark_rad;
   if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {theta, pose.sigma_theta_rad};
   if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {phi, pose.sigma_phi_rad};
   if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
@@ -171,8 +170,8 @@ double usual_radius_px(const BodyPath& path) {
 data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
                            const AssemblyOptions& options) {
   data::Track track{.object = object, .samples = {}};
-  Unwrapper phi(2.0 * kPi);
-  Unwrapper psi(path.marks && path.marks->two_fold() ? kPi : 2.0 * kPi);
+  Unwrapper phi(data::kTurn);
+  Unwrapper psi(path.marks && path.marks->two_fold() ? data::kPi : data::kTurn);
   const std::vector<double> inflations = smoothed_inflations(path);
   auto inflation = inflations.begin();
   const bool face_on = options.on_pin && turns_face_on(path);

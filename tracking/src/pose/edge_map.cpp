@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
+
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 // Logarithm of the luma; the offset keeps the noise of dark pixels from looking like edges.
 cv::Mat logarithm(const cv::Mat& luma) {
@@ -53,7 +52,7 @@ int EdgeMap::direction_of(double normal_x, double normal_y) {
   static const auto directions = [] {
     std::array<std::array<double, 2>, kDirections> units;
     for (size_t k = 0; k < kDirections; ++k) {
-      const double angle = kPi * static_cast<double>(k) / kDirections;
+      const double angle = data::kPi * static_cast<double>(k) / kDirections;
       units[k] = {std::cos(angle), std::sin(angle)};
     }
     return units;

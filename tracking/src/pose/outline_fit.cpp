@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "edges/colour_window.hpp"
 #include "pose/outline_refine.hpp"
 #include "pose/pose_start.hpp"
 #include "pose/spin_mark.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 
@@ -157,7 +157,7 @@ std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted
     others.push_back(std::move(*other));
   }
   data::Pose<> level = pose;
-  level.theta_rad = pose.theta_rad > 0.5 * std::numbers::pi ? std::numbers::pi : 0.0;
+  level.theta_rad = pose.theta_rad > 0.5 * data::kPi ? data::kPi : 0.0;
   if (auto other = fit_exactly(scenery, scenery.motion.settled(level), outline_px, fitted->blur_px))
     others.push_back(std::move(*other));
   spread_over(scenery.motion, others, *fitted);
@@ -327,14 +327,14 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
 
 // The other attitude with the same outline: the faces have changed places.
 data::Pose<> turned_over(data::Pose<> pose) {
-  pose.theta_rad = std::numbers::pi - pose.theta_rad;
-  pose.phi_rad = std::remainder(pose.phi_rad + std::numbers::pi, 2.0 * std::numbers::pi);
+  pose.theta_rad = data::kPi - pose.theta_rad;
+  pose.phi_rad = std::remainder(pose.phi_rad + data::kPi, data::kTurn);
   return pose;
 }
 
 // Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
 void fold(data::Pose<>& pose) {
-  if (pose.theta_rad > 0.5 * std::numbers::pi) pose = turned_over(pose);
+  if (pose.theta_rad > 0.5 * data::kPi) pose = turned_over(pose);
 }
 
 // Reads the marks; those of the other face show that a prediction had the body the wrong way up.

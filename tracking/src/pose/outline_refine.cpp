@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "edges/colour_edges.hpp"
 #include "edges/colour_window.hpp"
 #include "geometry/contour.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -110,17 +110,17 @@ double rounded_by_blur_px(const Crossings& crossings, double blur_px) {
 
 // What stretches of the outline look like; single profiles are too noisy for this, and their errors
 // would go with those of their edges.
-struct Surroundings {
+struct EdgeSurroundings {
   double steepness = 0.0;  // of the levels beside the edge, over its contrast [1/px]
   double wider_px = 0.0;
   bool darker = false;  // the body than what is beside it
   double rise = 0.0;    // how fast the latter gets brighter farther out, over the contrast [1/px]
 };
 
-std::vector<Surroundings> surroundings_of(const std::vector<StretchProfile>& looks) {
+std::vector<EdgeSurroundings> edge_surroundings(const std::vector<StretchProfile>& looks) {
   constexpr int kNeighbours = 4;
   const int n = static_cast<int>(looks.size());
-  std::vector<Surroundings> out(looks.size());
+  std::vector<EdgeSurroundings> out(looks.size());
   for (int i = 0; i < n; ++i) {
     double inner = 0.0, outer = 0.0, contrast = 1e-3;
     double wider = 0.0, wider_variance = 0.0, count = 1e-3;
@@ -157,7 +157,7 @@ double unknown_share(const ProfileEdge& edge) {
 
 // What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
 // light goes on under the blur, a sliver of shadow, levels beyond the range of the picture.
-double model_sd_px(const ProfileEdge& edge, bool clipped, const Surroundings& around,
+double model_sd_px(const ProfileEdge& edge, bool clipped, const EdgeSurroundings& around,
                    bool silhouette) {
   constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
   constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
@@ -178,7 +178,7 @@ double model_sd_px(const ProfileEdge& edge, bool clipped, const Surroundings& ar
 // contact the light of the room is missing too, unless the floor is as bright there as where it is
 // brightest. The higher above the floor, the farther from the rim all that is. Sizes: means over
 // recordings made by two ray tracers, edges about the true outline.
-double shadow_px(const Surroundings& around, const ProfileEdge& edge, double height_px) {
+double shadow_px(const EdgeSurroundings& around, const ProfileEdge& edge, double height_px) {
   constexpr double kPerRisePx2 = 2.5, kMostPx = 0.6, kPenumbraHeightPx = 25.0;
   constexpr double kContactPx = 0.04, kContactHeightPx = 12.0, kContactDims = 0.03;
   if (!around.darker) return 0.0;
@@ -325,7 +325,7 @@ double collect_exactly(const Scenery& scenery, const Search& search, bool last, 
   static const ShadingMemory kNothing;
   StretchFit fit =
       fit_stretches(looks, scenery.shading != nullptr ? *scenery.shading : kNothing, last);
-  const std::vector<Surroundings> around = surroundings_of(looks);
+  const std::vector<EdgeSurroundings> around = edge_surroundings(looks);
   for (size_t i = 0; i < looks.size(); ++i) {
     if (!looks[i].found) continue;
     const OutlineSample& sample = all[places[i]];
@@ -350,7 +350,7 @@ int rows_of_step(double step_px) {
 // What coding leaves of colours is off by half a level or so, alike for a few neighbours.
 double coded_px(const ColourEdge& found) {
   constexpr double kOffLevels = 0.5, kMostPx = 1.0;
-  const double step_px = std::sqrt(2.0 * std::numbers::pi) * found.blur_px;
+  const double step_px = std::sqrt(2.0 * data::kPi) * found.blur_px;
   return std::min(kMostPx, kOffLevels * step_px / std::max(1.0, std::abs(found.edge.contrast)));
 }
 

@@ -3,17 +3,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "geometry/outline_samples.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr size_t kMostStarts = 10;
 
 // Puts the centre on the ray through a pixel at the height the support wants.
@@ -28,7 +27,7 @@ std::optional<data::Pose<>> on_ray(const data::Camera& camera, const PoseMotion&
   return pose;
 }
 
-struct Candidate {
+struct PlaceCandidate {
   double score;
   data::Pose<> pose;
   Eigen::Vector2d centre_px;
@@ -47,13 +46,13 @@ std::vector<data::Pose<>> attitudes(double step_rad) {
   for (int ring = 1; ring <= rings; ++ring) {
     const double theta = kUpright * ring / rings;
     const int around =
-        std::max(4, static_cast<int>(std::lround(kTurn * std::sin(theta) / step_rad)));
-    for (int i = 0; i < around; ++i) add(theta, kTurn * (i + 0.5 * (ring % 2)) / around);
+        std::max(4, static_cast<int>(std::lround(data::kTurn * std::sin(theta) / step_rad)));
+    for (int i = 0; i < around; ++i) add(theta, data::kTurn * (i + 0.5 * (ring % 2)) / around);
   }
   return all;
 }
 
-struct Search {
+struct SilhouetteSearch {
   const data::Body& body;
   const data::Camera& camera;
   const PoseMotion& motion;
@@ -65,11 +64,11 @@ struct Search {
 struct CellPoint {
   int x, y, direction;
 };
-std::vector<CellPoint> silhouette_cells(const Search& search, const data::Pose<>& pose) {
+std::vector<CellPoint> silhouette_cells(const SilhouetteSearch& search, const data::Pose<>& pose) {
   constexpr double kPoints = 40.0;
   std::vector<CellPoint> cells;
   const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
-  const double step_px = kTurn * search.radius_px / kPoints;
+  const double step_px = data::kTurn * search.radius_px / kPoints;
   for (const auto& p : data::visible_outline(search.body, pose, search.camera, step_px)) {
     if (!p.silhouette) continue;
     const Eigen::Vector2d off = (p.image_px - centre) / search.map.cell_px();
@@ -80,7 +79,7 @@ std::vector<CellPoint> silhouette_cells(const Search& search, const data::Pose<>
 }
 
 // Mean strength of the edges under a silhouette for every cell its centre may be in.
-cv::Mat silhouette_scores(const Search& search, const std::vector<CellPoint>& cells) {
+cv::Mat silhouette_scores(const SilhouetteSearch& search, const std::vector<CellPoint>& cells) {
   const cv::Size size = search.map.strength(0).size();
   cv::Mat sum = cv::Mat::zeros(size, CV_32FC1);
   const cv::Rect all({}, size);
@@ -94,10 +93,11 @@ cv::Mat silhouette_scores(const Search& search, const std::vector<CellPoint>& ce
 }
 
 // The places of its centre where the silhouette of an attitude lies on edges best.
-std::vector<Candidate> best_places(const Search& search, const data::Pose<>& attitude,
-                                   const Eigen::Vector2d& about_px) {
+std::vector<PlaceCandidate> best_places(const SilhouetteSearch& search,
+                                        const data::Pose<>& attitude,
+                                        const Eigen::Vector2d& about_px) {
   constexpr int kPerAttitude = 2;
-  std::vector<Candidate> found;
+  std::vector<PlaceCandidate> found;
   const auto middle = on_ray(search.camera, search.motion, attitude, about_px);
   if (!middle) return found;
   cv::Mat scores = silhouette_scores(search, silhouette_cells(search, *middle));
@@ -115,27 +115,29 @@ std::vector<Candidate> best_places(const Search& search, const data::Pose<>& att
   return found;
 }
 
-std::vector<Candidate> joined(const std::vector<std::vector<Candidate>>& parts) {
-  std::vector<Candidate> all;
+std::vector<PlaceCandidate> joined(const std::vector<std::vector<PlaceCandidate>>& parts) {
+  std::vector<PlaceCandidate> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 
 // On the floor the silhouette of an attitude hardly depends on where it is: one template each.
-std::vector<Candidate> seek_on_floor(const Search& search, const Eigen::Vector2d& about_px) {
+std::vector<PlaceCandidate> seek_on_floor(const SilhouetteSearch& search,
+                                          const Eigen::Vector2d& about_px) {
   constexpr double kAttitudeStep = 0.21;
   const std::vector<data::Pose<>> all =
       search.motion.rotation() < 0 ? std::vector{data::Pose<>()} : attitudes(kAttitudeStep);
-  std::vector<std::vector<Candidate>> found(all.size());
+  std::vector<std::vector<PlaceCandidate>> found(all.size());
   data::in_parallel(all.size(), 2,
                     [&](size_t i) { found[i] = best_places(search, all[i], about_px); });
   return joined(found);
 }
 
 // The attitudes of an axis through the pivot with the centre so far along it.
-std::vector<Candidate> seek_at_distance(const Search& search, const Eigen::Vector3d& pivot_m,
-                                        double along_m, double cell_m) {
-  std::vector<Candidate> found;
+std::vector<PlaceCandidate> seek_at_distance(const SilhouetteSearch& search,
+                                             const Eigen::Vector3d& pivot_m, double along_m,
+                                             double cell_m) {
+  std::vector<PlaceCandidate> found;
   const cv::Rect all({}, search.map.strength(0).size());
   for (data::Pose<> pose : attitudes(std::clamp(1.5 * cell_m / along_m, 0.06, 0.21))) {
     pose.centre_m = pivot_m + along_m * axis_of(pose);
@@ -155,39 +157,40 @@ std::vector<Candidate> seek_at_distance(const Search& search, const Eigen::Vecto
 }
 
 // An axis through the pivot: the attitude and the distance along the axis place everything.
-std::vector<Candidate> seek_about_pivot(const Search& search, const Eigen::Vector3d& pivot_m) {
+std::vector<PlaceCandidate> seek_about_pivot(const SilhouetteSearch& search,
+                                             const Eigen::Vector3d& pivot_m) {
   constexpr double kFarthest = 6.0;  // radii from the pivot
   const double cell_m = search.map.cell_px() * search.body.radius_m / search.radius_px;
   std::vector<double> distances_m;
   for (double along = 0.1 * search.body.radius_m; along < kFarthest * search.body.radius_m;
        along += std::max(2.0 * cell_m, 0.1 * along))
     distances_m.push_back(along);
-  std::vector<std::vector<Candidate>> found(distances_m.size());
+  std::vector<std::vector<PlaceCandidate>> found(distances_m.size());
   data::in_parallel(distances_m.size(), 2, [&](size_t i) {
     found[i] = seek_at_distance(search, pivot_m, distances_m[i], cell_m);
   });
   return joined(found);
 }
 
-bool alike(const Candidate& a, const Candidate& b, double radius_px) {
+bool alike(const PlaceCandidate& a, const PlaceCandidate& b, double radius_px) {
   constexpr double kSameAttitude = 0.25;
   const Eigen::Vector3d k = data::symmetry_axis(a.pose.theta_rad, a.pose.phi_rad);
   const Eigen::Vector3d m = data::symmetry_axis(b.pose.theta_rad, b.pose.phi_rad);
   return (a.centre_px - b.centre_px).norm() < 0.2 * radius_px && (k - m).norm() < kSameAttitude;
 }
 
-std::vector<data::Pose<>> best_distinct(std::vector<Candidate> found, double radius_px) {
+std::vector<data::Pose<>> best_distinct(std::vector<PlaceCandidate> found, double radius_px) {
   std::sort(found.begin(), found.end(),
-            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-  std::vector<Candidate> kept;
-  for (const Candidate& c : found) {
+            [](const PlaceCandidate& a, const PlaceCandidate& b) { return a.score > b.score; });
+  std::vector<PlaceCandidate> kept;
+  for (const PlaceCandidate& c : found) {
     if (kept.size() == kMostStarts) break;
     if (std::none_of(kept.begin(), kept.end(),
-                     [&](const Candidate& other) { return alike(c, other, radius_px); }))
+                     [&](const PlaceCandidate& other) { return alike(c, other, radius_px); }))
       kept.push_back(c);
   }
   std::vector<data::Pose<>> starts;
-  for (const Candidate& c : kept) starts.push_back(c.pose);
+  for (const PlaceCandidate& c : kept) starts.push_back(c.pose);
   return starts;
 }
 
@@ -219,7 +222,7 @@ std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::
   if (window.width < 3 || window.height < 3) return {};
   EdgeMap map(evidence.luma, evidence.background, window, cell_px);
   if (!evidence.chroma.empty()) map.add_colours(evidence.chroma, evidence.background_chroma);
-  const Search search{body, camera, motion, map, radius_px};
+  const SilhouetteSearch search{body, camera, motion, map, radius_px};
   return best_distinct(support.kind == data::SupportKind::pivot
                            ? seek_about_pivot(search, *support.pivot_m)
                            : seek_on_floor(search, detection.centre_px),

@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "pose/arrow_system.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -42,17 +42,17 @@ constexpr double kColourPolaritySdPx = 0.3, kColourShiftSdPx = 0.08;
 constexpr double kShadowSd = 0.5;
 
 // The few unknowns an equation depends on, in the order of their indices but for the knots.
-struct Row {
+struct EquationRow {
   std::array<int, kRow> index{};
   std::array<double, kRow> value{};  // 0 beyond `count`
   int count = 0;
 
-  Row(const EdgeEquation& e, bool directions) {
+  EquationRow(const EdgeEquation& e, bool directions) {
     if (directions) {
       // Cosine and sine keep the variance the same between the knots.
-      const double place = (e.direction_rad / (2.0 * std::numbers::pi) + 1.0) * kKnots;
+      const double place = (e.direction_rad / data::kTurn + 1.0) * kKnots;
       const int knot = static_cast<int>(place);
-      const double part = 0.5 * std::numbers::pi * (place - knot);
+      const double part = 0.5 * data::kPi * (place - knot);
       const int first = e.group * kKnots;
       add(first + knot % kKnots, e.model_px * std::cos(part));
       add(first + (knot + 1) % kKnots, e.model_px * std::sin(part));
@@ -99,7 +99,7 @@ class Accumulating {
   Accumulating(const Accumulating&) = delete;
   Accumulating& operator=(const Accumulating&) = delete;
 
-  void add(const Row& row, double weight, double offset) {
+  void add(const EquationRow& row, double weight, double offset) {
     if (like_ == nullptr || row.index != like_->index) {
       flush();
       like_ = &row;
@@ -126,7 +126,7 @@ class Accumulating {
   }
 
   ArrowSystem& system_;
-  const Row* like_ = nullptr;
+  const EquationRow* like_ = nullptr;
   std::array<std::array<double, kRow>, kRow> square_;
   std::array<double, kRow> right_;
 };
@@ -179,7 +179,7 @@ constexpr size_t kSectors = 6;
 using Sectors = std::array<ArrowSystem, kSectors>;
 
 // What the equations of each sixth of all directions say.
-Sectors sectors_of(const std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
+Sectors sectors_of(const std::vector<EdgeEquation>& equations, const std::vector<EquationRow>& rows,
                    const ArrowSystem& prior, double scale) {
   ArrowSystem none = prior;
   none.add(prior, -1.0);
@@ -189,7 +189,7 @@ Sectors sectors_of(const std::vector<EdgeEquation>& equations, const std::vector
     Accumulating sums(sectors[k]);
     for (size_t i = 0; i < equations.size(); ++i) {
       const EdgeEquation& e = equations[i];
-      const double turn = e.direction_rad / (2.0 * std::numbers::pi) + 1.0;
+      const double turn = e.direction_rad / data::kTurn + 1.0;
       if (static_cast<size_t>(turn * kSectors) % kSectors == k)
         sums.add(rows[i], e.weight / (e.variance_px2 * scale * scale), e.offset_px);
     }
@@ -221,8 +221,9 @@ double jackknife_ratio(const ArrowSystem& all, const Sectors& sectors,
 // What errors common to whole sides of the outline do to the answer: no residual shows them, and
 // nothing is estimated of them.
 Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
-                                  const std::vector<Row>& rows, const ArrowSystem& factorised,
-                                  double scale, int first, int count) {
+                                  const std::vector<EquationRow>& rows,
+                                  const ArrowSystem& factorised, double scale, int first,
+                                  int count) {
   constexpr size_t kLower = 4, kOuterFlanks = 5, kBoreFlanks = 6, kOuterTwist = 7, kBoreTwist = 8,
                    kPatterns = 9;
   std::array<Vector, kPatterns> patterns{};
@@ -250,8 +251,9 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
 }
 
 // Tukey's weights about the solution so far, for errors that are `scale` times as large as claimed.
-double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows, const Vector& x,
-             double least_scale_px, const std::vector<double>& per_sd, std::vector<double>& sizes) {
+double weigh(std::vector<EdgeEquation>& equations, const std::vector<EquationRow>& rows,
+             const Vector& x, double least_scale_px, const std::vector<double>& per_sd,
+             std::vector<double>& sizes) {
   constexpr double kTukey = 4.685;  // 95 % efficiency for normal errors
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
@@ -272,7 +274,7 @@ double weigh(std::vector<EdgeEquation>& equations, const std::vector<Row>& rows,
 // Tukey-weighted least squares as it goes: the last solution and the system that gave it.
 struct Solving {
   std::vector<EdgeEquation>& equations;
-  const std::vector<Row>& rows;
+  const std::vector<EquationRow>& rows;
   const ArrowSystem& prior;
   int first, count;  // the pose among the unknowns
   double least_scale_px;
@@ -329,8 +331,8 @@ Vector variances(const ArrowSystem& factorised, int first, Eigen::MatrixXd& pose
   return all;
 }
 
-std::vector<Row> rows_of(const std::vector<EdgeEquation>& equations, bool directions) {
-  std::vector<Row> rows;
+std::vector<EquationRow> rows_of(const std::vector<EdgeEquation>& equations, bool directions) {
+  std::vector<EquationRow> rows;
   rows.reserve(equations.size());
   for (const EdgeEquation& e : equations) rows.emplace_back(e, directions);
   return rows;
@@ -345,7 +347,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(directions);
   const ArrowSystem prior = prior_information(prior_sd, directions);
-  const std::vector<Row> rows = rows_of(equations, directions);
+  const std::vector<EquationRow> rows = rows_of(equations, directions);
   Solving solving{equations, rows, prior, first, n, least_scale_px};
   if (!solving.run()) return false;
   double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0;
@@ -375,7 +377,7 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMoti
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(true);
   const ArrowSystem prior = prior_information(prior_sd, true);
-  const std::vector<Row> rows = rows_of(equations, true);
+  const std::vector<EquationRow> rows = rows_of(equations, true);
   const Sectors sectors = sectors_of(equations, rows, prior, solution.scale);
   ArrowSystem all = prior;
   for (const ArrowSystem& sector : sectors) all.add(sector, 1.0);

@@ -8,21 +8,23 @@
 #include <numbers>
 #include <vector>
 
+#include "geometry/bilinear.hpp"
 #include "geometry/outline_samples.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
-constexpr int kRings = 12, kSpokes = 256;
-constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kSpoke_rad = kTurn / kSpokes;
+constexpr int kFaceRings = 12, kFaceSpokes = 256;
+
+constexpr double kFaceSpoke_rad = data::kTurn / kFaceSpokes;
 
 // Cosine and sine of every spoke.
 struct Spokes {
-  std::array<float, kSpokes> cosine, sine;
+  std::array<float, kFaceSpokes> cosine, sine;
   Spokes() {
-    for (size_t i = 0; i < kSpokes; ++i) {
-      const double angle = kSpoke_rad * static_cast<double>(i);
+    for (size_t i = 0; i < kFaceSpokes; ++i) {
+      const double angle = kFaceSpoke_rad * static_cast<double>(i);
       cosine[i] = static_cast<float>(std::cos(angle));
       sine[i] = static_cast<float>(std::sin(angle));
     }
@@ -33,7 +35,7 @@ const Spokes& spokes() {
   return table;
 }
 
-using Face = Eigen::Matrix<float, kRings, kSpokes, Eigen::RowMajor>;
+using Face = Eigen::Matrix<float, kFaceRings, kFaceSpokes, Eigen::RowMajor>;
 
 // Marks of the face that is seen, and the band of radii they and their surroundings take.
 struct Band {
@@ -42,7 +44,7 @@ struct Band {
   double from_m = 0.0, to_m = 0.0;
 
   [[nodiscard]] double radius_m(int ring) const {
-    return from_m + (to_m - from_m) * (ring + 0.5) / kRings;
+    return from_m + (to_m - from_m) * (ring + 0.5) / kFaceRings;
   }
 };
 
@@ -62,16 +64,6 @@ Band band_of(const data::Body& body, bool upper) {
   return band;
 }
 
-float sample(const cv::Mat& image, const Eigen::Vector2d& p) {
-  const double x = std::clamp(p.x(), 0.0, image.cols - 1.001);
-  const double y = std::clamp(p.y(), 0.0, image.rows - 1.001);
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const auto fx = static_cast<float>(x - ix), fy = static_cast<float>(y - iy);
-  const std::uint8_t *above = image.ptr(iy) + ix, *below = image.ptr(iy + 1) + ix;
-  return (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) +
-         fy * ((1 - fx) * below[0] + fx * below[1]);
-}
-
 Face unroll(const cv::Mat& luma, const Band& band, const data::Body& body,
             const data::Camera& camera, const data::Pose<>& pose) {
   const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
@@ -79,13 +71,14 @@ Face unroll(const cv::Mat& luma, const Band& band, const data::Body& body,
       pose.centre_m + (band.upper ? 1.0 : -1.0) * body.half_thickness_m() * axis;
   const Eigen::Vector3d along = node_line(pose), across = axis.cross(along);
   Face face;
-  for (int i = 0; i < kSpokes; ++i) {
+  for (int i = 0; i < kFaceSpokes; ++i) {
     const auto k = static_cast<size_t>(i);
     const Eigen::Vector3d out = static_cast<double>(spokes().cosine[k]) * along +
                                 static_cast<double>(spokes().sine[k]) * across;
-    for (int ring = 0; ring < kRings; ++ring)
-      face(ring, i) =
-          sample(luma, camera.image_from_table<double>(centre + band.radius_m(ring) * out));
+    for (int ring = 0; ring < kFaceRings; ++ring) {
+      const Eigen::Vector2d p = camera.image_from_table<double>(centre + band.radius_m(ring) * out);
+      face(ring, i) = bilinear_inside<float>(luma, p.x(), p.y());
+    }
   }
   return face;
 }
@@ -95,9 +88,9 @@ Face coverage(const Band& band, double blur_m) {
   constexpr double kFar = 5.0;  // blurs from the mark there is none of it
   Face cover = Face::Zero();
   for (const data::SpinMark& mark : band.marks)
-    for (int i = 0; i < kSpokes; ++i) {
-      const double cosine = std::cos(kSpoke_rad * i - mark.angle_rad);
-      for (int ring = 0; ring < kRings; ++ring) {
+    for (int i = 0; i < kFaceSpokes; ++i) {
+      const double cosine = std::cos(kFaceSpoke_rad * i - mark.angle_rad);
+      for (int ring = 0; ring < kFaceRings; ++ring) {
         const double radius = band.radius_m(ring);
         const double apart2 = radius * radius + mark.distance_m * mark.distance_m -
                               2.0 * radius * mark.distance_m * cosine;
@@ -115,10 +108,10 @@ Face coverage(const Band& band, double blur_m) {
 void level(const Band& band, Face& face) {
   Eigen::Matrix2f normal = Eigen::Matrix2f::Zero();
   Eigen::Vector2f right = Eigen::Vector2f::Zero();
-  for (int ring = 0; ring < kRings; ++ring) {
+  for (int ring = 0; ring < kFaceRings; ++ring) {
     face.row(ring).array() -= face.row(ring).mean();
     const auto radius = static_cast<float>(band.radius_m(ring));
-    for (int i = 0; i < kSpokes; ++i) {
+    for (int i = 0; i < kFaceSpokes; ++i) {
       const auto k = static_cast<size_t>(i);
       const Eigen::Vector2f slope(radius * spokes().cosine[k], radius * spokes().sine[k]);
       normal += slope * slope.transpose();
@@ -126,9 +119,9 @@ void level(const Band& band, Face& face) {
     }
   }
   const Eigen::Vector2f slope = normal.inverse() * right;
-  for (int ring = 0; ring < kRings; ++ring) {
+  for (int ring = 0; ring < kFaceRings; ++ring) {
     const auto radius = static_cast<float>(band.radius_m(ring));
-    for (int i = 0; i < kSpokes; ++i) {
+    for (int i = 0; i < kFaceSpokes; ++i) {
       const auto k = static_cast<size_t>(i);
       face(ring, i) -= radius * (slope[0] * spokes().cosine[k] + slope[1] * spokes().sine[k]);
     }
@@ -137,18 +130,19 @@ void level(const Band& band, Face& face) {
 
 // Sample areas differ from ring to ring; so do their weights.
 void weigh(const Band& band, Face& face) {
-  for (int ring = 0; ring < kRings; ++ring)
+  for (int ring = 0; ring < kFaceRings; ++ring)
     face.row(ring) *= static_cast<float>(std::sqrt(band.radius_m(ring) / band.to_m));
 }
 
 std::vector<float> correlations(const Face& face, const Face& marks) {
-  std::vector<float> sums(kSpokes, 0.0F);
-  std::array<float, 2 * kSpokes> twice;  // a turn and the next: no index wraps
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (size_t i = 0; i < twice.size(); ++i) twice[i] = face(ring, static_cast<int>(i % kSpokes));
-    for (size_t i = 0; i < kSpokes; ++i) {
+  std::vector<float> sums(kFaceSpokes, 0.0F);
+  std::array<float, 2 * kFaceSpokes> twice;  // a turn and the next: no index wraps
+  for (int ring = 0; ring < kFaceRings; ++ring) {
+    for (size_t i = 0; i < twice.size(); ++i)
+      twice[i] = face(ring, static_cast<int>(i % kFaceSpokes));
+    for (size_t i = 0; i < kFaceSpokes; ++i) {
       const float m = marks(ring, static_cast<int>(i));
-      for (size_t s = 0; s < kSpokes; ++s) sums[s] += m * twice[i + s];
+      for (size_t s = 0; s < kFaceSpokes; ++s) sums[s] += m * twice[i + s];
     }
   }
   return sums;
@@ -156,11 +150,11 @@ std::vector<float> correlations(const Face& face, const Face& marks) {
 
 double turn_power(const Face& marks) {
   double power = 0.0;
-  for (int ring = 0; ring < kRings; ++ring)
-    for (int i = 0; i < kSpokes; ++i) {
+  for (int ring = 0; ring < kFaceRings; ++ring)
+    for (int i = 0; i < kFaceSpokes; ++i) {
       const double slope =
-          (marks(ring, (i + 1) % kSpokes) - marks(ring, (i + kSpokes - 1) % kSpokes)) /
-          (2.0 * kSpoke_rad);
+          (marks(ring, (i + 1) % kFaceSpokes) - marks(ring, (i + kFaceSpokes - 1) % kFaceSpokes)) /
+          (2.0 * kFaceSpoke_rad);
       power += slope * slope;
     }
   return power;
@@ -174,12 +168,12 @@ struct Peak {
 
 Peak find_peak(const std::vector<float>& sums, int flank) {
   Peak peak;
-  for (int s = 0; s < kSpokes; ++s)
+  for (int s = 0; s < kFaceSpokes; ++s)
     if (const float v = std::abs(sums[static_cast<size_t>(s)]); v > peak.height)
       peak.at = s, peak.height = v;
-  for (int s = 0; s < kSpokes; ++s) {
+  for (int s = 0; s < kFaceSpokes; ++s) {
     const int off = std::abs(s - peak.at);
-    if (std::min(off, kSpokes - off) > flank)
+    if (std::min(off, kFaceSpokes - off) > flank)
       peak.second = std::max(peak.second, std::abs(sums[static_cast<size_t>(s)]));
   }
   return peak;
@@ -190,15 +184,15 @@ Peak find_peak(const std::vector<float>& sums, int flank) {
 template <class Row>
 void smear(Row&& row, int half) {
   if (half == 0) return;
-  std::array<float, kSpokes> mean{};
-  const auto at = [&](int i) { return row[(i + kSpokes) % kSpokes]; };
+  std::array<float, kFaceSpokes> mean{};
+  const auto at = [&](int i) { return row[(i + kFaceSpokes) % kFaceSpokes]; };
   float sum = 0.0F;
   for (int i = -half; i <= half; ++i) sum += at(i);
-  for (int i = 0; i < kSpokes; ++i) {
+  for (int i = 0; i < kFaceSpokes; ++i) {
     mean[static_cast<size_t>(i)] = sum / static_cast<float>(2 * half + 1);
     sum += at(i + half + 1) - at(i - half);
   }
-  for (int i = 0; i < kSpokes; ++i) row[i] = mean[static_cast<size_t>(i)];
+  for (int i = 0; i < kFaceSpokes; ++i) row[i] = mean[static_cast<size_t>(i)];
 }
 
 // The marks as they look smeared, and how like them the face is at every angle: likeness to smeared
@@ -213,7 +207,7 @@ struct Match {
 
 Match match(const Face& marks, const std::vector<float>& sums, double all, int smeared, int flank) {
   Match found{marks, sums, smeared, {}, 0.0};
-  for (int ring = 0; ring < kRings; ++ring) smear(found.marks.row(ring), smeared);
+  for (int ring = 0; ring < kFaceRings; ++ring) smear(found.marks.row(ring), smeared);
   smear(found.sums.data(), smeared);
   found.peak = find_peak(found.sums, flank + 2 * smeared);
   found.likeness = found.peak.height / std::sqrt(std::max(found.marks.squaredNorm() * all, 1e-12));
@@ -224,7 +218,8 @@ Match match(const Face& marks, const std::vector<float>& sums, double all, int s
 // nothing unless that is clearly less like them.
 Match likeliest(const Face& marks, const std::vector<float>& sums, double all, int flank) {
   constexpr double kClearly = 1.2;
-  constexpr int kLeast = 3, kMost = kSpokes / 6;  // a third of a turn: beyond that a mark is a ring
+  constexpr int kLeast = 3,
+                kMost = kFaceSpokes / 6;  // a third of a turn: beyond that a mark is a ring
   Match best = match(marks, sums, all, 0, flank);
   for (int smeared = kLeast; smeared <= kMost; smeared += smeared / 3) {
     Match other = match(marks, sums, all, smeared, flank);
@@ -258,24 +253,26 @@ std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& bod
     widest = std::max(widest, mark.size_m / std::max(mark.distance_m, mark.size_m));
   const double all = face.squaredNorm();
   const Match best = likeliest(marks, correlations(face, marks), all,
-                               static_cast<int>(2.2 * widest / kSpoke_rad) + 2);
+                               static_cast<int>(2.2 * widest / kFaceSpoke_rad) + 2);
   const Peak& peak = best.peak;
   const double power = best.marks.squaredNorm();
   if (peak.height < kStandsOut * peak.second || best.likeness < kLeastLikeness) return std::nullopt;
   const auto value = [&](int s) {
-    return static_cast<double>(std::abs(best.sums[static_cast<size_t>((s + kSpokes) % kSpokes)]));
+    return static_cast<double>(
+        std::abs(best.sums[static_cast<size_t>((s + kFaceSpokes) % kFaceSpokes)]));
   };
   const double before = value(peak.at - 1), after = value(peak.at + 1);
   const double bend = before - 2.0 * peak.height + after;
   const double fine = bend < 0.0 ? 0.5 * (before - after) / bend : 0.0;
   MarkReading reading;
-  reading.psi_rad = kSpoke_rad * (peak.at + fine);
+  reading.psi_rad = kFaceSpoke_rad * (peak.at + fine);
   // What the marks do not explain, per sample; several samples share a pixel.
   const double contrast = peak.height / power;
-  const double unlike = std::max(all - contrast * contrast * power, 0.0) / (kRings * kSpokes);
-  const double area_px2 = std::numbers::pi * (band.to_m * band.to_m - band.from_m * band.from_m) *
+  const double unlike =
+      std::max(all - contrast * contrast * power, 0.0) / (kFaceRings * kFaceSpokes);
+  const double area_px2 = data::kPi * (band.to_m * band.to_m - band.from_m * band.from_m) *
                           px_per_m * px_per_m * std::abs(facing);
-  const double per_pixel = std::max(1.0, kRings * kSpokes / area_px2);
+  const double per_pixel = std::max(1.0, kFaceRings * kFaceSpokes / area_px2);
   reading.sigma_rad =
       std::sqrt((unlike + 0.1) * per_pixel / (contrast * contrast * turn_power(best.marks)));
   reading.radius_px = 0.5 * (band.from_m + band.to_m) * px_per_m;
