@@ -192,6 +192,7 @@ std::string sha256_of_stream(std::istream& in, const std::string& name) {
          (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || in.gcount() > 0))
     good =
         EVP_DigestUpdate(context.get(), chunk.data(), static_cast<std::size_t>(in.gcount())) == 1;
+  if (in.bad()) throw InputError(fmt::format("{}: reading failed", name));
   good = good && EVP_DigestFinal_ex(context.get(), digest.data(), &length) == 1;
   if (!good) throw InputError(fmt::format("{}: no SHA-256 could be computed", name));
   std::string hex;

@@ -92,7 +92,7 @@ void bootstrap_keys(Visit&& visit) {
 }
 
 template <class Visit>
-void fit_keys(Visit&& visit) {
+void fit_file_keys(Visit&& visit) {
   visit("model", &Fit::model);
   visit("converged", &Fit::converged);
   visit("outcome", &Fit::outcome);
@@ -158,7 +158,7 @@ void keys_of(const Bootstrap*, Visit&& visit) {
 }
 template <class Visit>
 void keys_of(const Fit*, Visit&& visit) {
-  fit_keys(visit);
+  fit_file_keys(visit);
 }
 
 template <class T>

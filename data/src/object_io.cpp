@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "body_rules.hpp"
 #include "json_read.hpp"
 #include "scene_keys.hpp"
 #include "trochoid/data/angle.hpp"
@@ -54,23 +55,24 @@ Body read_body(const JsonReader& json) {
   const std::string type = json.text("type");
   if (type != "disc" && type != "ring") json.fail("\"type\" must be disc or ring");
   body.kind = type == "ring" ? BodyKind::ring : BodyKind::disc;
-  body.radius_m = length_of(json, {"R_m", "R_outer_m"}, kPositive, 0.0);
+  body.radius_m = length_of(json, {"R_m", "R_outer_m"}, kSize, 0.0);
   if (body.radius_m == 0.0) json.fail("key \"R_m\" (or \"R_outer_m\") is missing");
-  body.inner_radius_m = length_of(json, {"R_inner_m"}, kNonNegative, 0.0);
-  if (body.inner_radius_m > body.radius_m)
-    json.fail(fmt::format("\"R_inner_m\" = {} must not exceed the outer radius {}",
-                          body.inner_radius_m, body.radius_m));
-  if (body.kind == BodyKind::ring && body.inner_radius_m == 0.0)
-    json.fail("a ring needs \"R_inner_m\"");
-  body.thickness_m = length_of(json, {"thickness_m", "height_m"}, kNonNegative, 0.0);
-  body.axle_radius_m = length_of(json, {"axle_radius_m"}, kNonNegative, 0.0);
-  body.axle_above_m = length_of(json, {"axle_above_upper_face_m"}, kNonNegative, 0.0);
+  body.inner_radius_m = length_of(json, {"R_inner_m"}, kSizeOrNone, 0.0);
+  body.thickness_m = length_of(json, {"thickness_m", "height_m"}, kSizeOrNone, 0.0);
+  body.axle_radius_m = length_of(json, {"axle_radius_m"}, kSizeOrNone, 0.0);
+  body.axle_above_m = length_of(json, {"axle_above_upper_face_m"}, kSizeOrNone, 0.0);
   if (json.has("mass_kg")) body.mass_kg = length(json, "mass_kg", kPositive);
   if (json.has("markers")) {
     if (!json.at("markers").is_array()) json.fail("\"markers\" must be a list");
     for (const nlohmann::json& marker : json.at("markers"))
       body.marks.push_back(read_marker(marker, json.where()));
   }
+  const BodyKeys keys{.radius = json.has("R_m") ? "\"R_m\"" : "\"R_outer_m\"",
+                      .inner_radius = "\"R_inner_m\"",
+                      .axle_radius = "\"axle_radius_m\"",
+                      .marks = "\"markers\"",
+                      .mark_distance = "\"r_m\""};
+  if (const auto fault = fault_of(body, keys)) json.fail(fault->words);
   return body;
 }
 

@@ -27,4 +27,11 @@ double median(std::vector<double> values) {
   return quantile(std::move(values), 0.5);
 }
 
+double usual_step_s(const std::vector<double>& t_s) {
+  if (t_s.size() < 2) return 0.0;
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < t_s.size(); ++i) steps_s.push_back(t_s[i] - t_s[i - 1]);
+  return median(std::move(steps_s));
+}
+
 }  // namespace trochoid::data

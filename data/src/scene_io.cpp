@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "body_rules.hpp"
 #include "scene_reader.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
@@ -52,20 +53,12 @@ void check_body(const TableReader& reader, const Body& body) {
   const bool shaped = body.kind != BodyKind::top;
   if (shaped && !reader.has("radius_m"))
     reader.fail("", "[body] needs radius_m, the outer radius of the rim");
-  if (body.kind == BodyKind::ring && !(body.inner_radius_m > 0.0))
-    reader.fail("inner_radius_m",
-                "a ring needs inner_radius_m > 0; a body without a bore is a disc");
-  if (shaped && body.inner_radius_m > body.radius_m)
-    reader.fail("inner_radius_m", fmt::format("inner_radius_m = {} must not exceed radius_m = {}",
-                                              body.inner_radius_m, body.radius_m));
-  if (shaped && body.axle_radius_m >= body.radius_m)
-    reader.fail("axle_radius_m",
-                fmt::format("axle_radius_m = {} must be smaller than radius_m = {}",
-                            body.axle_radius_m, body.radius_m));
-  for (const SpinMark& mark : body.marks)
-    if (shaped && mark.distance_m > body.radius_m)
-      reader.fail("mark", fmt::format("the mark's distance_m = {} lies outside radius_m = {}",
-                                      mark.distance_m, body.radius_m));
+  const BodyKeys keys{.radius = "radius_m",
+                      .inner_radius = "inner_radius_m",
+                      .axle_radius = "axle_radius_m",
+                      .marks = "mark",
+                      .mark_distance = "distance_m"};
+  if (const auto fault = fault_of(body, keys)) reader.fail(fault->key, fault->words);
 }
 
 Body read_body(const toml::table& table, const std::string& where) {

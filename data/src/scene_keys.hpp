@@ -29,7 +29,8 @@ constexpr Range kSize{0.0, 10.0, false, "in metres, greater than 0 and at most 1
 constexpr Range kSizeOrNone{0.0, 10.0, true, "in metres, 0 to 10"};
 constexpr Range kTilt{0.0, kPi, true, "between 0 (lying flat) and pi"};
 constexpr Range kTolerance{1e-15, 0.1, true, "between 1e-15 (finer is below rounding) and 0.1"};
-constexpr Range kObjects{1.0, 64.0, true, "a whole number in 1..64"};
+constexpr Range kObjects{1.0, TrackingSettings::kMostObjects, true, "a whole number in 1..64"};
+static_assert(TrackingSettings::kMostObjects == 64, "as kObjects words it");
 
 /// A word out of a list; the index in the list is the value of an enum.
 template <std::size_t N>

@@ -16,8 +16,8 @@ bool Table::has(const std::string& column) const {
 Eigen::VectorXd Table::column(const std::string& name) const {
   const auto found = std::find(columns.begin(), columns.end(), name);
   if (found == columns.end())
-    throw InputError(
-        fmt::format("table: there is no column {}; there are {}", name, join(columns, ",")));
+    throw InputError(fmt::format("{}: there is no column {}; there are {}",
+                                 file.empty() ? "table" : file, name, join(columns, ",")));
   return values.col(found - columns.begin());
 }
 

@@ -13,6 +13,7 @@ Table read_table(const std::filesystem::path& path) {
   const std::string text = read_text(path, std::size_t{1} << 30);
   CsvReader csv(text, path.string());
   Table table;
+  table.file = path.string();
   table.columns = csv.columns();
   std::vector<double> cells;
   while (csv.next())

@@ -29,6 +29,7 @@ std::string read_text(const std::filesystem::path& path, std::size_t limit_bytes
       throw InputError(fmt::format("{}: larger than {} MiB, not a file of this kind", path.string(),
                                    limit_bytes >> 20));
   }
+  if (file.bad()) throw InputError(fmt::format("{}: reading failed", path.string()));
   // Lines that end in a carriage return alone, as some spreadsheets still write them.
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
   return text;

@@ -44,15 +44,23 @@ Eigen::Vector3d moments_of(const data::Scene& scene) {
   return moments;
 }
 
+/// Angular velocity about the axis: given, or the Euler rates' dpsi + dphi cos(theta).
+double spin_of(const data::StartSettings& start, double theta) {
+  if (start.w3_rad_s) return *start.w3_rad_s;
+  if (start.omega_s_rad_s) return *start.omega_s_rad_s;
+  const double dpsi = start.dpsi_rad_s.value_or(0.0);
+  if (!start.w2_rad_s) return dpsi + start.dphi_rad_s.value_or(0.0) * std::cos(theta);
+  if (std::sin(theta) == 0.0)
+    throw InputError("start.w2_rad_s tells no dphi_rad_s at theta_rad = 0; give w3_rad_s");
+  return dpsi + *start.w2_rad_s / std::tan(theta);
+}
+
 /// Body rates from whatever the scene gives: body axes, node axes, or Euler rates (3).
 Eigen::Vector3d rates_of(const data::StartSettings& start, double theta, double psi) {
   if (start.w_body_rad_s) return *start.w_body_rad_s;
-  const double dphi = start.dphi_rad_s.value_or(0.0);
   const double w1 = start.w1_rad_s.value_or(start.dtheta_rad_s.value_or(0.0));
-  const double w2 = start.w2_rad_s.value_or(dphi * std::sin(theta));
-  const double spin = start.w3_rad_s.value_or(start.omega_s_rad_s.value_or(
-      start.dpsi_rad_s.value_or(0.0) +
-      (start.w2_rad_s ? *start.w2_rad_s / std::tan(theta) : dphi * std::cos(theta))));
+  const double w2 = start.w2_rad_s.value_or(start.dphi_rad_s.value_or(0.0) * std::sin(theta));
+  const double spin = spin_of(start, theta);
   return {w1 * std::cos(psi) + w2 * std::sin(psi), -w1 * std::sin(psi) + w2 * std::cos(psi), spin};
 }
 
@@ -144,21 +152,6 @@ void fill_row(const FreeSettings& free, double t_s, const Eigen::Ref<const Eigen
       integral[0], integral[1], integral[2];
 }
 
-/// Outputs plus the times between them at which the angles must be followed.
-std::vector<double> fine_times(const std::vector<double>& t_s, double w_rad_s, int& parts) {
-  constexpr double kLargestTurn = 0.5, kMostTimes = 2e7;
-  const double wanted =
-      t_s.size() > 1 ? std::ceil((t_s[1] - t_s[0]) * w_rad_s / kLargestTurn) : 1.0;
-  if (wanted * static_cast<double>(t_s.size()) > kMostTimes)
-    throw InputError("run.until_s is too long for this angular velocity; shorten the run");
-  parts = std::max(1, static_cast<int>(wanted));
-  std::vector<double> fine{t_s.front()};
-  for (std::size_t n = 1; n < t_s.size(); ++n)
-    for (int i = 1; i <= parts; ++i)
-      fine.push_back(i == parts ? t_s[n] : t_s[n - 1] + (t_s[n] - t_s[n - 1]) * i / parts);
-  return fine;
-}
-
 /// How far two runs are apart in attitude at every time both reached [rad].
 Eigen::VectorXd attitude_differences(const Solution& a, const Solution& b) {
   const Eigen::Index rows = std::min(a.states.rows(), b.states.rows());
@@ -177,7 +170,9 @@ Trajectory simulate_free(const data::Scene& scene) {
   // No component of w exceeds what all the energy in the smallest moment would give.
   const Eigen::Vector3d& I = free.moments_kg_m2;
   const double fastest = std::sqrt(I.dot(free.w_rad_s.cwiseAbs2()) / I.minCoeff());
-  const std::vector<double> fine = fine_times(t_s, fastest, parts);
+  constexpr double kLargestTurn_rad =
+      0.5;  // between two looks an angle is taken the short way round
+  const std::vector<double> fine = times_between(t_s, fastest, kLargestTurn_rad, parts);
   const Solution solution = run(free, fine, scene.run.tolerance, choice.method);
   Trajectory trajectory;
   trajectory.model = "free";

@@ -63,7 +63,7 @@ template <class System, class From>
 void place(const RimModel& model, const RimInput<From>& input, System& system) {
   using S = typename System::Scalar;
   system.body = model.body;
-  system.body.side = std::cos(value_of(input.theta)) < 0.0 ? -1.0 : 1.0;
+  system.body.side = touching_side(value_of(input.theta), value_of(input.w1));
   LossValues<S> losses{};
   for (int i = 0; i < kLosses; ++i) {
     if constexpr (std::is_same_v<S, From>)
@@ -81,7 +81,7 @@ void place(const RimModel& model, const RimInput<From>& input, System& system) {
 template <class S>
 [[nodiscard]] State<S, 10> rim_state(const RimBody& given, const RimInput<S>& in) {
   RimBody body = given;
-  body.side = std::cos(value_of(in.theta)) < 0.0 ? -1.0 : 1.0;
+  body.side = touching_side(value_of(in.theta), value_of(in.w1));
   const auto v = node_from_world(World<S>{in.vx, in.vy}, in.phi);
   const S un = v.along_n + body.R * in.w3 - body.signed_h() * in.w2;
   const S ut = v.along_mh + tilt(body, in.theta).z * in.w1;

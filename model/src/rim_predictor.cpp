@@ -275,7 +275,7 @@ void RimPredictor::fill_cyclic(const Call& call, Prediction& out) const {
   }
 }
 
-/// Enough for minutes of motion; a regularised law too stiff for the explicit method ends here.
+/// Enough for minutes of motion; run_sliding() may raise it to what stability needs.
 constexpr int kMostSteps = 300000;
 
 unsigned components_of(const PredictRequest& request) {

@@ -1,7 +1,10 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -92,6 +95,22 @@ template <class S>
   return r;
 }
 
+/// A start on or beyond an event's surface never crosses it.
+/// @returns what such a start is, nothing of a proper one.
+template <class System, class S, int N>
+[[nodiscard]] std::optional<Outcome> outside_at_start(const System& system, double t_s,
+                                                      const State<S, N>& y) {
+  State<S, System::kEvents> g;
+  system.events(t_s, y, g);
+  const auto outside = [&g](int event) { return !(value_of(g[event]) > 0.0); };
+  if (outside(System::flat)) return Outcome::flat;
+  if constexpr (requires { System::inconsistent; }) {
+    if (outside(System::inconsistent)) return Outcome::inconsistent_contact;
+  }
+  if (outside(System::lift_off)) return Outcome::lift_off;
+  return std::nullopt;
+}
+
 /// The floor bears any friction: no sliding phase is compiled.
 template <class S>
 struct NoSlip {
@@ -152,12 +171,8 @@ class RimRun {
  private:
   [[nodiscard]] bool exact() const { return slide_.stick_speed_m_s > 0.0; }
 
-  /// The rim that touches: by the tilt, and exactly on edge by the sense of falling.
   void place_on_rim() {
-    const double c = std::cos(value_of(end_.y[Rim::theta]));
-    const double w1 = value_of(end_.y[Rim::w1]);
-    constexpr double kOnEdge = 1e-15;
-    set_side(std::abs(c) < kOnEdge ? (w1 > 0.0 ? -1.0 : 1.0) : (c < 0.0 ? -1.0 : 1.0));
+    set_side(touching_side(value_of(end_.y[Rim::theta]), value_of(end_.y[Rim::w1])));
   }
   void set_side(double side) {
     roll_.body.side = side;
@@ -171,7 +186,7 @@ class RimRun {
     end_.outcome = outcome;
     going_on_ = false;
   }
-  void note(const char* name) { end_.events.push_back({end_.end_s, name}); }
+  void note(std::string_view name) { end_.events.push_back({end_.end_s, std::string(name)}); }
 
   /// Events that crowd together: contact chatters faster than anything the model describes.
   [[nodiscard]] bool chattering(double t_s) {
@@ -296,19 +311,13 @@ class RimRun {
         if constexpr (kCoulomb) settle(delay);
     }
   }
-  /// A start beyond an event's surface never crosses it: name it at once.
   template <class System, int N>
   bool starts_inside(const System& system, const State<S, N>& y) {
-    State<S, System::kEvents> g;
-    system.events(end_.end_s, y, g);
-    const auto outside = [&](int event) { return !(value_of(g[event]) > 0.0); };
-    if (outside(System::flat)) return note("flat"), finish(Outcome::flat), false;
-    if constexpr (requires { System::inconsistent; }) {
-      if (outside(System::inconsistent))
-        return note("inconsistent_contact"), finish(Outcome::inconsistent_contact), false;
-    }
-    if (outside(System::lift_off)) return note("lift_off"), finish(Outcome::lift_off), false;
-    return true;
+    const std::optional<Outcome> outside = outside_at_start(system, end_.end_s, y);
+    if (!outside) return true;
+    note(name(*outside));
+    finish(*outside);
+    return false;
   }
 
   /// Slip begins against the friction that rolling would need, so the force does not jump (S14).

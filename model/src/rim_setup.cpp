@@ -68,7 +68,7 @@ void fill_rates(const data::StartSettings& given, double typical_w2, RimStart& s
 
 void fill_velocity(const data::StartSettings& given, const RimBody& body, RimStart& start) {
   RimBody placed = body;
-  placed.side = std::cos(start.theta_rad) < 0.0 ? -1.0 : 1.0;
+  placed.side = touching_side(start.theta_rad, start.w1_rad_s);
   const double z = tilt(placed, start.theta_rad).z;
   const Horizontal<double> rolling{placed.signed_h() * start.w2_rad_s - body.R * start.w3_rad_s,
                                    -z * start.w1_rad_s};
@@ -135,34 +135,35 @@ RimStart rim_start_or_typical(const data::Scene& scene, const RimBody& body) {
 
 LossValues<double> loss_values(const data::ModelSettings& model) {
   LossValues<double> v;
-  const auto vector = [](const std::optional<Eigen::Vector3d>& c, double& first, double& third,
-                         double& ratio) {
+  const auto vector = [](const std::optional<Eigen::Vector3d>& c, const char* key, double& first,
+                         double& third, double& ratio) {
     const Eigen::Vector3d value = c.value_or(Eigen::Vector3d::Zero());
     first = value[0];
     third = value[2];
     if (!(value[1] >= 0.0) || !std::isfinite(value[1]) || (value[0] == 0.0 && value[1] != 0.0))
-      throw InputError(
-          fmt::format("air couples: of the two transverse coefficients the first is {}, the second "
-                      "{}; an axisymmetric body has them equal, 0 or greater",
-                      value[0], value[1]));
+      throw InputError(fmt::format(
+          "model.{}: the second transverse coefficient is {}, the first {}; both must be 0 or "
+          "greater, and the second 0 where the first is",
+          key, value[1], value[0]));
     if (value[0] > 0.0) ratio = value[1] / value[0];
   };
-  double* out = v.value;
-  vector(model.air_linear_N_m_s, out[0], out[1], v.air_ratio);
-  vector(model.air_quadratic_N_m_s2, out[2], out[3], v.quadratic_ratio);
-  out[4] = model.air_force_N_s_m.value_or(0.0);
-  out[5] = model.gap_viscosity_Pa_s.value_or(0.0);
-  out[6] = model.rolling_friction_m.value_or(0.0);
-  out[7] = model.pivoting_friction_m.value_or(0.0);
-  out[8] = model.contour_friction_m.value_or(0.0);
+  const auto of = [&v](Loss loss) -> double& { return v.value[static_cast<int>(loss)]; };
+  vector(model.air_linear_N_m_s, "air_linear_N_m_s", of(Loss::air1), of(Loss::air3), v.air_ratio);
+  vector(model.air_quadratic_N_m_s2, "air_quadratic_N_m_s2", of(Loss::quadratic1),
+         of(Loss::quadratic3), v.quadratic_ratio);
+  of(Loss::force) = model.air_force_N_s_m.value_or(0.0);
+  of(Loss::gap) = model.gap_viscosity_Pa_s.value_or(0.0);
+  of(Loss::rolling) = model.rolling_friction_m.value_or(0.0);
+  of(Loss::pivoting) = model.pivoting_friction_m.value_or(0.0);
+  of(Loss::contour) = model.contour_friction_m.value_or(0.0);
   v.eps_w = model.couple_regularisation_rad_s.value_or(v.eps_w);
   if (!(v.eps_w > 0.0) || !std::isfinite(v.eps_w))  // the couples would be 0/0 where a rate is zero
     throw InputError(
         fmt::format("model.couple_regularisation_rad_s = {} must be greater than 0", v.eps_w));
   for (int i = 0; i < kLosses; ++i)
-    if (!(out[i] >= 0.0) || !std::isfinite(out[i]))
+    if (!(v.value[i] >= 0.0) || !std::isfinite(v.value[i]))
       throw InputError(fmt::format("model.{} = {} must be 0 or greater: a loss takes energy",
-                                   kLossNames[i], out[i]));
+                                   kLossNames[i], v.value[i]));
   return v;
 }
 

@@ -121,6 +121,7 @@ template <class System, class DualSystem>
   constexpr int n = System::kStates;
   Ode ode = make_ode(duals);
   ode.events = System::kEvents;
+  ode.events_fall = true;
   ode.event_functions = [system](double t, const double* y, double* g) {
     State<double, n> state;
     State<double, System::kEvents> value;
@@ -138,10 +139,11 @@ void note_end(const SundialsRun& run, RimRunEnd<S>& end) {
   end.end_s = run.end_s;
   end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
                     static_cast<int>(run.evaluations)};
-  constexpr Outcome kOutcomes[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
-                                   Outcome::inconsistent_contact};
+  // In the order of the systems' events; none that slips, or bears so much friction, runs here.
+  constexpr Outcome kEnds[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
+                               Outcome::inconsistent_contact};
   if (run.event < 0 || run.event >= 4) return;
-  end.outcome = kOutcomes[run.event];
+  end.outcome = kEnds[run.event];
   end.events.push_back({run.end_s, std::string(name(end.outcome))});
 }
 
@@ -152,8 +154,14 @@ RimRecord run_sundials(const RimJob& job, const System& system, const DualSystem
   constexpr int n = System::kStates;
   RimRecord record;
   const State<double, 10> start = rim_state(job.model.body, job.input);
-  Eigen::VectorXd y0(n);
-  for (int i = 0; i < n; ++i) y0[i] = start[i];
+  State<double, n> y;
+  for (int i = 0; i < n; ++i) y[i] = start[i];
+  if (const auto outside = outside_at_start(system, 0.0, y)) {
+    record.end.outcome = *outside;
+    record.end.events.push_back({0.0, std::string(name(*outside))});
+    return record;
+  }
+  const Eigen::VectorXd y0 = Eigen::Map<const Eigen::VectorXd>(y.v, n);
   StepControl<n> control = rim_control<n>(job.model.body, job.options(tolerance, 1.0));
   if constexpr (n == 10) resolve_stick(job.input.eps_v, control);
   SundialsOptions options = sundials_options(job.method, control.rtol, control.atol, n);
@@ -161,7 +169,6 @@ RimRecord run_sundials(const RimJob& job, const System& system, const DualSystem
   if (job.method == Method::arkode && job.input.eps_v > 0.0)
     options.method = SundialsMethod::arkode_dirk;
   const SundialsRun run = integrate_sundials(rim_ode(system, duals), 0.0, y0, job.t_s, options);
-  State<double, n> y;
   for (Eigen::Index row = 0; row < run.states.rows(); ++row) {
     for (int i = 0; i < n; ++i) y[i] = run.states(row, i);
     record.rows.push_back(row_of(job.columns, system, job.t_s[static_cast<std::size_t>(row)], y));

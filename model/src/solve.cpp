@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace trochoid::model {
 
@@ -40,6 +41,25 @@ SundialsOptions sundials_options(Method method, double rtol, const double* atol,
   options.interpolate = method == Method::cvode_adams;
   options.atol = Eigen::Map<const Eigen::VectorXd>(atol, states).cwiseMax(1e-300);
   return options;
+}
+
+std::vector<double> times_between(const std::vector<double>& t_s, double rate_rad_s,
+                                  double largest_turn_rad, int& parts) {
+  constexpr double kMostTimes = 2e7;
+  const double apart_s = t_s.size() > 1 ? t_s[1] - t_s[0] : 0.0;
+  const double wanted = std::ceil(apart_s * rate_rad_s / largest_turn_rad);
+  if (wanted * static_cast<double>(t_s.size()) > kMostTimes)
+    throw InputError(fmt::format(
+        "run.until_s = {} s is too long to follow the angles of a body that turns at {:.3g} rad/s; "
+        "shorten it",
+        t_s.back(), rate_rad_s));
+  parts = std::max(1, static_cast<int>(wanted));
+  std::vector<double> fine{t_s.front()};
+  for (std::size_t n = 1; n < t_s.size(); ++n) {
+    for (int i = 1; i < parts; ++i) fine.push_back(t_s[n - 1] + (t_s[n] - t_s[n - 1]) * i / parts);
+    fine.push_back(t_s[n]);
+  }
+  return fine;
 }
 
 Solution from_sundials(SundialsRun run) {

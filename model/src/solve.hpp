@@ -32,6 +32,12 @@ struct Choice {
 /// @throws InputError for an unknown name.
 [[nodiscard]] Choice choose_integrator(const std::string& asked);
 
+/// @returns the outputs with so many times between each two that what turns at `rate_rad_s` turns
+/// by `largest_turn_rad` at most from one to the next, and can be followed; `parts` per interval.
+/// @throws InputError if these are too many.
+[[nodiscard]] std::vector<double> times_between(const std::vector<double>& t_s, double rate_rad_s,
+                                                double largest_turn_rad, int& parts);
+
 [[nodiscard]] Solution from_sundials(SundialsRun run);
 [[nodiscard]] SundialsOptions sundials_options(Method method, double rtol, const double* atol,
                                                int states);

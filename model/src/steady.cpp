@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "rim_setup.hpp"
 #include "trochoid/data/error.hpp"
@@ -190,14 +192,21 @@ double steady_rolling_spin(const RimBody& body, double theta_rad, double precess
 std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
                                                double along_m_s) {
   const auto [s, c, z, slope] = tilt(body, theta_rad);
-  // (1) with h W s - R w3 = v: two W^2 + one W + zero = 0.
-  const double two = body.A * s * c - body.C * s * s * body.h / body.R;
-  const double one = (body.C * s / body.R + body.m * body.R * s + body.m * body.h * c) * along_m_s;
-  const double zero = -body.m * body.g * slope;
-  const double discriminant = one * one - 4.0 * two * zero;
-  if (discriminant < 0.0 || std::abs(two) < 1e-300) return {};
-  const double root = std::sqrt(discriminant);
-  return {(-one + root) / (2.0 * two), (-one - root) / (2.0 * two)};
+  // (1) with h W s - R w3 = v: a2 W^2 + a1 W + a0 = 0.
+  const double a2 = body.A * s * c - body.C * s * s * body.h / body.R;
+  const double a1 = (body.C * s / body.R + body.m * body.R * s + body.m * body.h * c) * along_m_s;
+  const double a0 = -body.m * body.g * slope;
+  const double discriminant = a1 * a1 - 4.0 * a2 * a0;
+  if (discriminant < 0.0) return {};
+  // The sum of equal signs first, the other root from the product: no cancellation. Where a2
+  // vanishes only one is left.
+  const double sum = -0.5 * (a1 + std::copysign(std::sqrt(discriminant), a1));
+  std::array<double, 2> roots{sum / a2, a0 / sum};
+  if (a1 >= 0.0) std::swap(roots[0], roots[1]);  // that of + the square root first
+  std::vector<double> precessions;
+  for (const double root : roots)
+    if (std::isfinite(root)) precessions.push_back(root);
+  return precessions;
 }
 
 SteadyMotion steady_rolling(const data::Body& body, double gravity_m_s2, double theta_rad,

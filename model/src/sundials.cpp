@@ -46,7 +46,7 @@ Vector make_vector(const Eigen::VectorXd& values, SUNContext context) {
   return v;
 }
 
-// --- callbacks: SUNDIALS is C, so nothing throws through it --------------------------------------
+// --- callbacks: SUNDIALS is C, so what is thrown in one ends the program -------------------------
 
 constexpr int kRecoverable = 1;  // "try a shorter step"
 
@@ -56,26 +56,26 @@ bool all_finite(const double* values, int count) {
   return true;
 }
 
-int call_derivative(double t, N_Vector y, N_Vector dy, void* user) {
+int call_derivative(double t, N_Vector y, N_Vector dy, void* user) noexcept {
   const Ode& ode = *static_cast<const Ode*>(user);
   ode.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(dy));
   return all_finite(N_VGetArrayPointer(dy), ode.states) ? 0 : kRecoverable;
 }
 
 int call_jacobian(double t, N_Vector y, N_Vector, SUNMatrix jacobian, void* user, N_Vector,
-                  N_Vector, N_Vector) {
+                  N_Vector, N_Vector) noexcept {
   const Ode& ode = *static_cast<const Ode*>(user);
   ode.jacobian(t, N_VGetArrayPointer(y), SUNDenseMatrix_Data(jacobian));
   return all_finite(SUNDenseMatrix_Data(jacobian), ode.states * ode.states) ? 0 : kRecoverable;
 }
 
-int call_events(double t, N_Vector y, double* g, void* user) {
+int call_events(double t, N_Vector y, double* g, void* user) noexcept {
   static_cast<const Ode*>(user)->event_functions(t, N_VGetArrayPointer(y), g);
   return 0;
 }
 
 int call_sensitivities(int parameters, double t, N_Vector y, N_Vector, N_Vector* s, N_Vector* ds,
-                       void* user, N_Vector, N_Vector) {
+                       void* user, N_Vector, N_Vector) noexcept {
   const Ode& ode = *static_cast<const Ode*>(user);
   Eigen::MatrixXd from(ode.states, parameters), rate(ode.states, parameters);
   for (int p = 0; p < parameters; ++p)
@@ -125,6 +125,10 @@ std::string named(char* name) {
   return words;
 }
 
+std::vector<int> falling(int events) {
+  return std::vector<int>(static_cast<std::size_t>(events), -1);
+}
+
 class Cvode : public Stepper {
  public:
   Cvode(const Ode& ode, double start_s, const Vector& y, const Vector& atol,
@@ -141,8 +145,10 @@ class Cvode : public Stepper {
       use_newton(ode, y, context);
     else
       use_fixed_point(y, context);
-    if (ode.events > 0)
+    if (ode.events > 0) {
       require(CVodeRootInit(memory_.get(), ode.events, call_events), "CVodeRootInit");
+      if (ode.events_fall) CVodeSetRootDirection(memory_.get(), falling(ode.events).data());
+    }
     if (ode.sensitivities.start.cols() > 0) carry_sensitivities(ode, atol, options, context);
   }
 
@@ -223,8 +229,10 @@ class Erk : public Stepper {
     require(ERKStepSetTableNum(memory_.get(), ARKODE_FEHLBERG_13_7_8), "ERKStepSetTableNum");
     ERKStepSetUserData(memory_.get(), const_cast<Ode*>(&ode));  // NOLINT: as above
     ERKStepSetMaxNumSteps(memory_.get(), options.max_steps);
-    if (ode.events > 0)
+    if (ode.events > 0) {
       require(ERKStepRootInit(memory_.get(), ode.events, call_events), "ERKStepRootInit");
+      if (ode.events_fall) ERKStepSetRootDirection(memory_.get(), falling(ode.events).data());
+    }
   }
 
   // Stepping exactly to each output keeps order 8; interpolating would be of order 5 at most.
@@ -263,8 +271,10 @@ class Dirk : public Stepper {
     require(ARKStepSetLinearSolver(memory_.get(), linear_.get(), matrix_.get()),
             "ARKStepSetLinearSolver");
     if (ode.jacobian) require(ARKStepSetJacFn(memory_.get(), call_jacobian), "ARKStepSetJacFn");
-    if (ode.events > 0)
+    if (ode.events > 0) {
       require(ARKStepRootInit(memory_.get(), ode.events, call_events), "ARKStepRootInit");
+      if (ode.events_fall) ARKStepSetRootDirection(memory_.get(), falling(ode.events).data());
+    }
   }
 
   int advance(double t_limit_s, N_Vector y, double& t_s) override {

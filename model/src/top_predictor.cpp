@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 
+#include "decay.hpp"
 #include "factories.hpp"
 #include "top_dispatch.hpp"
 #include "top_scene.hpp"
@@ -112,19 +113,6 @@ int lane_of(Parameter parameter) {
   }
 }
 
-/// Integral of exp(-g s) over [0, t] and its derivative by g: the turns left under linear drag.
-struct Decay {
-  double integral, by_gamma;
-};
-Decay decay(double gamma, double t) {
-  const double x = gamma * t;
-  if (x < 1e-4) {  // series: the closed form cancels; next term x^3/24, below 1e-13
-    return {t * (1.0 - x / 2.0 + x * x / 6.0), t * t * (-0.5 + x / 3.0 - x * x / 8.0)};
-  }
-  const double e = std::exp(-x);
-  return {(1.0 - e) / gamma, (t * e * gamma - (1.0 - e)) / (gamma * gamma)};
-}
-
 class TopPredictor : public Predictor {
  public:
   using Kernel = void (*)(const TopRun&, TopResult&);
@@ -192,7 +180,7 @@ struct TopPredictor::Work {
     return counts_turns() ? share(value(kTopTurns, n)) : decayed(n).integral;
   }
   [[nodiscard]] double turn_s_by(Parameter by, int n) const {
-    if (!counts_turns()) return by == kGamma3 ? decayed(n).by_gamma : 0.0;
+    if (!counts_turns()) return by == kGamma3 ? decayed(n).by_rate : 0.0;
     return lane_of(by) < 0 ? 0.0 : share_by(by, lane(kTopTurns, n, lane_of(by)), turn_s(n));
   }
   /// A top without spin turns by nothing however that would slow it.
@@ -397,7 +385,7 @@ void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
       column[5] += work.omega_s * work.share_by(by, result.end_derivative[6][lane], turn_s);
       column[6] = work.omega_s * work.share_by(by, result.end_derivative[4][lane], left);
     } else if (by == kGamma3) {
-      column[5] += work.omega_s * linear.by_gamma;
+      column[5] += work.omega_s * linear.by_rate;
       column[6] = -work.omega_s * left * ran_s;
     }
   }

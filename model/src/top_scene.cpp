@@ -47,12 +47,11 @@ bool knows_moments(const data::Body& body) {
   return body.mass_kg.has_value();
 }
 
-double omega_s(const data::StartSettings& start, double theta_rad, double fallback) {
+double omega_s(const data::StartSettings& start, double theta_rad, double dphi_rad_s,
+               double fallback) {
   if (start.omega_s_rad_s) return *start.omega_s_rad_s;
   if (start.w3_rad_s) return *start.w3_rad_s;
-  if (start.dpsi_rad_s) {
-    return *start.dpsi_rad_s + start.dphi_rad_s.value_or(0.0) * std::cos(theta_rad);
-  }
+  if (start.dpsi_rad_s) return *start.dpsi_rad_s + dphi_rad_s * std::cos(theta_rad);
   return fallback;
 }
 
@@ -66,7 +65,7 @@ void read_start(const data::StartSettings& start, TopSettings& top) {
     if (s == 0.0) throw InputError("start.w2_rad_s says nothing at theta_rad = 0; give dphi_rad_s");
     top.dphi_rad_s = *start.w2_rad_s / s;
   }
-  top.omega_s_rad_s = omega_s(start, top.theta_rad, 1.0);
+  top.omega_s_rad_s = omega_s(start, top.theta_rad, top.dphi_rad_s, 1.0);
 }
 
 void read_body(const data::Scene& scene, TopSettings& top) {
@@ -89,16 +88,31 @@ void read_body(const data::Scene& scene, TopSettings& top) {
 void check(const TopSettings& top) {
   if (!(top.theta_rad >= 0.0) || top.theta_rad > M_PI)
     throw InputError(fmt::format("start.theta_rad = {} must lie between 0 and pi", top.theta_rad));
-  for (const double value : {top.a_1_s2, top.b_1_s, top.phi_rad, top.psi_rad, top.dtheta_rad_s,
-                             top.dphi_rad_s, top.omega_s_rad_s}) {
-    if (!std::isfinite(value))
-      throw InputError("the top's scene holds a number that is not finite");
-  }
-  if (top.gamma1_1_s < 0.0 || top.gamma3_1_s < 0.0 || top.dry_1_s2 < 0.0 || top.quadratic < 0.0)
-    throw InputError("model.drag_transverse_N_m_s and drag_spin_* must not be negative");
+  const std::pair<const char*, double> numbers[] = {
+      {"weight times l over I", top.a_1_s2},
+      {"Is omega_s over I", top.b_1_s},
+      {"start.phi_rad", top.phi_rad},
+      {"start.psi_rad", top.psi_rad},
+      {"start.dtheta_rad_s", top.dtheta_rad_s},
+      {"start.dphi_rad_s", top.dphi_rad_s},
+      {"the spin start.omega_s_rad_s", top.omega_s_rad_s}};
+  for (const auto& [what, value] : numbers)
+    if (!std::isfinite(value)) throw InputError(fmt::format("{} = {} must be finite", what, value));
+}
+
+void check_drag(const data::ModelSettings& model) {
+  const std::pair<const char*, std::optional<double>> drags[] = {
+      {"drag_transverse_N_m_s", model.drag_transverse_N_m_s},
+      {"drag_spin_N_m_s", model.drag_spin_N_m_s},
+      {"drag_spin_dry_N_m", model.drag_spin_dry_N_m},
+      {"drag_spin_quadratic_N_m_s2", model.drag_spin_quadratic_N_m_s2}};
+  for (const auto& [key, drag] : drags)
+    if (drag && !(*drag >= 0.0 && std::isfinite(*drag)))
+      throw InputError(fmt::format("model.{} = {} must be 0 or greater", key, *drag));
 }
 
 TopSettings common(const data::Scene& scene) {
+  check_drag(scene.model);
   TopSettings top;
   top.transverse_drag = scene.model.drag_transverse_N_m_s.has_value();
   top.spin_drag = scene.model.drag_spin_N_m_s.has_value();

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "decay.hpp"
 #include "factories.hpp"
 #include "solve.hpp"
 #include "top_dispatch.hpp"
@@ -65,24 +66,6 @@ TopColumns run_kernel(Kernel kernel, const TopSettings& top, const std::vector<d
   return columns;
 }
 
-/// Times between the outputs at which the azimuth is looked at, so that it can be followed.
-std::vector<double> refined(const std::vector<double>& t_s, double rate_rad_s, int& parts) {
-  constexpr double kLargestTurn = 0.25;
-  constexpr double kMostTimes = 2e7;
-  const double apart = t_s.size() > 1 ? t_s[1] - t_s[0] : 1.0;
-  const double wanted = std::ceil(apart * rate_rad_s / kLargestTurn);
-  if (wanted * static_cast<double>(t_s.size()) > kMostTimes)
-    throw InputError(
-        "run.until_s is too long for this spin with SUNDIALS; use integrator = \"auto\"");
-  parts = std::max(1, static_cast<int>(wanted));
-  std::vector<double> fine{t_s.front()};
-  for (std::size_t n = 1; n < t_s.size(); ++n) {
-    for (int i = 1; i < parts; ++i) fine.push_back(t_s[n - 1] + (t_s[n] - t_s[n - 1]) * i / parts);
-    fine.push_back(t_s[n]);
-  }
-  return fine;
-}
-
 template <class S>
 WithSpinAngle<TopWithDrag<S>> system_of(const TopSettings& top) {
   WithSpinAngle<TopWithDrag<S>> system;
@@ -114,7 +97,9 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   const double rate = std::abs(top.b_1_s) + 2.0 * std::sqrt(std::abs(top.a_1_s2)) +
                       std::abs(top.dphi_rad_s) + std::abs(top.dtheta_rad_s);
   int parts = 1;
-  const std::vector<double> fine = refined(t_s, rate, parts);
+  // The azimuth is followed from one look to the next; near the vertical it turns fastest.
+  constexpr double kLargestTurn_rad = 0.25;
+  const std::vector<double> fine = times_between(t_s, rate, kLargestTurn_rad, parts);
   StepControl<8> control = uniform_control<8>(tolerance);
   for (int i = 0; i < 3; ++i) control.atol[i] *= rate;
   State<double, 7> base;
@@ -170,15 +155,13 @@ Eigen::VectorXd axis_differences(const TopColumns& a, const TopColumns& b) {
 struct Spin {
   double rate_rad_s, turned_rad;
 };
-Spin spin_of(const TopSettings& top, const TopColumns& run, int n) {
+Spin spin_at(const TopSettings& top, const TopColumns& run, int n) {
   const double t_s = run.t_s[n], omega_s = top.omega_s_rad_s;
   if ((top.dry_drag || top.quadratic_drag) && top.b_1_s != 0.0) {
     const double per_b = omega_s / top.b_1_s;
     return {per_b * run.column[kTopAngleColumns + 3][n], per_b * run.column[kTopTurns][n]};
   }
-  const double x = top.gamma3_1_s * t_s;
-  const double turn_s = x < 1e-9 ? t_s * (1.0 - 0.5 * x) : -std::expm1(-x) / top.gamma3_1_s;
-  return {omega_s * std::exp(-x), omega_s * turn_s};
+  return {omega_s * std::exp(-top.gamma3_1_s * t_s), omega_s * decay(top.gamma3_1_s, t_s).integral};
 }
 
 /// One row: angles, rates and energy from axis and momentum, (8) and (11).
@@ -198,7 +181,7 @@ void fill_row(const TopSettings& top, const TopColumns& run, int n, double pivot
     angles.dphi_rad_s = 0.0;
     angles.dtheta_rad_s = std::sqrt(speed2);
   }
-  const Spin spin = spin_of(top, run, n);
+  const Spin spin = spin_at(top, run, n);
   const double psi = top.psi_rad + c[4][n] + spin.turned_rad;
   const double energy = 0.5 * top.I_kg_m2 * speed2 +
                         0.5 * top.Is_kg_m2 * spin.rate_rad_s * spin.rate_rad_s +

@@ -33,6 +33,17 @@ TEST(WriteText, LeavesAWriteProtectedFileAlone) {
   EXPECT_EQ(content(path), "old");
 }
 
+// A file on a share that goes away, or a bad block: the first page of the own memory cannot be read
+// either.
+TEST(ReadText, DoesNotTakeWhatCannotBeReadForTheEnd) {
+  const char* const unreadable = "/proc/self/mem";
+  if (!std::ifstream(unreadable)) GTEST_SKIP() << "no file opens that cannot be read";
+  EXPECT_NE(refusal([&] { (void)read_text(unreadable); }).find("reading failed"),
+            std::string::npos);
+  EXPECT_NE(refusal([&] { (void)sha256_of_file(unreadable); }).find("reading failed"),
+            std::string::npos);
+}
+
 TEST(WriteText, WritesIntoADeviceInsteadOfReplacingIt) {
   write_text("gone", "/dev/null");
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));

@@ -54,5 +54,26 @@ TEST(ObjectFile, WithBrokenEntriesIsRefusedByKey) {
             std::string::npos);
 }
 
+TEST(ObjectFile, IsHeldToTheRulesOfTheScene) {
+  const TestFolder folder;
+  const auto message = [&](const std::string& text) {
+    const auto path = folder.write("object.json", text);
+    return refusal([&] { static_cast<void>(read_object(path)); });
+  };
+  EXPECT_NE(message(R"({"type": "disc", "R_m": 45})").find("at most 10"), std::string::npos);
+  EXPECT_NE(message(R"({"type": "disc", "R_m": 0.03, "thickness_m": 12})").find("0 to 10"),
+            std::string::npos);
+  EXPECT_NE(message(R"({"type": "disc", "R_m": 0.03, "axle_radius_m": 0.04})")
+                .find(R"("axle_radius_m" = 0.04 must be smaller than "R_m" = 0.03)"),
+            std::string::npos);
+  EXPECT_NE(message(R"({"type": "ring", "R_outer_m": 0.03, "R_inner_m": 0.04})")
+                .find(R"("R_inner_m" = 0.04 must not exceed "R_outer_m" = 0.03)"),
+            std::string::npos);
+  EXPECT_NE(
+      message(R"({"type": "disc", "R_m": 0.03, "markers": [{"r_m": 0.05, "radius_m": 0.004}]})")
+          .find(R"(the mark's "r_m" = 0.05 lies outside "R_m" = 0.03)"),
+      std::string::npos);
+}
+
 }  // namespace
 }  // namespace trochoid::data

@@ -24,5 +24,14 @@ TEST(Quantile, OfNothingIsNotANumber) {
   EXPECT_TRUE(std::isnan(upper_median({})));
 }
 
+TEST(UsualStep, IsTheMedianOfTheTimesBetweenWhateverHasThem) {
+  struct Seen {
+    double t_s;
+  };
+  EXPECT_DOUBLE_EQ(usual_step_s({0.0, 0.5, 1.0, 4.0}), 0.5);
+  EXPECT_DOUBLE_EQ(usual_step_s(std::vector<Seen>{{0.0}, {0.5}, {1.0}, {4.0}}, &Seen::t_s), 0.5);
+  EXPECT_EQ(usual_step_s({3.0}), 0.0);
+}
+
 }  // namespace
 }  // namespace trochoid::data

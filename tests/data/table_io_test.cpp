@@ -50,5 +50,13 @@ TEST(TableFile, RefusesValuesThatDoNotFitTheColumnNames) {
   EXPECT_EQ(folder.entries(), 0);
 }
 
+TEST(TableFile, IsNamedWhenAColumnIsAskedForThatItLacks) {
+  const TestFolder folder;
+  const Table table = read_table(folder.write("labels.csv", "frame,x_px\n0,1\n"));
+  EXPECT_NE(
+      refusal([&] { (void)table.column("y_px"); }).find("labels.csv: there is no column y_px"),
+      std::string::npos);
+}
+
 }  // namespace
 }  // namespace trochoid::data

@@ -1,5 +1,4 @@
 #include "trochoid/fitting/compare.hpp"
-#include "common.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"

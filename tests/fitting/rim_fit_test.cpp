@@ -679,6 +679,7 @@ TEST(RimFit, LeavesMirroredFramesAside) {
 struct Fallen {
   data::Scene scene;  ///< that of the truth
   data::Track track;
+  std::vector<double> psi_rad;  ///< spin of each sample
 };
 
 Fallen fallen_disc(double theta_rad, double w2_rad_s, double w3_rad_s, double rolling_friction_m,
@@ -700,7 +701,8 @@ Fallen fallen_disc(double theta_rad, double w2_rad_s, double w3_rad_s, double ro
   model::PredictRequest request;
   request.t_s = t_s;
   request.observables = {model::Observable::x_m, model::Observable::y_m,
-                         model::Observable::theta_rad, model::Observable::phi_rad};
+                         model::Observable::theta_rad, model::Observable::phi_rad,
+                         model::Observable::psi_rad};
   request.lies_where_it_fell = true;
   const model::Prediction run = predictor->predict(values_with(*predictor, {}), request);
   EXPECT_EQ(run.outcome, model::Outcome::flat);
@@ -708,7 +710,7 @@ Fallen fallen_disc(double theta_rad, double w2_rad_s, double w3_rad_s, double ro
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    const Eigen::Vector4d seen = run.values.segment<4>(4 * static_cast<Eigen::Index>(i));
+    const Eigen::VectorXd seen = run.values.segment<5>(5 * static_cast<Eigen::Index>(i));
     data::TrackSample sample;
     sample.t_s = t_s[i];
     sample.centre_m = seen.head<2>() + 1e-4 * Eigen::Vector2d(normal(generator), normal(generator));
@@ -717,6 +719,7 @@ Fallen fallen_disc(double theta_rad, double w2_rad_s, double w3_rad_s, double ro
     if (t_s[i] < run.valid_until_s)
       sample.phi = data::MeasuredAngle{seen[3] + 0.03 * normal(generator), 0.03};
     made.track.samples.push_back(sample);
+    made.psi_rad.push_back(seen[4]);
   }
   return made;
 }
@@ -734,6 +737,21 @@ TEST(FlatEnd, IsPartOfTheTrack) {
   EXPECT_EQ(fit.verdict, data::FitVerdict::good);
   EXPECT_LT(pull(fit, "rolling_friction_m", 1e-3), kFar);
   EXPECT_LT(pull(fit, "theta_rad", 0.6), kFar);
+}
+
+// Its mark stays where it came to rest.
+TEST(FlatEnd, IsPartOfTheTrackOfABodyWithAMark) {
+  Fallen made = fallen_disc(0.6, 18.0, 1.5, 1e-3, 5.0, 9);
+  std::mt19937_64 generator(10);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < made.psi_rad.size(); ++i)
+    made.track.samples[i].psi =
+        data::MeasuredAngle{made.psi_rad[i] + 0.03 * normal(generator), 0.03};
+  const data::Fit fit = fit_fallen(made);
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_LT(pull(fit, "rolling_friction_m", 1e-3), kFar);
+  EXPECT_LT(pull(fit, "w3_rad_s", 1.5), kFar);
+  EXPECT_NE(fit.find("psi_rad"), nullptr);
 }
 
 // A tilt that nods its way down touches the floor in one dip or in the next: the path jumps, and

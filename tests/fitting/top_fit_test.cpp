@@ -47,6 +47,7 @@ data::Track track_of(const Planted& planted) {
   data::Scene scene = top_scene(planted.pivot_m);
   scene.model.drag_transverse_N_m_s = planted.drag.drag_transverse_N_m_s;
   scene.model.drag_spin_N_m_s = planted.drag.drag_spin_N_m_s;
+  scene.model.drag_spin_dry_N_m = planted.drag.drag_spin_dry_N_m;
   const auto predictor = model::make_predictor(scene);
   Eigen::VectorXd values(predictor->parameters().size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
@@ -387,6 +388,53 @@ DyingTop dying_top() {
     top.track.samples.push_back(sample);
   }
   return top;
+}
+
+// Whoever has measured the spin by other means gets the ratio of the moments from b.
+TEST(TopFit, TakesTheSpinFromAPriorToTellTheMoments) {
+  data::Scene scene = top_scene();
+  scene.fit.prior["omega_s_rad_s"] = {3.0, 0.03};
+  const data::Fit result = fit_one(track_of({}), scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  const data::FitParameter* ratio = result.find("I_over_Is");
+  ASSERT_NE(ratio, nullptr);
+  EXPECT_LT(pull(result, "I_over_Is", 3.0 / 0.75), kFar);
+  // The spin's own percent and that of b, which are independent.
+  const data::FitParameter* b = result.find("b_1_s");
+  EXPECT_NEAR(ratio->sigma / ratio->value, std::hypot(0.01, b->sigma / b->value), 1e-4);
+}
+
+TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
+  data::Scene scene = top_scene();
+  for (const auto& [name, value] : kThesis) scene.fit.fixed[name] = value;
+  try {
+    (void)fit_one(track_of({}), scene);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("leave at least one"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(TopFit, FindsADragThatTheSceneNamesWithNothing) {
+  Planted planted;
+  planted.values["b_1_s"] = 5.0;
+  planted.values["a_1_s2"] = 3.0;
+  planted.values["gamma3_dry_1_s2"] = 0.2;
+  planted.drag.drag_spin_dry_N_m = 1e-6;
+  planted.sigma_m = 3e-4;
+  const data::Track track = track_of(planted);
+  data::Scene scene = top_scene();
+  data::Body& body = scene.body.emplace();
+  body.kind = data::BodyKind::top;
+  body.mass_kg = 0.1;
+  body.I_kg_m2 = 1e-4;
+  body.Is_kg_m2 = 2e-5;
+  scene.model.drag_spin_dry_N_m = 0.0;
+  const data::Fit result = fit_one(track, scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "gamma3_dry_1_s2", 0.2), kFar);
+  EXPECT_GT(result.find("gamma3_dry_1_s2")->value, 0.1);
 }
 
 TEST(TopFit, FollowsASpinThatDies) {

@@ -118,6 +118,35 @@ TEST(RimSimulation, AgreesBetweenItsIntegrators) {
   }
 }
 
+// A start that touches with a face already never crosses that surface again.
+TEST(RimSimulation, OfABodyThatLiesFlatEndsAtOnceWithAnyIntegrator) {
+  data::Scene scene = reference_scene("s05_smooth_disc");
+  scene.start.theta_rad = 0.005;
+  for (const char* integrator : {"dop853", "cvode-bdf", "cvode-adams", "arkode"}) {
+    scene.run.integrator = integrator;
+    const Trajectory run = simulate(scene);
+    EXPECT_EQ(run.outcome, Outcome::flat) << integrator;
+    EXPECT_EQ(run.end_s, 0.0) << integrator;
+  }
+}
+
+// Which rim touches decides how the contact moves; exactly on edge that is the one it falls on.
+TEST(RimSimulation, OfABodyOnEdgeBeginsWithTheVelocityItIsGiven) {
+  data::Scene scene = reference_scene("s08_slide_disc");
+  scene.start = {};
+  scene.start.theta_rad = M_PI / 2.0;
+  scene.start.w2_rad_s = 20.0;
+  scene.start.vx_m_s = 0.1;
+  scene.start.vy_m_s = 0.0;
+  scene.run.until_s = 0.01;
+  for (const double falls_rad_s : {0.5, -0.5}) {
+    scene.start.w1_rad_s = falls_rad_s;
+    const Trajectory run = simulate(scene);
+    EXPECT_NEAR(column(run, "vx_m_s")[0], 0.1, 1e-12) << falls_rad_s;
+    EXPECT_NEAR(column(run, "vy_m_s")[0], 0.0, 1e-12) << falls_rad_s;
+  }
+}
+
 // Implicit steps damp what grows slowly, a top that falls asleep as well: they are for what is
 // stiff.
 TEST(RimSimulation, TakesImplicitStepsWhereFrictionIsStiffAndRefusesThemElsewhere) {

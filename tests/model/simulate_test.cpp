@@ -1,10 +1,11 @@
 #include "trochoid/model/simulate.hpp"
-#include "common.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
+#include "common.hpp"
 #include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -98,6 +99,40 @@ TEST(Simulate, TheThesisFormGivesTheSameMotion) {
   constexpr double kPath_m = 1e-10, kSpin_rad = 1e-8;
   EXPECT_LT(largest_difference(run, "x_m", expected, "x"), kPath_m);
   EXPECT_LT(largest_difference(run, "psi_rad", expected, "psi"), kSpin_rad);
+}
+
+TEST(Simulate, BeginsATopWithTheSpinItIsGivenBesideARateOfTheNodeFrame) {
+  data::Scene scene = reference("s03_top_thesis_base").posed.scene;
+  scene.start = {};
+  scene.start.theta_rad = 1.0;
+  scene.start.w2_rad_s = 2.0;
+  scene.start.dpsi_rad_s = 30.0;
+  scene.run.until_s = 0.1;
+  const Trajectory run = simulate(scene);
+  EXPECT_NEAR(column(run, "dpsi_rad_s")[0], 30.0, 1e-10);
+  EXPECT_NEAR(column(run, "dphi_rad_s")[0], 2.0 / std::sin(1.0), 1e-10);
+}
+
+TEST(Simulate, NamesTheFieldThatIsOutOfRange) {
+  const auto refusal = [](const data::Scene& scene) -> std::string {
+    try {
+      (void)simulate(scene);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  data::Scene top = reference("s11_top_drag").posed.scene;
+  top.model.drag_spin_N_m_s = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal(top).find("model.drag_spin_N_m_s = nan"), std::string::npos) << refusal(top);
+  data::Scene free = reference("s01_free_thesis").posed.scene;
+  free.start.w_body_rad_s.reset();
+  free.start.theta_rad = 0.0;
+  free.start.w2_rad_s = 1.0;
+  EXPECT_NE(refusal(free).find("give w3_rad_s"), std::string::npos) << refusal(free);
+  data::Scene disc = reference("s06_roll_disc").posed.scene;
+  disc.model.air_linear_N_m_s = Eigen::Vector3d(0.0, 1e-6, 0.0);
+  EXPECT_NE(refusal(disc).find("model.air_linear_N_m_s"), std::string::npos) << refusal(disc);
 }
 
 TEST(Simulate, NamesWhatTheSceneLacks) {

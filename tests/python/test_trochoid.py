@@ -59,8 +59,9 @@ class Simulate(unittest.TestCase):
             trochoid.Scene({"body": {"radius_m = 1\n#": 1}})
 
     def test_a_scene_survives_the_trip_through_its_text(self):
-        scene = trochoid.Scene(TOP)
-        self.assertEqual(trochoid.Scene.from_toml(scene.toml).toml, scene.toml)
+        for tables in (TOP, {"camera": {"file": "a \"b\"\\\t\r\n\x7f ü.json"}}):
+            scene = trochoid.Scene(tables)
+            self.assertEqual(trochoid.Scene.from_toml(scene.toml).toml, scene.toml)
 
 
 class Errors(unittest.TestCase):
@@ -254,6 +255,24 @@ class Fit(unittest.TestCase):
             with self.assertRaisesRegex(trochoid.InputError, "was not fitted to .*other.csv"):
                 trochoid.predict(fit, other)
 
+    def test_tracks_of_one_name_are_kept_apart_and_none_counts_twice(self):
+        with tempfile.TemporaryDirectory() as folder:
+            paths = [pathlib.Path(folder) / name / "top.track.csv" for name in ("a", "b")]
+            for number, path in enumerate(paths):
+                path.parent.mkdir()
+                trochoid.TrackFile([noisy_track(seed=number)], source="top.mp4",
+                                   source_sha256=64 * str(number)).write(path)
+            fit = trochoid.fit(paths, model="top")
+            self.assertEqual(set(fit.inputs), {"top.track.csv", str(paths[1]), "top.mp4",
+                                               f"source of {paths[1]}"})
+            for number, path in enumerate(paths):
+                self.assertEqual(len(trochoid.predict(fit, path, fit_track=number)), 1)
+            with self.assertRaisesRegex(trochoid.InputError, "is the same track as top.track.csv"):
+                trochoid.fit([paths[0], paths[0]], model="top")
+        track = noisy_track()
+        with self.assertRaisesRegex(trochoid.InputError, "is given twice"):
+            trochoid.fit([track, trochoid.TrackFile([track])], model="top")
+
     def test_samples_without_a_position_are_gaps_and_counted(self):
         track, seen = noisy_track(), noisy_track()
         track.centre_m[:3] = track.centre_m[100:110] = np.nan
@@ -355,7 +374,7 @@ class Recording(unittest.TestCase):
                                   effort="quick", smooth=smooth)
             header = [line for line in smooth.read_text().splitlines() if not line.startswith("#")][0]
             self.assertIn("vx_m_s", header.split(","))
-            self.assertEqual(file.summary["interpolated"], 0)
+            self.assertEqual((file.summary["interpolated"], file.summary["left_out"]), (0, 0))
             before = (SAMPLE / "video.mp4").read_bytes()
             with self.assertRaises(trochoid.InputError):
                 trochoid.track(SAMPLE / "video.mp4", to="f5", smooth=SAMPLE / "video.mp4")
@@ -365,6 +384,10 @@ class Recording(unittest.TestCase):
             with self.assertRaisesRegex(trochoid.InputError, "name another output"):
                 trochoid.overlay(copy, file, scene=SAMPLE / "scene.toml", output=copy)
             self.assertEqual(copy.read_bytes(), before)
+            still = pathlib.Path(folder) / "still.png"
+            with self.assertRaisesRegex(trochoid.InputError, "name it .mp4"):
+                trochoid.overlay(copy, file, output=pathlib.Path(folder) / "overlay.avi", still=still)
+            self.assertFalse(still.exists())
             file.source_sha256 = 64 * "0"
             with self.assertRaisesRegex(trochoid.InputError, "track: was tracked in another recording"):
                 trochoid.overlay(copy, file, still=pathlib.Path(folder) / "other.png")

@@ -28,6 +28,13 @@ TEST(ChildProcess, AProgramThatCannotBeStartedHasAReason) {
   EXPECT_THAT(run.error_output, HasSubstr("cannot be started: Too many open files"));
 }
 
+TEST(ChildProcess, TheLastLineIsTheLastThatSaysAnything) {
+  EXPECT_EQ(last_line("first\nsecond \n\n"), "second");
+  EXPECT_EQ(last_line("10 %\rbroken"), "broken");
+  EXPECT_EQ(last_line("alone"), "alone");
+  EXPECT_EQ(last_line(" \n"), "");
+}
+
 TEST(ChildProcess, AProgramThatRunsIsFoundWhereverItIs) {
   const ChildRun run = run_child({own_path(), "--gtest_list_tests"});
   EXPECT_TRUE(run.started);

@@ -22,6 +22,11 @@ TEST(MadeTracks, FollowTheThesisCaseForAMinute) {
   EXPECT_NEAR(made.track.samples.back().centre_m.y() / 0.1, 0.2342951380256336, kAllowed);
 }
 
+TEST(MadeTracks, AllOfASeedCounts) {
+  EXPECT_NE(generator_of(1, 0)(), generator_of((std::uint64_t{1} << 32U) + 1, 0)());
+  EXPECT_NE(generator_of(1, 0)(), generator_of(1, 1)());
+}
+
 TEST(MadeTracks, BeginWhereTheirTruthSays) {
   for (const char* model : {"top", "thesis", "rolling", "puck"}) {
     std::mt19937_64 generator(1);

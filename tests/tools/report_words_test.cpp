@@ -12,6 +12,7 @@ TEST(ValueWords, ShowTheErrorToItsSecondDigitHoweverSmall) {
   // A path without noise, of a simulation.
   EXPECT_EQ(value_words(0.098, 8.9e-14), "0.098 ± 8.9e-14");
   EXPECT_EQ(value_words(3.0, 1e-16), "3 ± 1.0e-16");
+  EXPECT_EQ(value_words(9.80665, 0.0), "9.80665");
 }
 
 }  // namespace

@@ -141,6 +141,20 @@ TEST(Calibration, PlacesTheFloorByACircle) {
   EXPECT_LT((up - truth.camera_from_table.col(2)).norm(), 1e-6);
 }
 
+TEST(Calibration, RefusesPointsThroughWhichNoCircleGoes) {
+  constexpr int kPoints = 24;
+  const auto zigzag = [](double half_px) {
+    std::vector<Eigen::Vector2d> rim;
+    for (int i = 0; i < kPoints; ++i)
+      rim.emplace_back(180.0 + 4.0 * i, 150.0 + (i % 2 == 0 ? half_px : -half_px));
+    return rim;
+  };
+  data::Camera camera = lens();
+  EXPECT_THROW((void)set_floor_from_circle(camera, zigzag(0.0), 0.04, 0.0), InputError);
+  EXPECT_THROW((void)set_floor_from_circle(camera, zigzag(0.5), 0.04, 0.0), NumericalError);
+  EXPECT_EQ(camera.camera_from_table, lens().camera_from_table) << "the camera has been moved";
+}
+
 TEST(Calibration, ReadsACharucoBoardAlsoWhenPartOfItIsHidden) {
   const auto board = cv::aruco::CharucoBoard::create(
       7, 5, 0.02F, 0.015F, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50));

@@ -137,7 +137,6 @@ TEST(ColourEdges, ADiscThatTurnsUnderTheOpenShutterIsMeasuredByWhatItCovers) {
          .background = no_plate,
          .detection = {},
          .predicted = disc.at(centre + off, theta_rad + 0.02, 0.02),
-         .attitude_known = true,
          .previous = disc.at(centre + off, theta_rad + 0.02, 0.02 - kTurned_rad / kFraction),
          .exposure_fraction = kFraction,
          .chroma = chroma});
@@ -271,7 +270,6 @@ TEST(OutlineFitter, TellsHowFarColoursLieOffLuma) {
                                       .background = no_plate,
                                       .detection = {},
                                       .predicted = disc.at(centre, kTheta),
-                                      .attitude_known = true,
                                       .chroma = chroma,
                                       .chroma_site_px = {site_px, 0.0}});
     ASSERT_TRUE(seen);

@@ -819,7 +819,6 @@ struct FaintWall {
          .background = plate,
          .detection = {},
          .predicted = thick.leaning(centre + Eigen::Vector2d(off_px, 0.0), kTheta),
-         .attitude_known = true,
          .there = there});
   }
 };
@@ -924,7 +923,6 @@ TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {
                                       .background = plate,
                                       .detection = {},
                                       .predicted = predicted,
-                                      .attitude_known = true,
                                       .chroma = chroma});
     return seen ? seen->evidence : 0.0;
   };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fmt/core.h>
+#include <algorithm>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
@@ -23,6 +24,29 @@ TEST(Recording, LooksAheadAsFarAsItCan) {
   ASSERT_TRUE(recording.advance(0));
   ASSERT_LT(recording.window().back().index, 45);
   EXPECT_GE(recording.samples().luma.size(), Background::kSamples);
+}
+
+TEST(Recording, LeavesOutWhatLiesOutsideOfThePartAskedForWhenToldSo) {
+  constexpr int kPictures = 100, kLast = 45;
+  const ScratchFolder folder("part");
+  for (int i = 0; i < kPictures; ++i)
+    cv::imwrite(folder / fmt::format("{:02}.png", i), cv::Mat(48, 64, CV_8U, cv::Scalar(i)));
+  constexpr std::size_t kFewest = 1;  // bytes: more pictures than one window follow
+  Recording recording(folder / "", {.frame_rate_hz = 100.0, .to = fmt::format("f{}", kLast)},
+                      kFewest);
+  ASSERT_TRUE(recording.advance(0));
+  const auto latest = [&] {
+    double level = 0.0;
+    for (const cv::Mat& luma : recording.samples().luma) level = std::max(level, cv::mean(luma)[0]);
+    return level;
+  };
+  EXPECT_GT(latest(), kLast) << "a camera on a stand sees the same floor later";
+  EXPECT_TRUE(recording.leave_out_the_rest());
+  EXPECT_LE(latest(), kLast);
+  EXPECT_GE(recording.samples().luma.size(), Background::kSamples);
+  EXPECT_FALSE(recording.leave_out_the_rest()) << "it is left out";
+  ASSERT_TRUE(recording.advance(0));
+  EXPECT_LE(latest(), kLast);
 }
 
 }  // namespace

@@ -32,7 +32,6 @@ TEST(FitRim, ErrorsAreSmallAndAsLargeAsTheySay) {
                              {.reach_px = 5.0, .noise_levels = 3.0});
     ASSERT_TRUE(fit) << trial;
     EXPECT_GT(fit->accepted, 0.9);
-    EXPECT_LT(fit->contrast, -80.0) << "darker than the floor";
     const Eigen::Vector2d error = fit->ellipse.centre_px - centre;
     squares += error.squaredNorm() / 2.0;
     normalised += error.dot(fit->covariance_px2.inverse() * error) / 2.0;

@@ -54,6 +54,17 @@ TEST(Smooth, FindsTheNoiseItIsNotTold) {
   EXPECT_NEAR(found[200].sigma / told[200].sigma, 1.0, 0.3);
 }
 
+TEST(Smooth, ErrorsSaidToBeNoneAreNotBelieved) {
+  Noisy noisy([](int) { return false; });
+  noisy.sigma.assign(noisy.sigma.size(), 0.0);
+  const auto believed = smooth(noisy.t_s, noisy.value, noisy.sigma);
+  noisy.sigma.assign(noisy.sigma.size(), std::nan(""));
+  const auto found = smooth(noisy.t_s, noisy.value, noisy.sigma);
+  EXPECT_EQ(believed[200].value, found[200].value);
+  EXPECT_EQ(believed[200].sigma, found[200].sigma);
+  EXPECT_GT(found[200].sigma, 0.0);
+}
+
 TEST(Smooth, BridgesAGapWithASigmaThatGrows) {
   const Noisy noisy([](int i) { return i >= 200 && i < 212; });
   const auto smoothed = smooth(noisy.t_s, noisy.value, noisy.sigma);

@@ -73,5 +73,26 @@ TEST(TrackAssembly, WhatAllFramesMayBeOffByDoesNotHideHowFarTheyScatter) {
   EXPECT_NEAR((mean_m2 - 0.5 * kOff_m * kOff_m) / (kClaimed_m * kClaimed_m), 4.0, kTolerance * 4.0);
 }
 
+// What is thrown up before a camera that looks along the floor passes the horizon.
+TEST(TrackAssembly, MetresStayUnknownWhereNoFloorIsSeen) {
+  constexpr int kWidth = 200, kHeight = 100;
+  MetreRule rule{data::Camera::overhead(kWidth, kHeight, 100.0, 1.0)};
+  Eigen::Matrix3d& camera_from_table = rule.camera->camera_from_table;
+  camera_from_table << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0;
+  rule.camera->camera_from_table_m = {0.0, 1.0, 0.0};
+  BodyPath path;
+  for (const double y_px : {20.0, 80.0}) {
+    BodyPath::At& at = path.frames[static_cast<std::int64_t>(y_px)];
+    at.t_s = 0.01 * y_px;
+    at.seen.centre_px = {0.5 * kWidth, y_px};
+    at.seen.covariance_px2 = Eigen::Matrix2d::Identity();
+  }
+  const data::Track track = assemble_track(path, 0, rule, {});
+  ASSERT_EQ(track.samples.size(), 2u);
+  EXPECT_FALSE(track.samples[0].has_metres() || track.samples[0].has_covariance());
+  EXPECT_TRUE(track.samples[1].has_metres() && track.samples[1].has_covariance());
+  EXPECT_NO_THROW(data::check(track, "track"));
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -198,6 +198,36 @@ TEST(TrackVideo, ARollingShutterGivesEverySampleTheTimeOfItsRow) {
   }
 }
 
+TEST(TrackVideo, AReadoutLongerThanAPictureIsRefusedBeforeTheFirst) {
+  const ScratchFolder folder("readout");
+  write_clip(folder / "clip.mkv", drawn_floor(200, 120, 150.0), 20, 2.0, draw_mover);
+  data::Scene scene;
+  scene.camera.readout_s = 8.0;  // milliseconds
+  TrackOptions options;
+  options.progress = [](std::int64_t, std::int64_t) { ADD_FAILURE() << "it has begun"; };
+  try {
+    (void)track_video(folder / "clip.mkv", scene, std::nullopt, options);
+    FAIL() << "it is accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(),
+                testing::HasSubstr("camera.readout_s = 8 is longer than the 0.01 s from picture to "
+                                   "picture; is it in seconds?"));
+  }
+}
+
+TEST(TrackVideo, HandsOutTheEdgesOfEveryFrameToWhoeverAsks) {
+  const ScratchFolder folder("edges");
+  write_clip(folder / "clip.mkv", drawn_floor(200, 120, 150.0), 40, 2.0, draw_mover);
+  TrackOptions options;
+  EXPECT_FALSE(track_video(folder / "clip.mkv", {}, std::nullopt, options).edges);
+  options.edges = true;
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt, options);
+  ASSERT_TRUE(result.edges);
+  const Eigen::VectorXd frame = result.edges->column("frame");
+  for (const data::TrackSample& sample : result.file.tracks.at(0).samples)
+    EXPECT_TRUE((frame.array() == static_cast<double>(sample.frame)).any()) << sample.frame;
+}
+
 TEST(TrackVideo, KeepsToTheFramesAskedForAndCountsTheRest) {
   const ScratchFolder folder("window");
   write_clip(folder / "clip.mkv", drawn_floor(200, 120, 150.0), 60, 2.0, draw_mover);

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <string>
 #include <system_error>
 
@@ -135,6 +136,9 @@ int main(int argc, char** argv) try {
 } catch (const std::system_error& error) {
   if (error.code() == std::errc::broken_pipe) trochoid::tools::end_by(SIGPIPE);
   complain(error.what());
+  return kError;
+} catch (const std::bad_alloc&) {
+  complain("out of memory");
   return kError;
 } catch (const std::exception& error) {
   complain(error.what());

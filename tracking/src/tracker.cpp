@@ -49,6 +49,7 @@ class Tracking {
         camera_(resolve_camera(scene, camera, recording_.info(), video)) {
     if (camera_ && scene.camera.transfer) camera_->transfer = *scene.camera.transfer;
     if (objects_ < 1) throw InputError("the number of objects must be at least 1");
+    check_readout();
     choose_finder();
   }
 
@@ -72,6 +73,18 @@ class Tracking {
     source.from = options.from.empty() ? scene.tracking.from : options.from;
     source.to = options.to.empty() ? scene.tracking.to : options.to;
     return source;
+  }
+
+  /// Rows read for longer than a picture lasts would put the times of a track out of order, which
+  /// shows only when it is done.
+  void check_readout() const {
+    constexpr double kRoom = 1.01;  // the rate is an average
+    const double rate_hz = recording_.info().frame_rate_hz, readout_s = scene_.camera.readout_s;
+    if (rate_hz > 0.0 && readout_s * rate_hz > kRoom)
+      throw InputError(
+          fmt::format("{}: camera.readout_s = {:g} is longer than the {:.4g} s from picture to "
+                      "picture; is it in seconds?",
+                      video_.string(), readout_s, 1.0 / rate_hz));
   }
 
   void choose_finder() {
@@ -149,6 +162,9 @@ class Tracking {
     const bool more = recording_.advance(kOverlap, [this](const Frame& frame) { see(frame); });
     if (!more || !bodies_missing()) return more;
     background_ = Background::from_samples(recording_.samples());
+    // Who asks for a part of a recording may do so because the camera moves in the rest.
+    if (background_.camera_moves() && recording_.leave_out_the_rest())
+      background_ = Background::from_samples(recording_.samples());
     camera_moved_ = camera_moved_ || background_.camera_moves();
     explained_.assign(recording_.window().size(), {});
     for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
@@ -178,7 +194,9 @@ class Tracking {
   /// Finds one more body in the window and follows it both ways. False if there is none.
   bool follow_next_body() {
     if (paths_.empty() && scene_.tracking.at_px) {
-      add(follow_from(seed_pointed_at()));
+      Followed found = follow_from(seed_pointed_at());
+      if (found.path.frames.empty()) no_rim_at_the_point();
+      add(std::move(found));
       return true;
     }
     constexpr int kAttempts = 4;
@@ -186,6 +204,11 @@ class Tracking {
       const auto seed = find_seed(recording_.window(), background_, *finder_, explained_);
       if (!seed) return paths_.empty() && follow_one_in_plate();
       Followed found = follow_from(*seed);
+      if (found.path.frames.empty()) {  // all frames together deny what one of them showed
+        explained_[seed->held_index].emplace_back(seed->seen.centre_px,
+                                                  seed->seen.rim.semi_major_px());
+        continue;
+      }
       if (attempt == 0) prefer_one_that_turns(found);
       follow_off_the_plate(found);
       explain(found.path);
@@ -216,6 +239,7 @@ class Tracking {
 
   /// What looks most like a body but hardly moves may be part of the scene, and the body one that
   /// turns in place: it explains more of what changes.
+  /// @param found in one frame at least, and so it stays.
   void prefer_one_that_turns(Followed& found) {
     constexpr double kHardly_radii = 0.5;
     if (found.path.frames.begin()->second.seen.pose || travel_in_radii(found.path) > kHardly_radii)
@@ -233,6 +257,7 @@ class Tracking {
 
   /// A body that keeps to its place is in the plate itself, and is lost in frames in which it looks
   /// as it does there. With the floor continued below it, it may be seen in more of them.
+  /// @param found in one frame at least, and so it stays.
   void follow_off_the_plate(Followed& found) {
     constexpr double kInPlace_radii = 0.5, kMostSeen = 0.9;
     const auto seen_in = [](const Followed& followed) {
@@ -304,13 +329,18 @@ class Tracking {
     else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
       seed = seed_in_plate(seed);
     if (!seed) tell_other_size(by_rim, "is at the point", "");
-    if (!seed)
-      throw InputError(fmt::format("{}: no rim found around the point at {:g},{:g} px",
-                                   video_.string(), at_px.x(), at_px.y()));
+    if (!seed) no_rim_at_the_point();
     return *seed;
   }
 
+  [[noreturn]] void no_rim_at_the_point() const {
+    throw InputError(fmt::format("{}: no rim found around the point at {:g},{:g} px",
+                                 video_.string(), scene_.tracking.at_px->x(),
+                                 scene_.tracking.at_px->y()));
+  }
+
   /// Follows a body through the window, ahead and back at once.
+  /// @return without any frame where these deny together what each of them showed.
   [[nodiscard]] Followed follow_from(Seed seed) const {
     BodyPath path;
     if (!paths_.empty()) path.chroma_site_px = paths_.front().chroma_site_px;
@@ -467,7 +497,7 @@ class Tracking {
       result.file.notes.push_back(std::move(note));
     result.file.camera = words;
     result.summary.camera_words = words;
-    if (options_.edges) data::write_table(edge_table(paths_), *options_.edges);
+    if (options_.edges) result.edges = edge_table(paths_);
     return result;
   }
 

@@ -116,7 +116,7 @@ bool climb_down(const Contest& contest, Rungs& rungs) {
 }
 
 // On a floor without friction, where the ladder has one. @returns whether that explains the track.
-bool glide(const Contest& contest, const Rung& best, Rungs& rungs) {
+bool try_smooth_floor(const Contest& contest, const Rung& best, Rungs& rungs) {
   const std::optional<int> none = smooth_term(contest.ladder);
   if (!none) return false;
   const Rung* smooth = &add_searched(contest, {*none}, rungs);
@@ -178,7 +178,7 @@ Rungs climb(const Contest& contest) {
   if (explains(best)) {
     // What stood in for another loss while that was missing may not be needed beside it.
     step_down(contest, best, rungs);
-  } else if (!glide(contest, best, rungs) && !by_last_resort(contest, best, rungs)) {
+  } else if (!try_smooth_floor(contest, best, rungs) && !by_last_resort(contest, best, rungs)) {
     by_all_that_usually_acts(contest, best, rungs);
   }
   return rungs;

@@ -246,7 +246,6 @@ ScoreTest score_test(std::span<const data::Track> tracks, const data::Scene& sce
         to_there.wider[problem.name(i)] = by.wider[i];
     return to_there;
   };
-  test.with = change({});
   for (const auto& [key, names] : others) test.instead[key] = change(named(problem, names));
   return test;
 }

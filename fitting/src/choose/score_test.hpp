@@ -29,7 +29,6 @@ struct ScoreTest {
     std::map<std::string, double> sigmas = {};
   };
   double before = 0.0;            ///< chi-square without the further losses
-  Change with;                    ///< with all of them
   std::map<int, Change> instead;  ///< with them and without some losses, by their key
   int rows = 0;                   ///< measurements
 };

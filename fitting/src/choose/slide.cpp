@@ -60,7 +60,7 @@ Rung longest_rolling(const Contest& contest, Rung known) {
 
 // What seems to roll first and to slide later may creep all the time, where friction sets in
 // softly: searched from the beginning, with all that usually acts.
-void creep(const Contest& contest, Rungs& rungs) {
+void try_gentle_friction(const Contest& contest, Rungs& rungs) {
   const Terms terms = all_that_usually_acts(contest.ladder, {});
   if (terms.empty()) return;
   Rungs searched;
@@ -90,7 +90,7 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
     if (explains(added))
       step_down(contest, added, rungs);
     else
-      creep(contest, rungs);
+      try_gentle_friction(contest, rungs);
     return true;
   }
   return false;

@@ -42,9 +42,8 @@ void keep_own(data::Scene& scene) {
 }  // namespace
 
 bool names_one_of(const std::set<std::string>& parameters, const std::string& name) {
-  return std::any_of(parameters.begin(), parameters.end(), [&](const std::string& parameter) {
-    return parameter == name || parameter.starts_with(name + "[");
-  });
+  return std::any_of(parameters.begin(), parameters.end(),
+                     [&](const std::string& parameter) { return means(name, parameter); });
 }
 
 Rung rung_with(const Ladder& ladder, const Terms& terms) {

@@ -1,6 +1,7 @@
 #include "judge/adequacy.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -306,12 +307,6 @@ int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u) {
   return -1;
 }
 
-std::string listed(const std::vector<std::string>& names) {
-  std::string all;
-  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
-  return all;
-}
-
 std::vector<std::string> undetermined(const data::Fit& fit) {
   std::vector<std::string> names;
   for (const data::FitParameter& parameter : fit.parameters)
@@ -372,7 +367,7 @@ void accept(const Problem& problem, const Solution& solution, const Uncertainty&
                 : !open.empty() ? FitVerdict::weak
                 : correlated    ? FitVerdict::good_correlated
                                 : FitVerdict::good;
-  if (!open.empty()) words += "; not determined: " + listed(open);
+  if (!open.empty()) words += fmt::format("; not determined: {}", fmt::join(open, ", "));
   fit.verdict_words = words;
 }
 

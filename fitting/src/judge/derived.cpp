@@ -41,7 +41,8 @@ class Propagation {
       const double sigma = std::sqrt(covariance_(i, i));
       if (!(sigma > 0.0) || !std::isfinite(sigma)) continue;
       Eigen::VectorXd shifted = values_;
-      const double step = 1e-4 * sigma;
+      // Within what a straight line says, and of sharp data well above rounding.
+      const double step = std::max(1e-4 * sigma, 1e-6 * std::abs(values_[problem_.free[i].index]));
       shifted[problem_.free[i].index] += step;
       const double up = f(shifted, g);
       shifted[problem_.free[i].index] -= 2.0 * step;
@@ -99,6 +100,7 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
   const Given I = given(scene, "I_kg_m2", body.I_kg_m2),
               Is = given(scene, "Is_kg_m2", body.Is_kg_m2);
   const Given mass = given(scene, "mass_kg", body.mass_kg);
+  const Given spin = given(scene, "omega_s_rad_s", std::nullopt);
 
   if (omega >= 0 && is_free(problem, "omega_s_rad_s")) {
     add(fit, "I_over_Is", "1",
@@ -113,6 +115,11 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
                       const std::vector<double>& g) { return v[b] * g[0] / g[1]; },
                   {I, Is}),
         "b I / Is with the given I and Is");
+  } else if (spin.known) {
+    add(fit, "I_over_Is", "1",
+        propagate([=](const Eigen::VectorXd& v, const std::vector<double>& g) { return g[0] / v[b]; },
+                  {spin}),
+        "omega_s / b, the spin as [fit] prior has it");
   } else if (shaped) {
     // Per unit mass; about the pivot I = A + m l^2 with the fitted l.
     data::Body unit = body;

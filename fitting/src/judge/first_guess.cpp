@@ -45,7 +45,7 @@ std::set<std::string> parameters_of(const data::Scene& given) {
 void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
                        const std::set<std::string>& known) {
   for (const auto& [name, value] : guess)
-    if (!known.contains(name))
+    if (!known.contains(name.substr(0, name.find('@'))))  // "x_m@1" is that of arc 1
       throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
                                    fmt::join(known, ", ")));
 }

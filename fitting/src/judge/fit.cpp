@@ -137,7 +137,7 @@ double silence_integration(Problem& problem, Solution& solution, double fixed_to
     solution = std::move(finer);
     // What only just does not come to lie in a dip may do so once it is integrated more finely.
     if (problem.arcs.size() == 1)
-      solution = fall_anew(problem, judged(problem, std::move(solution), "")).solution;
+      solution = restart_around_fall(problem, judged(problem, std::move(solution), "")).solution;
     *problem.work = 0.0;
     error = integration_error_sigma(problem, solution.u);
   }

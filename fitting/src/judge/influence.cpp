@@ -71,7 +71,7 @@ std::vector<Sample> carrying_most(const Problem& problem, const Eigen::VectorXd&
 }
 
 // The same problem, to which a sample says nothing.
-Problem deaf_to(Problem problem, const Sample& sample) {
+Problem without_weight_of(Problem problem, const Sample& sample) {
   const ArcData& data = problem.arcs[sample.arc];
   Eigen::VectorXd& weights = problem.row_weights[sample.arc];
   if (weights.size() == 0) weights = Eigen::VectorXd::Ones(data.rows);
@@ -91,11 +91,11 @@ std::vector<InfluentialSample> influential_samples(const Problem& problem, const
   const SolveOptions down{.iterations = 60, .function_tolerance = 1e-7};
   std::vector<InfluentialSample> found;
   for (const Sample& sample : carrying_most(problem, solution.u)) {
-    Problem deaf = deaf_to(problem, sample);
+    Problem others = without_weight_of(problem, sample);
     // The integration's noise stops a descent along a floor that hardly slopes.
     constexpr double kFine = 1e-8;
-    deaf.tolerance = std::min(problem.tolerance, kFine);
-    const Solution there = minimise(deaf, solution.u, down);
+    others.tolerance = std::min(problem.tolerance, kFine);
+    const Solution there = minimise(others, solution.u, down);
     if (!there.usable) continue;
     InfluentialSample without{problem.arcs[sample.arc].t_s[sample.index],
                               Eigen::VectorXd(sigmas.size())};

@@ -7,8 +7,8 @@
 
 namespace trochoid::fitting {
 
-/// Upper tail of the chi-square distribution with `dof` degrees of freedom (Wilson-Hilferty, good
-/// to 0.002 for dof >= 5).
+/// Upper tail of the chi-square distribution with `dof` degrees of freedom (Wilson-Hilferty: good
+/// to 0.002 for dof >= 5; a tail of 1e-6 is right within a factor of 2 for dof >= 10, of 4 for 1).
 [[nodiscard]] double chi2_upper_tail(double chi2, double dof);
 
 /// How residuals of one channel hang together in time.

@@ -79,7 +79,7 @@ WithRates with_rates(const model::Predictor& predictor, const Eigen::VectorXd& v
   // A fiftieth of the mean distance of samples: the motion is resolved by those.
   const double step_s = 0.02 * (t_s.back() - t_s.front()) /
                         std::max<double>(1.0, static_cast<double>(t_s.size()) - 1.0);
-  if (!(step_s > 0.0)) throw NumericalError("samples are out of order");
+  if (!(step_s > 0.0)) throw NumericalError("a rate needs samples at two instants at least");
   PredictRequest plain = request;
   plain.derivatives.clear();
   // The later one runs beyond the last sample, where the body may have come to its end: backward.

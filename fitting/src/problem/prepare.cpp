@@ -120,11 +120,11 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
       const auto prior = scene.fit.prior.find(name);
       const bool told = puck && prior != scene.fit.prior.end();
-      if (told && !is_free)
-        problem.free.push_back({index, arc, {}, prior->second, {}, prior->second.value});
+      const double value = told ? prior->second.value : problem.base[arc][index];
+      if ((told || seen) && !is_free)
+        problem.free.push_back(free_parameter(*problem.predictor, scene.fit, index, arc, value));
       if (told && !seen && name == std::string("w3_rad_s"))
         start_turning(prior->second, problem.base[arc][index]);
-      if (seen && !told && !is_free) problem.free.push_back({index, arc, {}, {}, {}});
       if (!seen && !told && is_free) std::erase_if(problem.free, same);
     }
   }
@@ -140,15 +140,18 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
     // Where they do not, it lies somewhere within the face: at its bounds it would bend the spin.
     constexpr double kAnywhere = 0.5;
     const double radius_m = problem.predictor->parameters()[contact].value;
-    const auto given = scene.fit.prior.find("contact_radius_m");
-    const data::Prior prior = given != scene.fit.prior.end()
-                                  ? given->second
-                                  : data::Prior{radius_m, kAnywhere * radius_m};
-    problem.free.push_back(
-        {contact, -1, {Transform::Kind::limited, 0.0, 1.5 * radius_m}, prior, {}, radius_m});
+    FreeParameter radius = free_parameter(*problem.predictor, scene.fit, contact, -1, radius_m);
+    if (!radius.prior) radius.prior = data::Prior{radius_m, kAnywhere * radius_m};
+    problem.free.push_back(radius);
   }
   std::stable_sort(problem.free.begin(), problem.free.end(),
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
+}
+
+// Is omega_s / I of a top at first, without its sign; 0 of other bodies.
+double top_spin_1_s(const Problem& problem) {
+  const int index = problem.predictor->index_of("b_1_s");
+  return index < 0 ? 0.0 : std::abs(problem.base[0][index]);
 }
 
 // Rates of decay start where they show in the record and let the body go on through it, whatever
@@ -160,10 +163,18 @@ void start_decay_within_sight(Problem& problem) {
   if (!(longest_s > 0.0)) return;
   for (FreeParameter& parameter : problem.free) {
     const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
-    if (info.unit != "1/s" || !is_loss(problem, parameter)) continue;
-    const double decay = parameter.given * longest_s;
-    if (decay > kLeast && decay < kMost) continue;
-    parameter.given = kTypical / longest_s;
+    if (!is_loss(problem, parameter)) continue;
+    if (info.unit == "1/s") {
+      const double decay = parameter.given * longest_s;
+      if (decay > kLeast && decay < kMost) continue;
+      parameter.given = kTypical / longest_s;
+    } else if (const double spin_1_s = top_spin_1_s(problem);
+               parameter.given == 0.0 && spin_1_s > 0.0) {
+      // A top's dry and quadratic drag; over decades nothing leads away from 0.
+      parameter.given = kTypical / longest_s * (info.unit == "1/s^2" ? spin_1_s : 1.0 / spin_1_s);
+    } else {
+      continue;
+    }
     for (Eigen::VectorXd& base : problem.base) base[parameter.index] = parameter.given;
   }
 }
@@ -235,6 +246,9 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
           std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
   }
   suit_to_data(problem, scene);
+  if (problem.free.empty())
+    throw InputError(fmt::format(
+        "[fit] fixed names every parameter of model '{}': leave at least one of them out", model));
   if (options.rolls_at_first) tie_to_spin(scene, problem);
   check_each_determined(problem);
   const int needed = static_cast<int>(problem.free.size());

@@ -265,14 +265,18 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   if (const auto* bounds = said_of(info.name, settings.bounds)) {
     const auto [lower, upper] = *bounds;
     const bool low = std::isfinite(lower), high = std::isfinite(upper);
+    // What cannot be negative is no more so for a bound from above.
+    const bool from_zero = info.logarithmic && !(lower > 0.0);
+    if (high && from_zero && upper > 0.0) return {Transform::Kind::limited, 0.0, upper};
     if (low && high) return {Transform::Kind::between, lower, upper};
-    if (low && !(info.logarithmic && lower <= 0.0)) return {Transform::Kind::above, lower, upper};
+    if (low && !from_zero) return {Transform::Kind::above, lower, upper};
     if (high) return {Transform::Kind::below, lower, upper};
   }
   // Beyond a coefficient of about 1.1 a disc on its rim has no consistent contact (Painleve).
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
+  if (info.name == "contact_radius_m") return {Transform::Kind::limited, 0.0, 1.5 * info.value};
   if (info.name == kSlipScale)
     return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
@@ -304,6 +308,15 @@ bool leaves_choice(const std::string& name) {
   return is_pivot(name) || name == kReadout || name == kAngleDelay || name == kSlipScale;
 }
 
+FreeParameter free_parameter(const model::Predictor& predictor, const data::FitSettings& settings,
+                             int index, int arc, double value) {
+  const ParameterInfo& info = predictor.parameters()[index];
+  FreeParameter parameter{index, arc, transform_of(info, predictor.model_name(), settings), {}, {}};
+  parameter.given = value;
+  if (const auto* prior = said_of(info.name, settings.prior)) parameter.prior = *prior;
+  return parameter;
+}
+
 Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,
                      const data::Scene& scene) {
   check_names(predictor, scene.fit);
@@ -322,14 +335,11 @@ Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arc
   problem.row_weights.resize(problem.arcs.size());
   problem.timing = timing_of(predictor, scene);
   const auto add = [&](int index, int arc) {
-    const ParameterInfo& info = parameters[index];
-    FreeParameter parameter{
-        index, arc, transform_of(info, predictor.model_name(), scene.fit), {}, {}};
-    parameter.given = values[index];
-    if (const auto* prior = said_of(info.name, scene.fit.prior)) parameter.prior = *prior;
+    FreeParameter parameter = free_parameter(predictor, scene.fit, index, arc, values[index]);
     // What is known of the camera widens the error bars; a model that is not the whole truth must
     // not bend it.
-    const bool camera = info.name == kScale || info.name == kTimeFactor;
+    const std::string& name = parameters[index].name;
+    const bool camera = name == kScale || name == kTimeFactor;
     if (camera && parameter.prior && !scene.fit.free_scale) {
       parameter.held = true;
       for (Eigen::VectorXd& base : problem.base) base[index] = parameter.prior->value;

@@ -137,6 +137,12 @@ const Value* said_of(const std::string& parameter, const std::map<std::string, V
 /// its pivot is, when it was seen, how friction sets in.
 [[nodiscard]] bool leaves_choice(const std::string& name);
 
+/// A parameter to be fitted, as [fit] bounds it and knows it beforehand.
+/// @param arc  whose it is, -1: all of them share it @param value  before any fitting
+[[nodiscard]] FreeParameter free_parameter(const model::Predictor& predictor,
+                                           const data::FitSettings& settings, int index, int arc,
+                                           double value);
+
 /// Chooses transforms and priors: parameters named in scene.fit (or the model's own choice when it
 /// names none) are free, those of role `initial` once per arc.
 /// @throws InputError for a free or fixed name the model does not have.

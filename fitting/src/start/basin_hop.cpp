@@ -93,7 +93,7 @@ std::optional<Prelude> before(const Problem& problem, const Eigen::VectorXd& u, 
 
 }  // namespace
 
-Found fall_anew(const Problem& problem, Found found) {
+Found restart_around_fall(const Problem& problem, Found found) {
   constexpr int kRounds = 4, kTrials = 60;
   constexpr double kSteps[] = {0.5, 1.0, 2.0, 3.0};
   constexpr double kTellsSomething = 0.3;  // of the variance

@@ -346,10 +346,7 @@ Found find_arc(Problem problem, const SearchRequest& asked) {
   if (best.passed || !asked.start_given) return best;
   Found from_given = grow(problem, given, std::max(24, all / 8));
   from_given.cut_short = best.cut_short && !from_given.passed;
-  return from_given.solution.usable &&
-                 (!best.solution.usable || from_given.reduced_chi2 < best.reduced_chi2)
-             ? from_given
-             : best;
+  return better(from_given, best) ? from_given : best;
 }
 
 }  // namespace

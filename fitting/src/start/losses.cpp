@@ -99,7 +99,7 @@ Probe most_missed(const Problem& problem, const std::vector<int>& vanished) {
 
 // Lets a missed loss act, and the others with it, as far as that holds what it promises. False:
 // not at all.
-bool let_act(const Problem& problem, const Probe& probe, double chi2, Problem& trial) {
+bool release_loss(const Problem& problem, const Probe& probe, double chi2, Problem& trial) {
   constexpr double kMostWorse = 2.0, kMostTimes = 10.0, kLeastShare = 0.01;
   const FreeParameter& gone = problem.free[probe.free];
   const double whole = std::min(1.0, kMostTimes * gone.given / probe.value);
@@ -149,7 +149,7 @@ Solution solve_to_the_end(Problem& problem) {
     const Probe probe = vanished.empty() ? Probe{} : most_missed(problem, vanished);
     if (probe.gain < kWorth) break;
     Problem trial;
-    if (!let_act(problem, probe, best.chi2, trial)) break;
+    if (!release_loss(problem, probe, best.chi2, trial)) break;
     Solution again = descend(trial);
     if (!again.usable || again.chi2 > best.chi2 - 0.1) break;
     best = std::move(again);

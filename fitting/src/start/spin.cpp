@@ -24,6 +24,8 @@ Eigen::VectorXd predicted_angles(const Problem& problem, int arc, const Eigen::V
   request.t_s = data.t_s;
   request.start_s = data.start_s;
   request.observables = {model::Observable::theta_rad, model::Observable::psi_rad};
+  request.tolerance = problem.tolerance;
+  request.lies_where_it_fell = true;
   request.rolls_at_first = problem.rolls_at_first;
   return problem.predictor->predict(values, request).values;
 }
@@ -40,6 +42,7 @@ SpinDifference spin_difference(const Problem& problem, int arc, int psi, int ome
   for (const Reading& reading : data.readings) {
     if (reading.channel != Channel::psi) continue;
     const int row = 2 * reading.sample;
+    if (!std::isfinite(still[row + 1]) || !std::isfinite(turning[row + 1])) continue;
     double measured = reading.value.x();
     if (data.folded && still[row] > 0.5 * data::kPi) measured = data::kPi - measured;
     difference.angle_rad.push_back(measured - still[row + 1]);

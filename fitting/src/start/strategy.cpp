@@ -325,7 +325,7 @@ Found grow(const Problem& problem, const Start& start, int first_window, const G
                                     : solve_to_the_end(current);
   Found found = judged(current, std::move(solution), start.path);
   found.strays_s = std::move(strays_s);
-  return fall_anew(current, std::move(found));
+  return restart_around_fall(current, std::move(found));
 }
 
 }  // namespace trochoid::fitting

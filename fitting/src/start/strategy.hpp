@@ -79,7 +79,7 @@ struct Growth {
 /// in which it comes to lie decides when and where. From one dip to the next the path jumps, and
 /// nothing leads downhill over that. What the track says before the fall leaves few dips to choose
 /// from: looks about as far as that lets it, and goes downhill on all of the track from the best.
-[[nodiscard]] Found fall_anew(const Problem& problem, Found found);
+[[nodiscard]] Found restart_around_fall(const Problem& problem, Found found);
 
 enum class Effort { brief, full };
 

@@ -20,6 +20,7 @@
 #include "trochoid/model/simulate.hpp"
 #ifdef TROCHOID_HAS_TRACKING
 #include "common/track_options.hpp"
+#include "draw/encoded_file.hpp"
 #include "draw/overlay.hpp"
 #include "report/run_folder.hpp"
 #include "trochoid/tracking/smooth.hpp"
@@ -70,7 +71,7 @@ std::string left_out_words(const py::list& given, const std::vector<data::Track>
 }
 
 data::Fit fit(const py::list& tracks, const SceneValue& scene, bool compare,
-              const py::dict& options, const std::map<std::string, std::string>& inputs) {
+              const py::dict& options, const tools::Checksums& inputs) {
   const std::vector<data::Track> values = tracks_of(tracks);
   fitting::FitOptions how;
   how.model = options["model"].cast<std::string>();
@@ -164,13 +165,14 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   std::optional<data::Camera> camera;
   if (camera_file) camera = data::read_camera(*camera_file);
   tracking::TrackOptions how = tools::track_options(with, choices);
-  if (!options["edges"].is_none()) how.edges = options["edges"].cast<fs::path>();
+  how.edges = !options["edges"].is_none();
   tracking::TrackResult result;
   run_interruptibly([&](const Interrupt& interrupt) {
     how.checkpoint = [&] { interrupt.check(); };
     result = tracking::track_video(video, with, camera, how);
   });
   result.file.made_by = "trochoid " TROCHOID_VERSION;
+  if (result.edges) data::write_table(*result.edges, options["edges"].cast<fs::path>());
   const tracking::TrackSummary& s = result.summary;
   py::dict summary;
   if (!options["smooth"].is_none()) {
@@ -181,6 +183,7 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
       data::write_table(smoothed.table, target);
     });
     summary["interpolated"] = smoothed.interpolated;
+    summary["left_out"] = smoothed.left_out;
   }
   summary["frames"] = s.frames;
   summary["found"] = s.found;
@@ -194,6 +197,9 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
 py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* fit,
                  const SceneValue* scene, const std::optional<fs::path>& camera_file,
                  const py::dict& options) {
+  const auto output = options["output"].cast<fs::path>(), still = options["still"].cast<fs::path>();
+  if (!still.empty()) tools::check_picture_name(still);
+  if (!output.empty()) tools::check_overlay_name(output);
   tools::OverlayInput input;
   input.video = video;
   input.tracks = file_of(file);
@@ -211,7 +217,6 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
                             .to = options["to"].cast<std::string>(),
                             .slow = options["slow"].cast<double>(),
                             .between_pictures = {}};
-  const auto output = options["output"].cast<fs::path>(), still = options["still"].cast<fs::path>();
   tools::OverlayFrames frames;
   run_interruptibly([&](const Interrupt& interrupt) {
     how.between_pictures = [&] { interrupt.check(); };
@@ -362,6 +367,25 @@ void add_scene(py::module_& module) {
   });
 }
 
+/// Of the files behind a fit; what is handed in comes back with one more.
+void add_provenance(py::module_& module) {
+  using tools::Checksums;
+  module.def("with_checksum", [](Checksums known, const fs::path& file) {
+    tools::add_checksum(known, file);
+    return known;
+  });
+  module.def("with_track", [](Checksums known, const fs::path& file) {
+    tools::add_track(known, file);
+    return known;
+  });
+  module.def("with_recording", [](Checksums known, const std::string& source,
+                                  const std::string& sha256, const std::string& track) {
+    tools::add_recording(known, source, sha256, track);
+    return known;
+  });
+  module.def("check_made_from", &tools::check_made_from);
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
@@ -379,9 +403,8 @@ PYBIND11_MODULE(_core, module) {
   module.def("write_track", [](const py::dict& file, const fs::path& path) {
     data::write_track(file_of(file), path);
   });
-  module.def("sha256_of_file", &data::sha256_of_file);
-  module.def("check_output", &tools::check_output);
-  module.def("check_made_from", &tools::check_made_from);
+  add_provenance(module);
+  module.def("check_outputs", &tools::check_outputs);
   module.def("simulate", &simulate);
   module.def("fit", &fit);
   module.def("predict", &predict);

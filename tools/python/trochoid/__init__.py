@@ -78,13 +78,12 @@ def _optional(check: Callable[..., Any], name: str, value: Any) -> Any:
     return None if value is None else check(name, value)
 
 
-def _output(name: str, value: Optional[Path], *inputs: Any) -> Optional[str]:
+def _outputs(inputs: Sequence[Any], **named: Optional[Path]) -> list[Optional[str]]:
     """Before the work, so that a wrong name costs no time and none of the files that are read."""
-    if value is None:
-        return None
-    _core.check_output(_path(name, value), [os.fsdecode(i) for i in inputs
-                                            if isinstance(i, (str, bytes, os.PathLike))])
-    return os.fsdecode(value)
+    paths = [_optional(_path, name, value) for name, value in named.items()]
+    _core.check_outputs([path for path in paths if path is not None],
+                        [os.fsdecode(i) for i in inputs if isinstance(i, (str, bytes, os.PathLike))])
+    return paths
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -105,7 +104,8 @@ class _Record:
 
 
 def _toml_text(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+    return '"' + "".join("\\" + c if c in '"\\' else f"\\u{ord(c):04x}" if c < " " or c == "\x7f" else c
+                         for c in text) + '"'
 
 
 def _toml_key(key: Any) -> str:
@@ -304,13 +304,11 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
         if not isinstance(at_px, (Sequence, np.ndarray)) or len(at_px) != 2:
             raise _wrong("at_px", at_px, "a point (x, y)")
         at_px = (_number("at_px", at_px[0]), _number("at_px", at_px[1]))
-    inputs = video, scene, camera
+    output, edges, smooth = _outputs([video, scene, camera], output=output, edges=edges, smooth=smooth)
     options = {"objects": _optional(_whole, "objects", objects), "from": _moment("from_", from_),
                "to": _moment("to", to), "at_px": at_px,
                "rate_hz": _optional(_number, "rate_hz", rate_hz), "effort": _text("effort", effort),
-               "edges": _output("edges", edges, *inputs, output),
-               "smooth": _output("smooth", smooth, *inputs, output, edges)}
-    output = _output("output", output, *inputs)
+               "edges": edges, "smooth": smooth}
     values, summary = _core.track(_path("video", video), Scene(scene)._value,
                                   _optional(_path, "camera", camera), options)
     file = _file(values, summary)
@@ -322,25 +320,42 @@ def track(video: Path, scene: Union[None, Path, Mapping, Scene] = None, *,
 Tracks = Union[Path, Track, TrackFile, "Trajectory", Sequence[Union[Path, Track, TrackFile, "Trajectory"]]]
 
 
-def _all_tracks(given: Tracks) -> tuple[list[Track], dict[str, str]]:
-    if isinstance(given, (str, os.PathLike)):
-        name = os.path.basename(os.fspath(given))
-        return read_track(given).tracks, {name: _core.sha256_of_file(given)}
-    if isinstance(given, Track):
-        return [given], {}
-    if isinstance(given, TrackFile):
-        return list(given.tracks), {}
-    if isinstance(given, Trajectory):
-        return [Track(given["t_s"], np.column_stack([given["x_m"], given["y_m"]]))], {}
-    if not isinstance(given, Sequence):
-        raise InputError(f"tracks: a {type(given).__name__} is no track, track file or path")
-    tracks: list[Track] = []
-    inputs: dict[str, str] = {}
-    for one in given:
-        more, sources = _all_tracks(one)
-        tracks += more
-        inputs.update(sources)
-    return tracks, inputs
+class _Given:
+    """Tracks in the order they are given, and the checksums of the files behind them."""
+
+    def __init__(self, given: Tracks):
+        self.tracks: list[Track] = []
+        self.inputs: dict[str, str] = {}
+        self._add(given)
+
+    def _add(self, given: Tracks) -> None:
+        if isinstance(given, (str, os.PathLike)):
+            path = os.fsdecode(given)
+            file = read_track(path)
+            self.inputs = _core.with_track(self.inputs, path)
+            self._add_file(file, path)
+        elif isinstance(given, Track):
+            self._add_track(given)
+        elif isinstance(given, TrackFile):
+            self._add_file(given, f"track {len(self.tracks)}")
+        elif isinstance(given, Trajectory):
+            self._add_track(Track(given["t_s"], np.column_stack([given["x_m"], given["y_m"]])))
+        elif isinstance(given, Sequence):
+            for one in given:
+                self._add(one)
+        else:
+            raise InputError(f"tracks: a {type(given).__name__} is no track, track file or path")
+
+    def _add_file(self, file: TrackFile, name: str) -> None:
+        self.inputs = _core.with_recording(self.inputs, _text("source", file.source),
+                                           _text("source_sha256", file.source_sha256), name)
+        for track in file.tracks:
+            self._add_track(track)
+
+    def _add_track(self, track: Track) -> None:
+        if any(track is one for one in self.tracks):
+            raise InputError(f"tracks: {track!r} is given twice; a recording counts once")
+        self.tracks.append(track)
 
 
 class Fit:
@@ -446,7 +461,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     """Fits model parameters to one or more tracks of a body (``trochoid fit``).
 
     tracks     a path, Track, TrackFile or Trajectory, or a list (several recordings of one body)
-    model      top, rolling, sliding, puck, pivot or auto; overrides the scene's
+    model      top, smooth, rolling, sliding, puck, pivot or auto; overrides the scene's
     from_, to  first and last sample: seconds (1.5) or a frame ("f120")
     free_pivot fit the pivot's x and y (top); else it is where the scene says, or at 0, 0
     compare    try the models that make sense, fit the simplest that suffices
@@ -460,11 +475,11 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     An unwelcome answer is not an exception: look at ``converged``, ``verdict`` and ``warnings``.
     """
     tracks = list(tracks) if isinstance(tracks, Iterator) else tracks
-    values, inputs = _all_tracks(tracks)
+    given = _Given(tracks)
     if scene is None and not model:
         raise InputError("fit: give a scene, or model='top' (the only one that needs no body)")
     if isinstance(scene, (str, os.PathLike)) and os.path.isfile(scene):
-        inputs[os.path.basename(os.fspath(scene))] = _core.sha256_of_file(scene)
+        given.inputs = _core.with_checksum(given.inputs, os.fspath(scene))
     if not isinstance(start, (type(None), Mapping)):
         raise _wrong("start", start, "a dict of numbers by parameter name")
     first_guess = {_text("start", name): _number(f"start[{name!r}]", value)
@@ -476,9 +491,9 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
                "start": first_guess}
     one = isinstance(tracks, (str, Track, TrackFile, Trajectory)) or not isinstance(tracks, Sequence)
     files = [tracks] if one else list(tracks)
-    output = _output("output", output, scene, *files)
-    result = Fit(_core.fit([_track_dict(t) for t in values], Scene(scene)._value,
-                           _flag("compare", compare), options, inputs))
+    output, = _outputs([scene, *files], output=output)
+    result = Fit(_core.fit([_track_dict(t) for t in given.tracks], Scene(scene)._value,
+                           _flag("compare", compare), options, given.inputs))
     if output is not None:
         result.write(output)
     return result
@@ -498,7 +513,7 @@ class PredictedArc(_Record):
 def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
             fit_track: int = 0) -> list[PredictedArc]:
     """Replays a fit over the track it was made from; ``fit_track`` counts tracks fitted together."""
-    file = TrackFile(_all_tracks(tracks)[0])
+    file = TrackFile(_Given(tracks).tracks)
     arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(file), _whole("fit_track", fit_track))
     return [PredictedArc(**arc) for arc in arcs]
 
@@ -528,17 +543,16 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
     _needs_tracking("overlay")
     if output is None and still is None:
         raise InputError("overlay: nothing to write; give output='overlay.mp4', still='path.png' or both")
-    inputs = video, track, fit, scene, camera
+    output, still = _outputs([video, track, fit, scene, camera], output=output, still=still)
     if _number("slow", slow) != 0.0 and not 0.01 <= slow <= 1000.0:
         raise _wrong("slow", slow, "0 or a number in 0.01..1000")
-    options = {"output": _output("output", output, *inputs) or "",
-               "still": _output("still", still, *inputs, output) or "",
+    options = {"output": output or "", "still": still or "",
                "from": _moment("from_", from_), "to": _moment("to", to),
                "slow": float(slow),
                "fit_file": fit if isinstance(fit, (str, os.PathLike)) else "",
                "track_file": track if isinstance(track, (str, os.PathLike)) else "",
                "fit_track": _whole("fit_track", fit_track)}
-    file = track if isinstance(track, TrackFile) else TrackFile(_all_tracks(track)[0])
+    file = track if isinstance(track, TrackFile) else TrackFile(_Given(track).tracks)
     frames = _core.overlay(_path("video", video), _file_dict(file),
                            _fit(fit, track)._value if fit is not None else None,
                            Scene(scene)._value if scene is not None else None,
@@ -592,4 +606,5 @@ def simulate(scene: Union[Path, Mapping, Scene], *, until_s: Optional[float] = N
         _optional(_number, "until_s", until_s), _optional(_number, "rate_hz", rate_hz),
         _optional(_number, "tolerance", tolerance), _text("model", model),
         _text("integrator", integrator))
-    return Trajectory(**_core.simulate(value, _output("output", output, scene) or ""))
+    output, = _outputs([scene], output=output)
+    return Trajectory(**_core.simulate(value, output or ""))

@@ -4,10 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/child_process.hpp"
+#include "common/json_object.hpp"
 #include "common/recording_name.hpp"
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"
@@ -112,23 +112,11 @@ CampaignRecord record_of(const Json& json) {
   return record;
 }
 
-Json read_json(const fs::path& path) {
-  std::ifstream file(path);
-  return Json::parse(file, nullptr, /*allow_exceptions=*/false);
-}
-
-std::string last_line(const std::string& text) {
-  const std::size_t end = text.find_last_not_of(" \n");
-  if (end == std::string::npos) return {};
-  const std::size_t start = text.find_last_of("\n\r", end);
-  return text.substr(start == std::string::npos ? 0 : start + 1, end - (start + 1) + 1);
-}
-
 void read_answer(const fs::path& file, CampaignRecord& record) {
-  const Json answer = read_json(file);
-  if (!answer.is_object()) return;
-  record.grade = answer.value("grade", "");
-  record.verdict = answer.value("verdict", "");
+  const auto answer = read_json_object(file);
+  if (!answer) return;
+  record.grade = answer->value("grade", "");
+  record.verdict = answer->value("verdict", "");
 }
 
 // Also of a run that failed: they tell whether its cause was mended. Empty for what cannot be read.
@@ -164,10 +152,10 @@ void check_items(const Campaign& campaign, const std::vector<const CampaignItem*
 }
 
 std::optional<CampaignRecord> current_record(const Campaign& campaign, const CampaignItem& item) {
-  const Json json = read_json(record_path(campaign, item));
-  if (!json.is_object()) return std::nullopt;
+  const auto json = read_json_object(record_path(campaign, item));
+  if (!json) return std::nullopt;
   try {
-    CampaignRecord record = record_of(json);
+    CampaignRecord record = record_of(*json);
     const bool kept = !record.done || fs::exists(folder_of(campaign, item.name) / kRunFile);
     if (kept && record.key == key_of(campaign, item)) return record;
   } catch (const Json::exception&) {  // not ours, or an older version's: as if never run
@@ -210,10 +198,9 @@ std::vector<CampaignLine> collect(const Campaign& campaign) {
     const fs::path folder = folder_of(campaign, item.name);
     const fs::path fit = folder / (recording_name(item.video) + ".fit.json");
     if (line.record.done) {
-      const Json run = read_json(folder / kRunFile);
-      if (run.is_object()) {
-        line.frames = run.value("frames", std::int64_t{0});
-        line.found = run.value("found", std::int64_t{0});
+      if (const auto run = read_json_object(folder / kRunFile)) {
+        line.frames = run->value("frames", std::int64_t{0});
+        line.found = run->value("found", std::int64_t{0});
       }
       std::error_code code;
       try {

@@ -371,9 +371,10 @@ void run(const CalibrateOptions& options) {
   tracking::Calibration result = tracking::calibrate(views.found, views.size);
   set_aside(result, views);
   const std::string floor = place_floor(options, views, result.camera);
+  // The picture first, which may fail: an earlier camera is still there then.
+  if (!options.picture.empty()) draw_check(options, views, result.camera);
   data::write_camera(result.camera, options.output);
   tell(options, views, result, floor);
-  if (!options.picture.empty()) draw_check(options, views, result.camera);
   constexpr double kPoor_px = 1.0;
   if (result.rms_px > kPoor_px)
     throw NotGood(
@@ -397,8 +398,9 @@ void add_calibrate_command(CLI::App& app) {
   command
       ->add_option("inputs", options->inputs, "Pictures of the board, a folder of them or a video")
       ->required();
-  command->add_option("--pattern", options->pattern,
-                      "Inner corners of a chessboard, squares of a ChArUco board [9x6]");
+  command->add_option(
+      "--pattern", options->pattern,
+      "Columns x rows: inner corners of a chessboard, squares of a ChArUco board [9x6]");
   constexpr double kLeast_mm = 0.5, kMost_mm = 1000.0;  // no slip between millimetres and metres
   command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
       ->required()
@@ -407,7 +409,8 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--marker-mm", options->marker_mm,
                    "Side of a marker [mm]: the board is a ChArUco board")
       ->check(positive_number());
-  command->add_option("--dictionary", options->dictionary, "Of the markers [4X4_50]")
+  command
+      ->add_option("--dictionary", options->dictionary, "ArUco dictionary of the markers [4X4_50]")
       ->needs("--marker-mm");
   command->add_option(
       "--floor", options->floor,
@@ -415,7 +418,7 @@ void add_calibrate_command(CLI::App& app) {
       "[the first]");
   command
       ->add_option("--floor-height-mm", options->floor_height_mm,
-                   "Height of that board, of the points or of the circle above the floor [0]")
+                   "Height of that board, of the points or of the circle above the floor [mm, 0]")
       ->check(number_within(-1e5, 1e5).description(""));
   command
       ->add_option("--floor-points", options->floor_points,
@@ -429,7 +432,8 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
       ->check(positive_number())
       ->needs("--circle-points");
-  command->add_option("--picture", options->picture, "PNG of the corners and their residuals");
+  command->add_option("--picture", options->picture,
+                      "Picture of the corners and their residuals to write (.png, .jpg)");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   add_json_flag(*command, options->json);
   command->footer(

@@ -166,7 +166,7 @@ void add_campaign_command(CLI::App& app) {
       app.add_subcommand("campaign", "Run many recordings; resume where it was interrupted");
   command->add_option("manifest", options->manifest, "Recordings and scenes (docs/campaigns.md)")
       ->required();
-  command->add_option("-j,--jobs", options->jobs, "Recordings at a time; 0: one per core")
+  command->add_option("-j,--jobs", options->jobs, "Recordings at a time; 0: one per core [0]")
       ->check(whole_number());
   CLI::Option* part = command->add_option(
       "--part", options->part,
@@ -175,7 +175,8 @@ void add_campaign_command(CLI::App& app) {
   command->add_flag("--summary", options->summary_only, "Run nothing, write the summary")
       ->excludes(part);
   add_json_flag(*command, options->json);
-  command->add_flag("--again", options->again, "Run also what is done")->excludes("--summary");
+  command->add_flag("--again", options->again, "Also run again what is done")
+      ->excludes("--summary");
   command->footer(
       "Example:\n  trochoid campaign lab.toml\nwrites lab.campaign/: open summary.html");
   command->callback([options] { run(*options); });

@@ -2,10 +2,8 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -16,6 +14,7 @@
 #include "common/provenance.hpp"
 #include "common/scene_library.hpp"
 #include "common/validators.hpp"
+#include "common/value_words.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/moment.hpp"
@@ -33,15 +32,6 @@ struct FitCommand {
   bool compare = false, json = false;
   fitting::FitOptions options;
 };
-
-// Value and error to the error's second digit.
-std::string with_error(double value, double sigma) {
-  if (!(sigma > 0.0) || !std::isfinite(sigma)) return fmt::format("{:.6g}", value);
-  const int digits =
-      std::max(0, static_cast<int>(std::floor(std::log10(std::max(std::abs(value), sigma)))) -
-                      static_cast<int>(std::floor(std::log10(sigma))) + 2);
-  return fmt::format("{:.{}g} +- {:.2g}", value, std::min(digits, 15), sigma);
-}
 
 std::string_view word(data::ParameterStatus status) {
   return status == data::ParameterStatus::free ? "fitted" : name(status);
@@ -75,7 +65,7 @@ void print(const data::Fit& fit) {
   if (fit.parameters.empty()) return print_notes(fit);
   if (fit.converged) fmt::print("  {}: {}\n", name(fit.verdict), fit.verdict_words);
   for (const data::FitParameter& p : fit.parameters)
-    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, with_error(p.value, p.sigma), p.unit,
+    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, value_words(p.value, p.sigma), p.unit,
                word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
   fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3g}, whiteness p {:.2g}\n",
              fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
@@ -85,7 +75,7 @@ void print(const data::Fit& fit) {
     fmt::print("  profile of {:<22} {:<9} 95 % {:.6g} .. {:.6g}\n", p.parameter, name(p.verdict),
                p.lower_95, p.upper_95);
   for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
-    fmt::print("  bootstrap of {:<20} +- {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
+    fmt::print("  bootstrap of {:<20} ± {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
                b.lower_95, b.upper_95);
   print_comparison(fit.comparison);
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
@@ -127,20 +117,16 @@ void tell_odd_units(const std::string& path, const data::Track& track) {
     note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 
-/// @param remarks what the files note about their tracks.
-std::vector<data::Track> read_tracks(const FitCommand& command, data::Fit& provenance,
+/// @param inputs  the files read.
+/// @param remarks  what they note about their tracks.
+std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& inputs,
                                      std::vector<std::string>& remarks) {
   std::vector<data::Track> tracks;
-  std::map<std::string, std::string> by_checksum;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
     for (const std::string& line : file.notes) remarks.push_back(path + ": " + line);
-    const auto [same, fresh] = by_checksum.emplace(data::sha256_of_file(path), path);
-    if (!fresh)
-      throw InputError(
-          fmt::format("{}: is the same track as {}; a recording counts once", path, same->second));
-    add_checksum(provenance.inputs, path);
-    if (!file.source_sha256.empty()) provenance.inputs[file.source] = file.source_sha256;
+    add_track(inputs, path);
+    add_recording(inputs, file.source, file.source_sha256, path);
     for (const data::Track& track : file.tracks)
       if (!command.object || track.object == *command.object) {
         tell_odd_units(path, track);
@@ -181,22 +167,24 @@ std::string advice(const data::Fit& fit, const data::Scene& scene,
 }
 
 void run(const FitCommand& command) {
-  std::vector<std::filesystem::path> inputs(command.tracks.begin(), command.tracks.end());
-  inputs.emplace_back(command.scene);
-  check_output(command.output, inputs);
+  std::vector<std::filesystem::path> read(command.tracks.begin(), command.tracks.end());
+  read.emplace_back(command.scene);
+  check_output(command.output, read);
   static_cast<void>(data::parse_window(command.options.from, command.options.to));
-  data::Fit provenance;
+  Checksums inputs;
   std::vector<std::string> remarks;
-  const std::vector<data::Track> tracks = read_tracks(command, provenance, remarks);
+  const std::vector<data::Track> tracks = read_tracks(command, inputs, remarks);
   data::Scene scene;
   if (!command.scene.empty()) {
     scene = load_scene(command.scene);
-    if (std::filesystem::exists(command.scene)) add_checksum(provenance.inputs, command.scene);
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(command.scene, ignored))
+      add_checksum(inputs, command.scene);
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }
   data::Fit fit = fitted(command, tracks, scene);
-  fit.inputs = provenance.inputs;
+  fit.inputs = std::move(inputs);
   if (!command.output.empty()) data::write_fit(fit, command.output);
   if (command.json)
     fmt::print("{}", data::fit_text(fit, "fit"));
@@ -219,25 +207,29 @@ void add_fit_command(CLI::App& app) {
   fit->add_option("--scene,-s", command->scene,
                   "Scene file, or a bundled scene's name: body, model, priors");
   fit->add_option("--model,-m", command->options.model,
-                  "Model to fit, or auto: compare, as where the scene names none; overrides the "
-                  "scene's")
+                  "Model to fit, instead of the scene's; auto (also where the scene names none): "
+                  "compare those that make sense")
       ->check(fitted_model());
   fit->add_option("--output,-o", command->output, "Where to write the fit (JSON)");
-  fit->add_option("--object", command->object, "Fit this object of the track only")
+  fit->add_option("--object", command->object,
+                  "Fit only the body with this number in the column object")
       ->check(whole_number());
   fit->add_option("--from", command->options.from, "First moment: seconds (1.5) or a frame (f120)");
   fit->add_option("--to", command->options.to, "Last moment: seconds or a frame");
-  fit->add_flag("--free-pivot", command->options.free_pivot, "Fit the pivot's x and y (top)");
+  fit->add_flag("--free-pivot", command->options.free_pivot,
+                "Also fit where the pivot is, x and y (model top)");
   fit->add_flag("--compare", command->compare,
                 "Try the models that make sense for the scene; fit the simplest that suffices");
   fit->add_flag("--profile", command->options.profile,
-                "Profile likelihood of the body's and the table's parameters");
-  fit->add_option("--bootstrap", command->options.bootstrap,
-                  "Fits to residuals resampled in blocks, for the shape of the error bars; 0: none")
+                "Also profile likelihoods of the body's and the table's parameters");
+  fit->add_option(
+         "--bootstrap", command->options.bootstrap,
+         "Number of fits to residuals resampled in blocks, for the shape of the error bars [0]")
       ->check(whole_number_within(0, 100000));
-  fit->add_option("--threads", command->options.threads, "At most so many threads; 0: all cores")
+  fit->add_option("--threads", command->options.threads,
+                  "At most so many threads; 0: all cores [0]")
       ->check(whole_number());
-  fit->add_option("--seed", command->options.seed, "Seed of everything random")->check(seed());
+  fit->add_option("--seed", command->options.seed, "Seed of everything random [1]")->check(seed());
   fit->add_flag("--json", command->json, "Print the fit as its file holds it (JSON)");
   fit->footer("Example: trochoid fit ring.track.csv --scene ring.toml -o ring.fit.json");
   fit->callback([command] { run(*command); });

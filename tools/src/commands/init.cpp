@@ -216,8 +216,7 @@ void add_init_command(CLI::App& app) {
       app.add_subcommand("init", "Write a scene file from a first look at a recording");
   command->add_option("video", options->video, "Recording")->required()->transform(without_slash());
   command->add_option("-o,--output", options->output, "Scene to write [VIDEO's name with .toml]");
-  command
-      ->add_option("--radius-mm", options->radius_mm, "Radius of the body, if known: 0.1 to 10000")
+  command->add_option("--radius-mm", options->radius_mm, "Radius of the body [mm], if known")
       ->check(radius_in_mm());
   command
       ->add_option("--rate", options->rate_hz,

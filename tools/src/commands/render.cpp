@@ -391,24 +391,32 @@ void add_look_options(CLI::App& command, RenderOptions& options) {
       ->check(number_within(0.0, 1.0));
   command.add_option("--floor", options.floor, "Brightness of the floor, 0..1")
       ->check(number_within(0.0, 1.0));
-  command.add_option("--texture", style.texture, "Of the floor, relative [0.05]")
+  command
+      .add_option("--texture", style.texture,
+                  "Texture of the floor, relative standard deviation of its brightness [0.05]")
       ->check(number_within(0.0, 1.0));
-  command.add_option("--gloss", style.gloss, "Highlights on the body [0.1]")
+  command.add_option("--gloss", style.gloss, "Strength of highlights on the body, 0: matt [0.1]")
       ->check(number_within(0.0, 10.0));
   command.add_flag("--no-shadow", options.no_shadow, "The body casts no shadow");
-  command.add_option("--blur", style.blur_px, "Of the lens, standard deviation [px, 0.5]")
+  command.add_option("--blur", style.blur_px, "Blur of the lens, standard deviation [px, 0.5]")
       ->check(number_within(0.0, 20.0));
-  command.add_option("--noise", style.noise_levels, "Standard deviation [8-bit levels, 1]")
+  command
+      .add_option("--noise", style.noise_levels,
+                  "Noise of the camera, standard deviation [8-bit levels, 1]")
       ->check(number_within(0.0, 100.0));
-  command.add_option("--exposure", style.exposure_fraction, "Share of the frame interval [0.25]")
+  command
+      .add_option("--exposure", style.exposure_fraction,
+                  "Exposure time as a share of the frame interval [0.25]")
       ->check(number_within(0.0, 1.0));
-  command.add_option("--flicker", style.flicker, "Relative amplitude at 100 Hz [0]")
+  command
+      .add_option("--flicker", style.flicker,
+                  "Flicker of the light at 100 Hz, relative amplitude [0]")
       ->check(number_within(0.0, 0.9));
   command.add_option("--samples", style.samples, "Rays across a pixel on an edge [8]")
       ->check(whole_number_within(1, 64));
-  command.add_option("--times", style.times, "Pictures averaged over the exposure [5]")
+  command.add_option("--times", style.times, "Moments averaged over the exposure [5]")
       ->check(whole_number_within(1, 64));
-  command.add_option("--seed", style.seed, "Of texture and noise [1]")->check(seed());
+  command.add_option("--seed", style.seed, "Seed of texture and noise [1]")->check(seed());
 }
 
 }  // namespace
@@ -431,15 +439,16 @@ void add_render_command(CLI::App& app) {
       });
   CLI::Option* camera = command->add_option("--camera", options->camera,
                                             "Camera file [the scene's, else from above]");
-  command->add_option("--width", options->width_px, "Of the picture [px, 640]")
+  command->add_option("--width", options->width_px, "Width of the pictures [px, 640]")
       ->check(whole_number_within(32, 8192))
       ->excludes(camera);
-  command->add_option("--height", options->height_px, "Of the picture [px, 480]")
+  command->add_option("--height", options->height_px, "Height of the pictures [px, 480]")
       ->check(whole_number_within(32, 8192))
       ->excludes(camera);
-  command->add_option("--rate", options->rate_hz, "Frames per second [the scene's run.rate_hz]")
+  command->add_option("--rate", options->rate_hz, "Frame rate [Hz, the scene's run.rate_hz]")
       ->check(frame_rate());
-  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
+  command->add_option("--until", options->until_s, "End time [s, the scene's run.until_s]")
+      ->check(positive_number());
   command->add_option("--crf", options->quality, "H.264 quality, 0 best .. 51 [14]")
       ->check(whole_number_within(0, 51));
   command->add_flag("--lossless", options->lossless, "FFV1 instead of H.264 (needs .mkv)")

@@ -67,7 +67,7 @@ void add_report_command(CLI::App& app) {
   command->add_option("--fit", options->fit, "Fit JSON made from that track")->needs("--track");
   command->add_option("-o,--output", options->output, "Page to write, .html")->required();
   command->add_option("--path-svg", options->path_svg,
-                      "Also write the path as a picture for papers");
+                      "Also write the path as a picture for papers (.svg)");
   add_json_flag(*command, options->json);
   command->footer("Example:\n  trochoid report ring.trochoid/ -o report.html");
   command->callback([options] { run(*options); });

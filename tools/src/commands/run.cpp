@@ -155,7 +155,8 @@ void write_data(Run& run, const RunOptions& options, const fs::path& folder) {
   run.fit->scene_toml = data::to_toml(kept);
   run.fit->versions["trochoid"] = TROCHOID_VERSION;
   run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(folder / (stem + ".track.csv"));
-  run.fit->inputs[run.tracked.file.source] = run.tracked.file.source_sha256;
+  add_recording(run.fit->inputs, run.tracked.file.source, run.tracked.file.source_sha256,
+                stem + ".track.csv");
   if (!options.inputs.scene.empty()) add_checksum(run.fit->inputs, options.inputs.scene);
   if (run.camera) add_checksum(run.fit->inputs, folder / "camera.json");
   data::write_fit(*run.fit, folder / (stem + ".fit.json"));
@@ -210,11 +211,12 @@ std::string command_line(const RunOptions& options) {
   add("--from", choices.from);
   add("--to", choices.to);
   if (choices.objects) add("--objects", std::to_string(*choices.objects));
-  if (choices.rate_hz) add("--rate", fmt::format("{:g}", *choices.rate_hz));
+  if (choices.rate_hz) add("--rate", fmt::format("{}", *choices.rate_hz));
   if (choices.effort != tracking::Effort::normal) add("--effort", effort_name(choices.effort));
   if (options.free_pivot) line += " --free-pivot";
-  if (options.slow > 0.0) add("--slow", fmt::format("{:g}", options.slow));
+  if (options.slow > 0.0) add("--slow", fmt::format("{}", options.slow));
   if (options.seed != 1) add("--seed", std::to_string(options.seed));
+  add("-o", options.output);
   return line;
 }
 
@@ -319,14 +321,15 @@ std::shared_ptr<RunOptions> add_options(CLI::App& command) {
                      "Folder to make (default: VIDEO's name with .trochoid)");
   command
       .add_option("--model", options->model,
-                  "Model to fit, or auto: compare; overrides the scene's")
+                  "Model to fit, instead of the scene's; auto: compare those that make sense")
       ->check(fitted_model());
-  command.add_flag("--free-pivot", options->free_pivot, "Fit the pivot's x and y (top)");
+  command.add_flag("--free-pivot", options->free_pivot,
+                   "Also fit where the pivot is, x and y (model top)");
   command
       .add_option("--slow", options->slow,
                   "Overlay plays this many times slower (default: at most 60 frames/s)")
       ->check(number_within(0.01, 1000.0));
-  command.add_option("--seed", options->seed, "Seed of everything random")->check(seed());
+  command.add_option("--seed", options->seed, "Seed of everything random [1]")->check(seed());
   add_json_flag(command, options->json);
   return options;
 }

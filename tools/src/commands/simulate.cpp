@@ -136,6 +136,13 @@ void check_rows(const std::string& scene, const data::RunSettings& run) {
         scene, run.until_s, run.rate_hz, 1.0 / run.until_s));
 }
 
+data::Scene wanted_scene(const SimulateOptions& options) {
+  data::Scene scene = options.fit.empty() ? load_scene(options.scene)
+                                          : fitted_scene(data::read_fit(options.fit), options.arc);
+  apply_overrides(options, scene);
+  return scene;
+}
+
 void simulate_scene(const SimulateOptions& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
@@ -146,10 +153,7 @@ void simulate_scene(const SimulateOptions& options) {
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) check_animation_name(options.animation);
 #endif
-  data::Scene scene = options.fit.empty() ? load_scene(options.scene)
-                                          : fitted_scene(data::read_fit(options.fit), options.arc);
-  apply_overrides(options, scene);
-  if (options.steady) return print_steady(scene, options.json);
+  const data::Scene scene = wanted_scene(options);
   check_rows(named.string(), scene.run);
   const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
   if (run.values.rows() == 0)
@@ -181,6 +185,7 @@ void run(const SimulateOptions& options) {
     throw InputError(
         "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
         "a fit with --fit FILE");
+  if (options.steady) return print_steady(wanted_scene(options), options.json);
   simulate_scene(options);
 }
 
@@ -199,13 +204,18 @@ void add_simulate_command(CLI::App& app) {
       ->check(whole_number())
       ->needs("--fit");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");
-  command->add_option("--until", options->until_s, "End time [s]")->check(positive_number());
-  command->add_option("--rate", options->rate_hz, "Output rate [Hz]")->check(positive_number());
-  command->add_option("--tolerance", options->tolerance, "Integration tolerance")
+  command->add_option("--until", options->until_s, "End time [s, the scene's run.until_s]")
+      ->check(positive_number());
+  command->add_option("--rate", options->rate_hz, "Rows per second [Hz, the scene's run.rate_hz]")
+      ->check(positive_number());
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   "Relative tolerance of the integration [the scene's run.tolerance]")
       ->check(number_within(1e-15, 0.1));
   command->add_option("--model", options->model, "Model, instead of the scene's");
   command->add_option("--integrator", options->integrator,
-                      "auto, dop853, taylor, radau, cvode-adams, cvode-bdf or arkode");
+                      "Method, instead of the scene's: auto, dop853, taylor, radau, cvode-adams, "
+                      "cvode-bdf or arkode");
   command->add_flag("--thesis", options->thesis,
                     "Add body rates, angular momentum, wrapped angles and running integrals");
   command->add_option("--plots", options->plots,

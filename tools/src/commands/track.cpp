@@ -29,17 +29,26 @@ struct TrackCommandOptions {
   bool json = false;
 };
 
-/// Run times live beside the track, so that the track itself is the same from run to run.
+/// Run times live beside the track, so that the track itself is the same from run to run. Beside a
+/// device or a pipe (/dev/stdout, also where it leads into a file) there is no place for them:
+/// empty.
 fs::path timing_file(fs::path track) {
+  std::error_code ignored;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(track, ignored).parent_path(), ignored);
+  if (folder == "/dev" || folder.string().starts_with("/proc/") ||
+      (fs::exists(track, ignored) && !fs::is_regular_file(track, ignored)))
+    return {};
   return track.replace_extension(".timing.json");
 }
 
 void write_timing(const fs::path& track, double seconds, const tracking::TrackSummary& summary) {
+  const fs::path file = timing_file(track);
+  if (file.empty()) return;
   const nlohmann::json timing = {{"command", "track"},
                                  {"seconds", seconds},
                                  {"frames", summary.frames},
                                  {"frames_per_s", static_cast<double>(summary.frames) / seconds}};
-  data::write_text(timing.dump(2) + "\n", timing_file(track));
+  data::write_text(timing.dump(2) + "\n", file);
 }
 
 /// Frame by frame what deserves a look: gaps, and samples to be doubted.
@@ -104,7 +113,7 @@ void run(const TrackCommandOptions& options) {
       inputs.scene.empty() ? data::Scene{} : data::read_scene(inputs.scene), options.choices);
   const std::optional<data::Camera> camera = named_camera(inputs.camera, scene, inputs.scene);
   tracking::TrackOptions how = track_options(scene, options.choices);
-  if (!options.edges.empty()) how.edges = options.edges;
+  how.edges = !options.edges.empty();
   tracking::TrackResult result;
   {
     Progress progress("track");
@@ -113,6 +122,7 @@ void run(const TrackCommandOptions& options) {
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
   data::write_track(result.file, options.output);
+  if (result.edges) data::write_table(*result.edges, options.edges);
   std::optional<tracking::SmoothTrack> smoothed;
   if (!options.smooth.empty()) {
     smoothed = tracking::smooth_track(result.file);

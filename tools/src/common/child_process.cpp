@@ -75,6 +75,13 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
   return run;
 }
 
+std::string last_line(const std::string& text) {
+  const std::size_t end = text.find_last_not_of(" \n\r");
+  if (end == std::string::npos) return {};
+  const std::size_t start = text.find_last_of("\n\r", end);
+  return text.substr(start == std::string::npos ? 0 : start + 1, end - (start + 1) + 1);
+}
+
 std::string own_path() {
   return "/proc/self/exe";
 }

@@ -19,6 +19,9 @@ struct ChildRun {
 [[nodiscard]] ChildRun run_child(const std::vector<std::string>& arguments,
                                  const std::filesystem::path& output = "/dev/null");
 
+/// The last line with anything in it: what a program complained of when it ended.
+[[nodiscard]] std::string last_line(const std::string& text);
+
 /// The running program, as run_child() takes it: the one that runs, also once another lies in its
 /// place or it has been moved.
 [[nodiscard]] std::string own_path();

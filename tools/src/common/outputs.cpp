@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -27,14 +29,10 @@ fs::path camera_of(const fs::path& input) {
   }
 }
 
-void check_apart(const fs::path& output, const fs::path& input) {
-  if (input.empty()) return;
+bool is_same(const fs::path& a, const fs::path& b) {
+  if (a.empty() || b.empty()) return false;
   std::error_code ignored;
-  if (fs::equivalent(output, input, ignored))
-    throw InputError(fmt::format(
-        "{}: is read or written by this command already; name another output", output.string()));
-  if (plain(output) == plain(input))
-    throw InputError(fmt::format("{}: is named for two outputs; name two files", output.string()));
+  return fs::equivalent(a, b, ignored) || plain(a) == plain(b);
 }
 
 }  // namespace
@@ -43,15 +41,22 @@ void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (output.empty()) return;
   data::check_writable(output);
   for (const fs::path& input : inputs) {
-    check_apart(output, input);
-    check_apart(output, camera_of(input));
+    if (is_same(output, input))
+      throw InputError(
+          fmt::format("{}: is read by this command; name another output", output.string()));
+    if (is_same(output, camera_of(input)))
+      throw InputError(
+          fmt::format("{}: is the camera file of {}, which this command reads; name another output",
+                      output.string(), input.string()));
   }
 }
 
-void check_outputs(const std::vector<fs::path>& outputs, std::vector<fs::path> inputs) {
-  for (const fs::path& output : outputs) {
-    check_output(output, inputs);
-    inputs.push_back(output);
+void check_outputs(const std::vector<fs::path>& outputs, const std::vector<fs::path>& inputs) {
+  for (auto output = outputs.begin(); output != outputs.end(); ++output) {
+    check_output(*output, inputs);
+    if (std::any_of(outputs.begin(), output, [&](const auto& b) { return is_same(*output, b); }))
+      throw InputError(
+          fmt::format("{}: is named for two outputs; name two files", output->string()));
   }
 }
 

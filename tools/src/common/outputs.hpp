@@ -14,7 +14,7 @@ void check_output(const std::filesystem::path& output,
 
 /// The same for all that one command writes, none of which may be another.
 void check_outputs(const std::vector<std::filesystem::path>& outputs,
-                   std::vector<std::filesystem::path> inputs);
+                   const std::vector<std::filesystem::path>& inputs);
 
 /// The same for a folder of results that is there or is to be made: no file may be in its place,
 /// nor its name be a picture's or a table's. @throws InputError naming it.

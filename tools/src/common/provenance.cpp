@@ -11,10 +11,33 @@ namespace trochoid::tools {
 
 namespace fs = std::filesystem;
 
-void add_checksum(std::map<std::string, std::string>& checksums, const fs::path& file) {
-  const std::string digest = data::sha256_of_file(file), name = file.filename().string();
+namespace {
+
+/// Two recordings may have one name, in folders of their own.
+void add_named(Checksums& checksums, const std::string& name, const std::string& longer_name,
+               const std::string& digest) {
   const auto known = checksums.find(name);
-  checksums[known == checksums.end() || known->second == digest ? name : file.string()] = digest;
+  checksums[known == checksums.end() || known->second == digest ? name : longer_name] = digest;
+}
+
+}  // namespace
+
+void add_checksum(Checksums& checksums, const fs::path& file) {
+  add_named(checksums, file.filename().string(), file.string(), data::sha256_of_file(file));
+}
+
+void add_track(Checksums& checksums, const fs::path& file) {
+  const std::string digest = data::sha256_of_file(file);
+  for (const auto& [name, known] : checksums)
+    if (known == digest)
+      throw InputError(
+          fmt::format("{}: is the same track as {}; a recording counts once", file.string(), name));
+  add_named(checksums, file.filename().string(), file.string(), digest);
+}
+
+void add_recording(Checksums& checksums, const std::string& source, const std::string& sha256,
+                   const std::string& track) {
+  if (!sha256.empty()) add_named(checksums, source, "source of " + track, sha256);
 }
 
 void check_made_from(const data::Fit& fit, const fs::path& fit_path, const fs::path& track_path) {

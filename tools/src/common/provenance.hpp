@@ -7,8 +7,19 @@
 
 namespace trochoid::tools {
 
-/// Adds a file and its SHA-256 under its name; a second file of that name, under its folder too.
-void add_checksum(std::map<std::string, std::string>& checksums, const std::filesystem::path& file);
+/// SHA-256 of files by name, as Fit::inputs keeps them.
+using Checksums = std::map<std::string, std::string>;
+
+/// Adds a file under its name; a second file of that name, under its folder too.
+void add_checksum(Checksums& checksums, const std::filesystem::path& file);
+
+/// The same for a track file. @throws InputError if it is among them: a recording counts once.
+void add_track(Checksums& checksums, const std::filesystem::path& file);
+
+/// Adds the recording that a track tells of, if it tells its checksum; where the name is another's,
+/// as "source of `track`".
+void add_recording(Checksums& checksums, const std::string& source, const std::string& sha256,
+                   const std::string& track);
 
 /// Refuses to show a fit over a track it was not made from.
 /// @throws InputError if the fit tells the checksums of what it read and the track is none of them.

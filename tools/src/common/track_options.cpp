@@ -18,7 +18,7 @@ const std::map<std::string, tracking::Effort> kEfforts{{"quick", tracking::Effor
                                                        {"normal", tracking::Effort::normal},
                                                        {"exact", tracking::Effort::exact}};
 
-constexpr int kMostObjects = 64;
+constexpr int kMostObjects = data::TrackingSettings::kMostObjects;
 
 std::optional<Eigen::Vector2d> point_named(const std::string& text) {
   double x = 0.0, y = 0.0;

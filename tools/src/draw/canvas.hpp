@@ -57,7 +57,7 @@ class Ink {
 enum class Align { left, centre, right };
 
 /// Anti-aliased text, `height_px` the height of a capital; `at` is the left, middle or right end of
-/// the base line. ASCII only.
+/// the base line. The font is ASCII's: Latin letters lose their accents, the rest is shown as "?".
 void draw_text(cv::Mat& picture, const std::string& text, const cv::Point2d& at, double height_px,
                const cv::Scalar& colour, Align align = Align::left);
 /// The same over a dark halo, for text inside a picture.

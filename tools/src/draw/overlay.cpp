@@ -83,7 +83,8 @@ class OverlayPainter {
  private:
   void draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const;
   void draw_predicted(cv::Mat& picture, const ObjectPaths& paths, double t_s) const;
-  void draw_observed(cv::Mat& picture, std::size_t object, double t_s);
+  void draw_past(cv::Mat& picture, double t_s);
+  void draw_trail(cv::Mat& picture, std::size_t object, double t_s) const;
   void draw_now(cv::Mat& picture, const ObjectPaths& paths, const tracking::Frame& frame,
                 double t_s) const;
   void mark_missing(cv::Mat& picture) const;
@@ -94,7 +95,7 @@ class OverlayPainter {
   int header_px_, height_px_;
   ResidualStrip strip_;
   Ink whole_prediction_, past_points_;
-  std::vector<std::size_t> drawn_;  ///< observed points already in past_points_, per object
+  std::vector<std::size_t> drawn_;  ///< observed points in past_points_, per object
 };
 
 OverlayPainter::OverlayPainter(const OverlayContent& content, const tracking::VideoInfo& info,
@@ -120,9 +121,10 @@ cv::Mat OverlayPainter::paint(const tracking::Frame& frame, double t_s) {
   cv::Mat page(height_px_, view_.size().width, CV_8UC3, kBand);
   cv::Mat picture = view_.picture(frame.bgr);
   whole_prediction_.lay_on(picture, future_stroke());
+  for (const ObjectPaths& paths : content_.objects()) draw_predicted(picture, paths, t_s);
+  draw_past(picture, t_s);
   for (std::size_t i = 0; i < content_.objects().size(); ++i) {
-    draw_predicted(picture, content_.objects()[i], t_s);
-    draw_observed(picture, i, t_s);
+    draw_trail(picture, i, t_s);
     draw_now(picture, content_.objects()[i], frame, t_s);
   }
   draw_scale_bar(picture, content_.scale_px_per_m(), view_.factor, text_px_);
@@ -158,16 +160,25 @@ void OverlayPainter::draw_predicted(cv::Mat& picture, const ObjectPaths& paths, 
   ink.lay_on(picture, stroke);
 }
 
-void OverlayPainter::draw_observed(cv::Mat& picture, std::size_t object, double t_s) {
+// Every point up to now, of all objects at once: laid on for each, all would be as many times as
+// opaque.
+void OverlayPainter::draw_past(cv::Mat& picture, double t_s) {
   const Stroke faint{.colour = palette::observed, .width_px = 1, .halo_px = 0};
+  for (std::size_t object = 0; object < drawn_.size(); ++object) {
+    const std::vector<ObservedPoint>& points = content_.objects()[object].observed;
+    std::size_t& next = drawn_[object];
+    for (; next < points.size() && points[next].t_s <= t_s; ++next)
+      past_points_.dot(view_(points[next].px), 1.0, faint, 0.5);
+  }
+  past_points_.lay_on(picture, faint);
+}
+
+// The last moments of the past, brighter towards now.
+void OverlayPainter::draw_trail(cv::Mat& picture, std::size_t object, double t_s) const {
   const Stroke bright = observed_stroke();
   const std::vector<ObservedPoint>& points = content_.objects()[object].observed;
-  std::size_t& next = drawn_[object];
-  for (; next < points.size() && points[next].t_s <= t_s; ++next)
-    past_points_.dot(view_(points[next].px), 1.0, faint, 0.5);
-  past_points_.lay_on(picture, faint);
   Ink trail(picture.size());
-  for (std::size_t i = next; i-- > 0;) {
+  for (std::size_t i = drawn_[object]; i-- > 0;) {
     const double age = (t_s - points[i].t_s) / trail_s_;
     if (age > 1.0) break;
     trail.dot(view_(points[i].px), 1.9, bright, 0.95 - 0.75 * age);
@@ -193,11 +204,10 @@ void OverlayPainter::draw_now(cv::Mat& picture, const ObjectPaths& paths,
     ink.lay_on(picture, predicted);
     ink.clear();
   }
-  const auto at = std::lower_bound(paths.observed.begin(), paths.observed.end(), t_s - 1e-9,
-                                   [](const ObservedPoint& p, double t) { return p.t_s < t; });
-  if (at == paths.observed.end() || (at->frame >= 0 && at->frame != frame.index)) return;
+  const ObservedPoint* const seen = content_.observed_in(paths, frame.index, t_s);
+  if (seen == nullptr) return;
   const Stroke observed{.colour = palette::observed, .width_px = 2, .halo_px = 1};
-  ink.ring(view_(at->px), 6.0, observed, 1.0);
+  ink.ring(view_(seen->px), 6.0, observed, 1.0);
   ink.lay_on(picture, observed);
 }
 
@@ -256,6 +266,8 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
   Progress progress("overlay");
   constexpr double kLongestPause_s = 2.0;  // on the screen
   Pace pace(rate_hz, kLongestPause_s / written.slowed);
+  // How many frames lie in a range is known when they are decoded.
+  const std::int64_t total = options.from.empty() && options.to.empty() ? info.frames : 0;
   std::int64_t drawn = 0;
   cv::Mat picture;
   const auto show = [&](std::int64_t frame, double t_s) {
@@ -274,7 +286,7 @@ OverlayFrames write_overlay(const OverlayInput& input, const OverlayOptions& opt
     }
     picture = painter.paint(*frame, t_s);
     show(frame->index, t_s);
-    progress.update(++drawn, info.frames);
+    progress.update(++drawn, total);
   }
   overlay.finish();
   overlay.commit();

@@ -136,6 +136,7 @@ void OverlayContent::collect(const data::Track& track) {
       ++with_metres;
     }
   }
+  paths.usual_step_s = data::usual_step_s(paths.observed, &ObservedPoint::t_s);
   if (camera_ && with_metres > 0 && !scale_px_per_m_) {
     const auto jacobian = camera_->jacobian_px_per_m(sum_m / with_metres);
     scale_px_per_m_ = std::sqrt(std::abs(jacobian.leftCols<2>().determinant()));
@@ -166,7 +167,27 @@ double OverlayContent::time_of_frame(std::int64_t frame, double fallback_s) cons
 
 bool OverlayContent::detected(std::int64_t frame, double t_s) const {
   if (frame_times_.numbered()) return frame_times_.has(frame);
-  return t_s >= first_s_ && t_s <= last_s_;
+  return std::any_of(objects_.begin(), objects_.end(), [&](const ObjectPaths& paths) {
+    return observed_in(paths, frame, t_s) != nullptr;
+  });
+}
+
+const ObservedPoint* OverlayContent::observed_in(const ObjectPaths& paths, std::int64_t frame,
+                                                 double t_s) const {
+  const std::vector<ObservedPoint>& points = paths.observed;
+  const auto away_s = [t_s](const ObservedPoint& point) { return std::abs(point.t_s - t_s); };
+  auto nearest =
+      std::lower_bound(points.begin(), points.end(), t_s,
+                       [](const ObservedPoint& point, double t) { return point.t_s < t; });
+  if (nearest != points.begin() &&
+      (nearest == points.end() || away_s(*std::prev(nearest)) < away_s(*nearest)))
+    --nearest;
+  if (nearest == points.end()) return nullptr;
+  constexpr double kRounding_s = 1e-9;
+  const bool here = nearest->frame >= 0
+                        ? nearest->frame == frame
+                        : away_s(*nearest) <= 0.5 * paths.usual_step_s + kRounding_s;
+  return here ? &*nearest : nullptr;
 }
 
 std::optional<data::Pose<>> OverlayContent::tracked_pose(int object, std::int64_t frame) const {

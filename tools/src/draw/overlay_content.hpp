@@ -40,6 +40,7 @@ struct PredictedLine {
 struct ObjectPaths {
   int object = 0;
   std::vector<ObservedPoint> observed;
+  double usual_step_s = 0.0;  ///< between points; 0 if there is one only
   std::vector<PredictedLine> predicted;
   std::vector<Residual> residuals;  ///< empty without a fit
 };
@@ -63,6 +64,10 @@ class OverlayContent {
   [[nodiscard]] double time_of_frame(std::int64_t frame, double fallback_s) const;
   /// As FrameTimes has it.
   [[nodiscard]] double usual_step_s() const { return frame_times_.usual_step_s(); }
+  /// The object's point in the frame; of points without frame numbers the nearest, within half a
+  /// usual step, so that gaps stay gaps. Null if there is none.
+  [[nodiscard]] const ObservedPoint* observed_in(const ObjectPaths& paths, std::int64_t frame,
+                                                 double t_s) const;
   /// Whether any object was found in the frame.
   [[nodiscard]] bool detected(std::int64_t frame, double t_s) const;
   [[nodiscard]] double first_s() const { return first_s_; }

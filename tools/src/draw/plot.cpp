@@ -4,9 +4,9 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 
+#include "common/child_process.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -119,15 +119,18 @@ std::string script(const std::vector<Axes>& panels, const std::filesystem::path&
 
 void write_plot(const std::vector<Axes>& panels, const std::filesystem::path& path) {
   data::PendingFile pending(path);
-  const std::string commands = script(panels, path, pending.path());
-  std::FILE* gnuplot = popen("gnuplot 2>/dev/null", "w");
-  if (gnuplot == nullptr) throw InputError("gnuplot could not be started");
-  std::fwrite(commands.data(), 1, commands.size(), gnuplot);
-  const int status = pclose(gnuplot);
-  if (status != 0 || !std::filesystem::exists(pending.path()))
-    throw InputError(fmt::format(
-        "{}: gnuplot did not draw the plot; install the package gnuplot-nox", path.string()));
-  pending.commit();
+  const data::PendingFile commands(path.string() + ".gnuplot");
+  data::write_text(script(panels, path, pending.path()), commands.path());
+  // Absolute: a name that begins with a dash would be an option.
+  const ChildRun gnuplot =
+      run_child({"gnuplot", std::filesystem::absolute(commands.path()).string()});
+  if (!gnuplot.started)
+    throw InputError(fmt::format("{}: gnuplot {}; install the package gnuplot-nox", path.string(),
+                                 last_line(gnuplot.error_output)));
+  if (gnuplot.exit_status == 0 && std::filesystem::exists(pending.path())) return pending.commit();
+  const std::string why = last_line(gnuplot.error_output);
+  throw InputError(fmt::format("{}: gnuplot did not draw the plot: {}", path.string(),
+                               why.empty() ? "it does not say why; is the disk full?" : why));
 }
 
 }  // namespace trochoid::tools

@@ -26,7 +26,8 @@ struct Axes {
 
 /// Draws panels below each other, more than three in two columns, as SVG or PNG, by the file's
 /// ending, in colours that colour-blind readers tell apart. Drawn by gnuplot; whole file or none.
-/// @throws InputError if gnuplot is not installed or the ending is another.
+/// @throws InputError if gnuplot is not installed or draws nothing (with its own last word), or the
+/// ending is another.
 void write_plot(const std::vector<Axes>& panels, const std::filesystem::path& path);
 
 }  // namespace trochoid::tools

@@ -45,7 +45,6 @@ class PictureRenderer {
   /// What a camera makes of it: blur, brightness, transfer, noise of frame `index`, 8 bit.
   [[nodiscard]] cv::Mat picture(const cv::Mat& light, std::int64_t index,
                                 double brightness = 1.0) const;
-  [[nodiscard]] const RenderStyle& style() const { return style_; }
 
  private:
   struct Posed;

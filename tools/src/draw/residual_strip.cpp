@@ -33,15 +33,6 @@ double limit_mm(const std::vector<Residual>& list) {
   return limit > 0.0 ? limit : 1.0;
 }
 
-// Typical spacing of the samples, to tell a gap from the ordinary step.
-double usual_step_s(const std::vector<ObservedPoint>& points) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < points.size(); ++i)
-    steps.push_back(points[i].t_s - points[i - 1].t_s);
-  if (steps.empty()) return 0.0;
-  return data::median(std::move(steps));
-}
-
 }  // namespace
 
 ResidualStrip::ResidualStrip(const OverlayContent& content, double from_s, double to_s,
@@ -89,7 +80,7 @@ void ResidualStrip::draw_bands(const ObjectPaths& paths, const Row& row) {
   const auto columns = static_cast<std::size_t>(picture_.cols);
   std::vector<double> sigma_mm(columns, 0.0);
   double last_x = -1.0, last_mm = 0.0;
-  const double step_px = (x_of(usual_step_s(paths.observed)) - x_of(0.0)) * 1.5 + 1.0;
+  const double step_px = (x_of(paths.usual_step_s) - x_of(0.0)) * 1.5 + 1.0;
   for (const Residual& residual : paths.residuals) {
     const double mm = residual.sigma_m.maxCoeff() * kMmPerM;
     const double x = x_of(residual.t_s);
@@ -155,7 +146,7 @@ void ResidualStrip::draw_row(const ObjectPaths& paths, const Row& row, const std
 }
 
 void ResidualStrip::draw_gaps(const ObjectPaths& paths, double top_px, double bottom_px) {
-  const double usual_s = usual_step_s(paths.observed);
+  const double usual_s = paths.usual_step_s;
   const auto hatch = [&](double from_s, double to_s) {
     const double x0 = std::max(x_of(from_s), left_px_), x1 = std::min(x_of(to_s), right_px_);
     for (double x = x0; x < x1; x += 4.0)

@@ -36,9 +36,8 @@ struct Moment {
 // First and last sample of each object: where the body's outline is drawn.
 std::vector<Moment> ends_of(const ObjectPaths& paths) {
   if (paths.observed.empty()) return {};
-  const auto& [first, first_s, first_px] = paths.observed.front();
-  const auto& [last, last_s, last_px] = paths.observed.back();
-  return {{first, first_s}, {last, last_s}};
+  const ObservedPoint &first = paths.observed.front(), &last = paths.observed.back();
+  return {{first.frame, first.t_s}, {last.frame, last.t_s}};
 }
 
 // The part of the frame that holds every path and the body at its ends, with a margin, not narrower

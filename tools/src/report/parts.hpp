@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/prediction.hpp"
+#include "common/value_words.hpp"
 #include "report/report.hpp"
 
 /// Pieces of the report; see report.cpp for how they are put together.
@@ -42,10 +43,6 @@ struct Verdict {
   std::vector<std::string> remarks;
 };
 [[nodiscard]] Verdict judge(const ReportFacts& facts);
-/// "0.0450 ± 0.0003" or "(3.1 ± 0.2) × 10^-5": as many digits as the error justifies (two of it).
-[[nodiscard]] std::string value_words(double value, double sigma);
-/// "0.034", "1.2e-05": short, for tables.
-[[nodiscard]] std::string short_number(double value);
 
 // --- figures (SVG) ---
 [[nodiscard]] std::string path_figure(const ReportFacts& facts);

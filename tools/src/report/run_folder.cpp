@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/json_object.hpp"
 #include "common/recording_name.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -14,15 +14,14 @@ namespace trochoid::tools {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using Json = nlohmann::ordered_json;
 
-json read_json(const fs::path& path) {
-  std::ifstream file(path);
-  json value = json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (value.is_discarded() || !value.is_object())
+Json results_in(const fs::path& path) {
+  std::optional<Json> value = read_json_object(path);
+  if (!value)
     throw InputError(
         fmt::format("{}: is not a JSON object; run the recording again", path.string()));
-  return value;
+  return *std::move(value);
 }
 
 // The only file of the folder whose name ends like this; nothing if there is none.
@@ -40,23 +39,23 @@ std::optional<fs::path> file_ending(const fs::path& folder, const std::string& e
 }
 
 template <class Value>
-Value value_or(const json& object, const char* key, Value otherwise) {
+Value value_or(const Json& object, const char* key, Value otherwise) {
   const auto found = object.find(key);
   if (found == object.end()) return otherwise;
   try {
     return found->get<Value>();
-  } catch (const json::exception&) {
+  } catch (const Json::exception&) {
     throw InputError(
         fmt::format("{}: '{}' is not what a run writes; run the recording again", kRunFile, key));
   }
 }
 
-void read_facts(const json& run, ReportInput& input) {
+void read_facts(const Json& run, ReportInput& input) {
   input.title = value_or<std::string>(run, "video", input.title);
   input.command = value_or<std::string>(run, "command", "");
   input.no_fit_reason = value_or<std::string>(run, "no_fit_reason", "");
   input.frames = value_or<std::int64_t>(run, "frames", 0);
-  const json overlay = value_or<json>(run, "overlay", json::object());
+  const Json overlay = value_or<Json>(run, "overlay", Json::object());
   if (!overlay.is_object()) return;
   input.video_rate_hz = value_or<double>(overlay, "frame_rate_hz", 0.0);
   input.video_t_s = value_or<std::vector<double>>(overlay, "t_s", {});
@@ -64,7 +63,7 @@ void read_facts(const json& run, ReportInput& input) {
 
 // Beginning of the names of the track, the fit and the times that a run left.
 std::string stem_of_run(const fs::path& folder) try {
-  const json run = read_json(folder / kRunFile);
+  const Json run = results_in(folder / kRunFile);
   return value_or(run, "stem", recording_name(value_or<std::string>(run, "video", "")));
 } catch (const InputError&) {
   throw InputError(
@@ -136,10 +135,10 @@ ReportInput read_run_folder(const fs::path& folder) {
     input.scene->camera.file = fs::path(input.scene->camera.file).filename().string();
   }
   if (fs::exists(folder / "overlay.mp4", code)) input.video = folder / "overlay.mp4";
-  if (fs::exists(folder / kRunFile, code)) read_facts(read_json(folder / kRunFile), input);
+  if (fs::exists(folder / kRunFile, code)) read_facts(results_in(folder / kRunFile), input);
   const std::string stem = track->stem().stem().string();
   if (const fs::path timing = folder / (stem + ".timing.json"); fs::exists(timing, code)) {
-    const json times = read_json(timing);
+    const Json times = results_in(timing);
     for (const auto& [stage, seconds] : times.items())
       if (seconds.is_number() && stage.ends_with("_s"))
         input.times_s.emplace_back(stage.substr(0, stage.size() - 2), seconds.get<double>());

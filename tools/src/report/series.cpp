@@ -14,14 +14,6 @@ namespace {
 using nlohmann::json;
 constexpr std::size_t kMostRows = 20000;  // a page with more is slow and shows no more
 
-double usual_step_s(const data::Track& track) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < track.samples.size(); ++i)
-    steps.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
-  if (steps.empty()) return 0.0;
-  return data::median(std::move(steps));
-}
-
 struct SampleRow {
   double t_s;
   const data::TrackSample* sample;  ///< none within a gap
@@ -29,7 +21,7 @@ struct SampleRow {
 
 // The samples, and the frames missing between them, so that gaps look like gaps.
 std::vector<SampleRow> rows_of(const data::Track& track) {
-  const double step_s = usual_step_s(track);
+  const double step_s = data::usual_step_s(track.samples, &data::TrackSample::t_s);
   const std::size_t stride = track.samples.size() / kMostRows + 1;
   std::vector<SampleRow> rows;
   for (std::size_t i = 0; i < track.samples.size(); i += stride) {

@@ -5,7 +5,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <random>
 #include <utility>
 
 #include "commands.hpp"
@@ -92,8 +91,7 @@ FitOutcome measure(const FitSetting& setting, const ChainOptions& options) {
   FitOutcome outcome;
   std::vector<double> errors, sigmas, times_ms, integration;
   for (int i = 0; i < options.count; ++i) {
-    std::seed_seq seed{options.seed, static_cast<std::uint64_t>(i)};
-    std::mt19937_64 generator(seed);
+    std::mt19937_64 generator = generator_of(options.seed, i);
     const MadeTrack made = make_track(setting.tracks, generator);
     fitting::FitOptions how = setting.how;
     if (setting.start_off) how.start = start_off(made, generator);

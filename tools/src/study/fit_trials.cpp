@@ -20,12 +20,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Scenes are independent of each other and of the order in which threads take them.
-std::mt19937_64 generator_of(std::uint64_t seed, int scene) {
-  std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(scene)};
-  return std::mt19937_64(sequence);
-}
-
 // What a person writes who sees only the picture: l a little above the reach of the path, the axis
 // towards the first sample, at rest, one per second for the rest.
 std::map<std::string, double> blind_start(const MadeTrack& made) {

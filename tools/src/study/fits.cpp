@@ -156,20 +156,21 @@ void add_study_fits(CLI::App& study) {
       ->check(whole_number());
   command
       ->add_option("--noise", options->tracks.noise,
-                   "Standard deviation of a position over the body's length (l or radius)")
+                   "Standard deviation of a position, relative to the body's length (l or radius)")
       ->capture_default_str()
       ->check(positive_number());
   command
       ->add_option("--duration", options->tracks.duration_s,
                    "Length of the tracks [s]; default: by the scene, 2.5 nutations of a top")
       ->check(positive_number());
-  command->add_option("--rate", options->tracks.rate_hz, "Samples per second with --duration")
+  command->add_option("--rate", options->tracks.rate_hz, "Samples per second [Hz]")
       ->capture_default_str()
+      ->needs("--duration")
       ->check(positive_number());
   command->add_option("--seed", options->seed, "Seed of scenes, noise and starts")
       ->capture_default_str()
       ->check(seed());
-  command->add_option("--threads", options->threads, "Fits at a time; 0: all cores")
+  command->add_option("--threads", options->threads, "Fits at a time; 0: all cores [0]")
       ->check(whole_number());
   command->add_option("--out", options->out, "Folder for the table and the diagram")
       ->capture_default_str();

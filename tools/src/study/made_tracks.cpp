@@ -327,6 +327,12 @@ MadeTrack make_track(const MadeTrackOptions& options, std::mt19937_64& generator
   return made;
 }
 
+std::mt19937_64 generator_of(std::uint64_t seed, int scene) {
+  // seed_seq takes 32 bits of each number.
+  std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(scene)};
+  return std::mt19937_64(sequence);
+}
+
 std::map<std::string, double> start_off(const MadeTrack& made, std::mt19937_64& generator) {
   std::map<std::string, double> start;
   for (const auto& [name, value] : made.truth) {

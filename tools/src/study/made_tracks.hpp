@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <random>
@@ -39,6 +40,10 @@ struct MadeTrackOptions {
 ///   puck     sliding and spinning flat on the face, friction 0.05..0.4, spin angle seen to 1 deg
 /// @throws InputError for an unknown model.
 [[nodiscard]] MadeTrack make_track(const MadeTrackOptions& options, std::mt19937_64& generator);
+
+/// Of the draws of one scene: scenes are independent of each other and of the order in which
+/// threads take them.
+[[nodiscard]] std::mt19937_64 generator_of(std::uint64_t seed, int scene);
 
 /// A start that is 30-50 % off in every parameter (0.3-0.5 where the truth is zero).
 [[nodiscard]] std::map<std::string, double> start_off(const MadeTrack& made,

@@ -208,7 +208,7 @@ void add_study_reference(CLI::App& study) {
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_option("--out", options->out, "Write our trajectories here, one CSV per case");
-  command->add_option("--tolerance", options->tolerance, "Integration tolerance")
+  command->add_option("--tolerance", options->tolerance, "Relative tolerance of the integration")
       ->capture_default_str()
       ->check(positive_number());
   command->footer("Example: trochoid study reference cases/ --out runs/");

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 struct TrackingStudyOptions {
   std::vector<fs::path> folders;
-  fs::path out = "study_tracking";
+  fs::path out = "study-tracking";
   bool baselines = false;
 };
 
@@ -239,8 +239,9 @@ void add_study_tracking(CLI::App& study_command) {
   auto options = std::make_shared<TrackingStudyOptions>();
   CLI::App* command = study_command.add_subcommand(
       "tracking", "Track recordings with truth.csv or reference_*.csv and score the tracks");
-  command->add_option("folders", options->folders, "Folders, one recording each")->required();
-  command->add_option("--out", options->out, "Folder for <name>.track.csv")->capture_default_str();
+  command->add_option("folders", options->folders, "Folders with one recording each")->required();
+  command->add_option("--out", options->out, "Folder for the tracks, NAME.track.csv")
+      ->capture_default_str();
   command->add_flag("--baselines", options->baselines,
                     "Also score OpenCV's usual ways: background subtraction, HoughCircles");
   command->footer("Example: trochoid study tracking data/samples/*/");

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -30,12 +31,13 @@ struct Attitude {
   double theta, phi, psi;
 };
 
-/// The one of two indistinguishable attitudes with the smaller tilt. Turned over about the axis of
-/// its mark (angle a in the body) a body shows spin pi - psi - 2 a.
+/// The one of two indistinguishable attitudes with the smaller tilt.
 Attitude folded(Attitude a, const data::Body& body) {
   if (!body.faces_look_alike() || a.theta <= 0.5 * data::kPi) return a;
   const double mark = body.marks.empty() ? 0.0 : body.marks.front().angle_rad;
-  return {data::kPi - a.theta, a.phi + data::kPi, data::kPi - a.psi - 2.0 * mark};
+  const data::Pose<> over = data::turned_over(
+      data::Pose<>{.theta_rad = a.theta, .phi_rad = a.phi, .psi_rad = a.psi}, mark);
+  return {over.theta_rad, over.phi_rad, over.psi_rad};
 }
 
 double turn_difference(double a, double b) {

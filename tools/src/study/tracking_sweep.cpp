@@ -337,8 +337,7 @@ void draw(const data::Table& table, const std::vector<Point>& all, const fs::pat
 }
 
 void run(const SweepOptions& options) {
-  check_output(options.output, {});
-  check_output(options.plot, {options.output});
+  check_outputs({options.output, options.plot}, {});
   const std::vector<Point> all = points();
   data::Table table;
   table.header = {{"trochoid study tracking-sweep", ""},
@@ -376,10 +375,10 @@ void add_study_tracking_sweep(CLI::App& study) {
       "tracking-sweep",
       "Error of the measured centre against noise, blur, contrast, size and tilt, beside the "
       "Cramer-Rao bound");
-  command->add_option("--draws", options->draws, "Pictures per row [16]")
+  command->add_option("--draws", options->draws, "Pictures per row of the table [16]")
       ->check(whole_number_within(3, 10000));
-  command->add_option("--seed", options->seed, "Of pictures and starts [1]")->check(seed());
-  command->add_option("-o,--output", options->output, "Table to write [tracking_sweep.csv]");
+  command->add_option("--seed", options->seed, "Seed of pictures and starts [1]")->check(seed());
+  command->add_option("-o,--output", options->output, "Table to write (CSV) [tracking_sweep.csv]");
   command->add_option("--plot", options->plot, "Plot to write (.svg, .png)");
   command->footer("Example: trochoid study tracking-sweep");
   command->callback([options] { run(*options); });

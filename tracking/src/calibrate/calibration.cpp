@@ -22,9 +22,14 @@ void check(const BoardPattern& pattern) {
   if (pattern.columns < 3 || pattern.rows < 3)
     throw InputError(
         fmt::format("a board of {} x {}: give at least 3 x 3", pattern.columns, pattern.rows));
-  if (!(pattern.square_m > 0.0)) throw InputError("the squares of the board need a size above 0");
+  if (!(pattern.square_m > 0.0))
+    throw InputError(
+        fmt::format("squares of {:g} m: those of a board need a size above 0", pattern.square_m));
   if (pattern.marker_m && !(*pattern.marker_m > 0.0 && *pattern.marker_m < pattern.square_m))
-    throw InputError("the markers of a ChArUco board must be smaller than its squares");
+    throw InputError(fmt::format(
+        "markers of {:g} m: those of a ChArUco board need a size above 0 and below that of its "
+        "squares, {:g} m",
+        *pattern.marker_m, pattern.square_m));
 }
 
 cv::Ptr<cv::aruco::Dictionary> dictionary_named(const std::string& name) {
@@ -146,6 +151,16 @@ bool seen_from_above(const BoardView& view) {
   return cross.determinant() < 0.0;  // image y points down
 }
 
+// Across the line the points spread over less than a thousandth of what they do along it.
+bool lie_on_a_line(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& point : points) {
+    const Eigen::Vector2d off = point - points.front();
+    scatter += off * off.transpose();
+  }
+  return scatter.determinant() <= 1e-6 * scatter.trace() * scatter.trace();
+}
+
 double rms_px(const data::Camera& camera, const FloorPoints& points, double height_m) {
   double sum = 0.0;
   for (std::size_t i = 0; i < points.table_m.size(); ++i)
@@ -175,23 +190,21 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
     throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
   std::vector<cv::Point3d> table;
   std::vector<cv::Point2d> image;
-  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (std::size_t i = 0; i < n; ++i) {
     table.emplace_back(points.table_m[i].x(), points.table_m[i].y(), 0.0);
     image.emplace_back(points.image_px[i].x(), points.image_px[i].y());
-    const Eigen::Vector2d off = points.table_m[i] - points.table_m[0];
-    scatter += off * off.transpose();
   }
-  // Across their line the points spread over less than a thousandth of what they do along it.
-  if (scatter.determinant() <= 1e-6 * scatter.trace() * scatter.trace())
-    throw InputError("the points of the floor lie on one line");
+  if (lie_on_a_line(points.table_m))
+    throw InputError(fmt::format("the {} points of the floor lie on one line", n));
   cv::Mat rotation, translation, attitude;
   const std::vector<double> distortion(camera.distortion.begin(), camera.distortion.end());
   bool solved = cv::solvePnP(table, image, matrix_of(camera), distortion, rotation, translation,
                              false, cv::SOLVEPNP_IPPE);
   if (solved)
     cv::solvePnPRefineLM(table, image, matrix_of(camera), distortion, rotation, translation);
-  if (!solved) throw NumericalError("the points of the floor determine no pose of the camera");
+  if (!solved)
+    throw NumericalError(
+        fmt::format("the {} points of the floor determine no pose of the camera", n));
   cv::Rodrigues(rotation, attitude);
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column)
@@ -202,74 +215,141 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
   camera.camera_from_table_m -= camera.camera_from_table.col(2) * height_m;
   if (camera.position_m().z() <= height_m)
     throw InputError(
-        "the points of the floor are seen from below; x, y and up must be "
-        "right-handed as seen by the camera");
+        fmt::format("the {} points of the floor are seen from below; x, y and up must be "
+                    "right-handed as seen by the camera",
+                    n));
   return rms_px(camera, points, height_m);
 }
 
-double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
-                             double radius_m, double height_m) {
-  constexpr std::size_t kFewest = 6;
-  constexpr int kIterations = 50;
-  if (rim_px.size() < kFewest)
-    throw InputError(
-        fmt::format("{} points of the rim; at least {} are needed", rim_px.size(), kFewest));
-  // The circle in camera axes: centre (3) and the plane's tilt about the line of sight (2),
-  // starting square to it at the distance its mean size says.
-  std::vector<Eigen::Vector3d> rays;
-  data::Camera bare = camera;
-  bare.camera_from_table.setIdentity();
-  bare.camera_from_table_m.setZero();
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector2d& p : rim_px) {
-    const Eigen::Vector3d d = bare.ray_from_image(p).direction;
-    rays.push_back(d / d.z());
-    middle += rays.back() / static_cast<double>(rim_px.size());
+namespace {
+
+/// A circle of known radius as the camera sees it, in camera axes: centre [m] and the tilt of its
+/// plane against square to the line of sight, whose normal is along (a, b, -1).
+using SeenCircle = Eigen::Matrix<double, 5, 1>;  // centre (3), a, b
+
+Eigen::Vector3d centre_of(const SeenCircle& circle) {
+  return circle.head<3>();
+}
+
+Eigen::Vector3d normal_of(const SeenCircle& circle) {
+  return Eigen::Vector3d(circle[3], circle[4], -1.0).normalized();
+}
+
+/// Rays through points of a rim, and how far a circle is from them.
+struct RimRays {
+  std::vector<Eigen::Vector3d> rays;  ///< camera axes, z = 1
+  double radius_m, focal_px;
+
+  RimRays(const data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px, double radius)
+      : radius_m(radius), focal_px(camera.fx) {
+    data::Camera bare = camera;
+    bare.camera_from_table.setIdentity();
+    bare.camera_from_table_m.setZero();
+    for (const Eigen::Vector2d& p : rim_px) {
+      const Eigen::Vector3d d = bare.ray_from_image(p).direction;
+      rays.push_back(d / d.z());
+    }
   }
-  double size = 0.0;
-  for (const auto& ray : rays) size += (ray - middle).norm() / static_cast<double>(rays.size());
-  constexpr double kLeast_px = 1.0;
-  if (!(size * camera.fx > kLeast_px))
-    throw InputError("the points of the rim lie within a pixel of each other");
-  Eigen::Matrix<double, 5, 1> x;
-  x << middle * (radius_m / size), 0.0, 0.0;
-  const auto residuals = [&](const Eigen::Matrix<double, 5, 1>& at) {
-    const Eigen::Vector3d centre = at.head<3>();
-    const Eigen::Vector3d normal = Eigen::Vector3d(at[3], at[4], -1.0).normalized();
+
+  /// Square to the line of sight, at the distance its mean size says.
+  [[nodiscard]] SeenCircle start() const {
+    constexpr double kLeast_px = 1.0;
+    const auto count = static_cast<double>(rays.size());
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const auto& ray : rays) middle += ray / count;
+    double size = 0.0;
+    for (const auto& ray : rays) size += (ray - middle).norm() / count;
+    if (!(size * focal_px > kLeast_px))
+      throw InputError("the points of the rim lie within a pixel of each other");
+    SeenCircle circle;
+    circle << middle * (radius_m / size), 0.0, 0.0;
+    return circle;
+  }
+
+  /// Distance of each point from the circle, in its plane [px].
+  [[nodiscard]] Eigen::VectorXd residuals(const SeenCircle& circle) const {
+    const Eigen::Vector3d centre = centre_of(circle), normal = normal_of(circle);
     Eigen::VectorXd r(static_cast<Eigen::Index>(rays.size()));
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const Eigen::Vector3d p = rays[i] * (centre.dot(normal) / rays[i].dot(normal));
-      r[static_cast<Eigen::Index>(i)] = ((p - centre).norm() - radius_m) * camera.fx / centre.z();
+      r[static_cast<Eigen::Index>(i)] = ((p - centre).norm() - radius_m) * focal_px / centre.z();
     }
     return r;
-  };
-  double damping = 1e-3;
+  }
+};
+
+double rms_of(const Eigen::VectorXd& residuals) {
+  return std::sqrt(residuals.squaredNorm() / static_cast<double>(residuals.size()));
+}
+
+/// Levenberg-Marquardt with differences. @throws NumericalError if it does not settle.
+SeenCircle nearest_circle(const RimRays& rim, const SeenCircle& start) {
+  constexpr int kIterations = 50;
+  constexpr double kHopeless = 1e9;     // damping: no step, however small, gets nearer
+  constexpr double kSettled_px = 1e-3;  // a step that brings the rms no nearer is the last needed
+  SeenCircle x = start;
+  double damping = 1e-3, gained_px = 0.0;
   for (int i = 0; i < kIterations; ++i) {
-    const Eigen::VectorXd r = residuals(x);
+    const Eigen::VectorXd r = rim.residuals(x);
     Eigen::MatrixXd J(r.size(), 5);
     for (int k = 0; k < 5; ++k) {
-      Eigen::Matrix<double, 5, 1> moved = x;
+      SeenCircle moved = x;
       const double step = 1e-6 * (k < 3 ? x[2] : 1.0);
       moved[k] += step;
-      J.col(k) = (residuals(moved) - r) / step;
+      J.col(k) = (rim.residuals(moved) - r) / step;
     }
     Eigen::Matrix<double, 5, 5> normal = J.transpose() * J;
     normal.diagonal() *= 1.0 + damping;
-    const Eigen::Matrix<double, 5, 1> next = x - normal.ldlt().solve(J.transpose() * r);
-    const bool better = next.allFinite() && residuals(next).squaredNorm() < r.squaredNorm();
+    const SeenCircle next = x - normal.ldlt().solve(J.transpose() * r);
+    const bool better = next.allFinite() && rim.residuals(next).squaredNorm() < r.squaredNorm();
     damping *= better ? 0.3 : 10.0;
-    if (better) x = next;
-    if (damping > 1e9) break;
+    if (better) {
+      gained_px = rms_of(r) - rms_of(rim.residuals(next));
+      x = next;
+    }
+    if (damping > kHopeless) return x;
   }
-  const Eigen::Vector3d up = Eigen::Vector3d(x[3], x[4], -1.0).normalized();
+  if (!(gained_px < kSettled_px))
+    throw NumericalError(fmt::format(
+        "no circle settles on the {} points of the rim, {:.3g} px off after {} steps; are all of "
+        "them on one rim, and is the camera that of their picture?",
+        rim.rays.size(), rms_of(rim.residuals(x)), kIterations));
+  return x;
+}
+
+/// Table frame with its origin below the centre, x to the right in the picture.
+void set_frame(const SeenCircle& circle, double height_m, data::Camera& camera) {
+  const Eigen::Vector3d up = normal_of(circle);
   const Eigen::Vector3d right =
       (Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitX().dot(up) * up).normalized();
   camera.camera_from_table.col(0) = right;
   camera.camera_from_table.col(1) = up.cross(right);
   camera.camera_from_table.col(2) = up;
-  camera.camera_from_table_m = x.head<3>() - height_m * up;
-  const Eigen::VectorXd left = residuals(x);
-  return std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
+  camera.camera_from_table_m = centre_of(circle) - height_m * up;
+}
+
+}  // namespace
+
+double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
+                             double radius_m, double height_m) {
+  constexpr std::size_t kFewest = 6;
+  if (rim_px.size() < kFewest)
+    throw InputError(
+        fmt::format("{} points of the rim; at least {} are needed", rim_px.size(), kFewest));
+  const RimRays rim(camera, rim_px, radius_m);
+  const SeenCircle start = rim.start();
+  // Edge on nothing tells how far away a circle is.
+  if (lie_on_a_line(rim_px))
+    throw InputError(fmt::format("the {} points of the rim lie on one line", rim_px.size()));
+  const SeenCircle circle = nearest_circle(rim, start);
+  if (!(centre_of(circle).z() > 0.0 && centre_of(circle).dot(normal_of(circle)) < 0.0))
+    throw NumericalError(fmt::format(
+        "the circle through the {} points of the rim is not seen from above: its "
+        "centre lies {:.3g} m before the camera and {:.3g} m below it; check the "
+        "points and the camera",
+        rim_px.size(), centre_of(circle).z(), -centre_of(circle).dot(normal_of(circle))));
+  set_frame(circle, height_m, camera);
+  return rms_of(rim.residuals(circle));
 }
 
 }  // namespace trochoid::tracking

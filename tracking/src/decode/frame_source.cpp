@@ -358,10 +358,16 @@ class LibavSource final : public FrameSource {
                        size.height));
     frame.damaged =
         (picture_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture_->decode_error_flags != 0;
+    fill(frame);
+    for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) turn_.apply(*image);
+  }
+
+  void fill(Frame& frame) try {
     frame.luma = luma_of(*picture_, scaler_);
     if (options_.colour) frame.bgr = bgr_of(*picture_, colour_scaler_);
     if (options_.chroma) frame.chroma = chroma_of(*picture_);
-    for (cv::Mat* image : {&frame.luma, &frame.chroma, &frame.bgr}) turn_.apply(*image);
+  } catch (const InputError& error) {
+    fail(fmt::format("frame {}{}: {}", frame.index, name_of_picture(), error.what()));
   }
 
   /// A file cut short ends like a whole one; only the promised number of frames tells. Open groups

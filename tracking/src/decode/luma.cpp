@@ -1,7 +1,10 @@
 #include "decode/luma.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <string>
 
 #include "trochoid/data/error.hpp"
 
@@ -79,12 +82,18 @@ void fill_chroma(const AVFrame& picture, const AVPixFmtDescriptor& format, int w
   }
 }
 
+std::string format_words(const AVFrame& picture) {
+  const char* name = av_get_pix_fmt_name(static_cast<AVPixelFormat>(picture.format));
+  return name != nullptr ? fmt::format("its pixel format {}", name)
+                         : fmt::format("its pixel format, number {},", picture.format);
+}
+
 cv::Mat scaled_to(const AVFrame& picture, AVPixelFormat target, int type, Scaler& scaler) {
   scaler.reset(sws_getCachedContext(scaler.release(), picture.width, picture.height,
                                     static_cast<AVPixelFormat>(picture.format), picture.width,
                                     picture.height, target, SWS_BILINEAR | SWS_ACCURATE_RND,
                                     nullptr, nullptr, nullptr));
-  if (!scaler) throw InputError("a pixel format that cannot be converted");
+  if (!scaler) throw InputError(fmt::format("{} cannot be converted", format_words(picture)));
   cv::Mat image(picture.height, picture.width, type);
   std::uint8_t* planes[4] = {image.data, nullptr, nullptr, nullptr};
   const int strides[4] = {static_cast<int>(image.step), 0, 0, 0};
@@ -97,7 +106,7 @@ cv::Mat scaled_to(const AVFrame& picture, AVPixelFormat target, int type, Scaler
 cv::Mat luma_of(const AVFrame& picture, Scaler& scaler) {
   const AVPixFmtDescriptor* format =
       av_pix_fmt_desc_get(static_cast<AVPixelFormat>(picture.format));
-  if (format == nullptr) throw InputError("an unknown pixel format");
+  if (format == nullptr) throw InputError(format_words(picture) + " is unknown");
   if (!has_luma_plane(*format)) return scaled_to(picture, AV_PIX_FMT_GRAY8, CV_8UC1, scaler);
   cv::Mat luma(picture.height, picture.width, CV_8UC1);
   const bool full = is_full_range(picture, *format);

@@ -9,7 +9,7 @@ namespace trochoid::tracking {
 // The transfer curve that cameras apply to light, sRGB (IEC 61966-2-1; BT.709 differs by less than
 // two levels): levels of the picture and linear light, both 0..255.
 
-/// The light of a level, which may lie outside 0..255.
+/// The light of a level; of one outside 0..255, that of the end it is beyond.
 inline double light_of(double level) {
   const double v = std::clamp(level / 255.0, 0.0, 1.0);
   return 255.0 * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));

@@ -59,7 +59,6 @@ class Background {
     return sited;
   }
 
-  [[nodiscard]] bool empty() const { return plate_.luma.empty(); }
   /// At the brightness of one of the samples; noise at least 0.7 levels.
   [[nodiscard]] const Plate& plate() const { return plate_; }
   /// Pixels that changed in some sample by more than noise (CV_8UC1, 0 or 255).

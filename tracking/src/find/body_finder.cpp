@@ -98,7 +98,6 @@ class CylinderFinder final : public BodyFinder {
         .predicted = look.predicted != nullptr && look.predicted->pose
                          ? std::optional(look.predicted->pose->pose)
                          : std::nullopt,
-        .attitude_known = true,
         .previous = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->pose)
                                                             : std::nullopt,
         .exposure_fraction = exposure_fraction_,
@@ -169,8 +168,7 @@ class CylinderFinder final : public BodyFinder {
         outline.push_back(
             {point.image_px, point.normal_px, gap_px(look, point.normal_px, exposure_fraction_)});
     std::vector<Eigen::Vector2d> face;
-    const Eigen::Vector3d node(std::cos(pose.phi_rad), std::sin(pose.phi_rad), 0.0);
-    const Eigen::Vector3d across = data::symmetry_axis(pose.theta_rad, pose.phi_rad).cross(node);
+    const Eigen::Vector3d node = node_line(pose), across = axis_of(pose).cross(node);
     for (const double share : {0.25, 0.5, 0.75}) {
       const double radius = body_.inner_radius_m + share * (body_.radius_m - body_.inner_radius_m);
       for (int i = 0; i < kSpokes; ++i) {
@@ -185,13 +183,12 @@ class CylinderFinder final : public BodyFinder {
   /// The ellipse the outer rim of the middle plane appears as, to first order.
   [[nodiscard]] Ellipse rim_of(const data::Pose<>& pose) const {
     const Eigen::Matrix<double, 2, 3> px_per_m = camera_.jacobian_px_per_m(pose.centre_m);
-    const double cos_phi = std::cos(pose.phi_rad), sin_phi = std::sin(pose.phi_rad);
-    const Eigen::Vector3d node(cos_phi, sin_phi, 0.0);
-    const Eigen::Vector3d across = data::symmetry_axis(pose.theta_rad, pose.phi_rad).cross(node);
+    const Eigen::Vector3d node = node_line(pose), across = axis_of(pose).cross(node);
     Eigen::Matrix2d axes;
     axes << px_per_m * node * body_.radius_m, px_per_m * across * body_.radius_m;
     // axes u runs round the rim, and so does sqrt(axes axes^T) u: the symmetric root, in closed
-    // form.
+    // form. A rim seen edge on has no inverse; a pixel squared more, far below what is measured,
+    // gives it a width.
     const Eigen::Matrix2d square = axes * axes.transpose() + Eigen::Matrix2d::Identity();
     const double root = std::sqrt(square.determinant());
     return {camera_.image_from_table<double>(pose.centre_m),

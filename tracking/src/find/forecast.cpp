@@ -23,7 +23,6 @@ struct Three {
   double t0, t1, t2;
   Value v0, v1, v2;
 
-  [[nodiscard]] Value linear(double t) const { return v2 + (t - t2) / (t2 - t1) * (v2 - v1); }
   [[nodiscard]] Value quadratic(double t) const {
     const Value late = (v2 - v1) / (t2 - t1), early = (v1 - v0) / (t1 - t0);
     return v2 + (t - t2) * late + (t - t2) * (t - t1) / (t2 - t0) * (late - early);
@@ -51,8 +50,7 @@ Pose straight_on(const Pose& a, const Pose& b, double ahead) {
     axis_straight_on(a, b, ahead, c);
     return c;
   }
-  c.theta_rad =
-      std::clamp(b.theta_rad + ahead * (b.theta_rad - a.theta_rad), 0.0, 0.5 * data::kTurn);
+  c.theta_rad = std::clamp(b.theta_rad + ahead * (b.theta_rad - a.theta_rad), 0.0, data::kPi);
   c.phi_rad = b.phi_rad + ahead * std::remainder(b.phi_rad - a.phi_rad, data::kTurn);
   return c;
 }
@@ -67,7 +65,7 @@ Pose turning_on(const Three<Pose>& past, double t) {
   const Three<double> phi{past.t0, past.t1, past.t2, phi_a, phi_b, phi_c};
   const Three<double> theta{past.t0, past.t1, past.t2, a.theta_rad, b.theta_rad, c.theta_rad};
   next.phi_rad = phi.quadratic(t);
-  next.theta_rad = std::clamp(theta.quadratic(t), 0.0, 0.5 * data::kTurn);
+  next.theta_rad = std::clamp(theta.quadratic(t), 0.0, data::kPi);
   next.psi_rad = c.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
                                  std::remainder(c.psi_rad - b.psi_rad, data::kTurn);
   const Eigen::Vector3d late = (c.centre_m - b.centre_m) / (past.t2 - past.t1);
@@ -105,11 +103,7 @@ double apart_px(const Sighting& a, const Sighting& b) {
 
 Pose nearer_face(const Pose& pose, const Pose& reference, double mark_rad) {
   if (axis_of(pose).dot(axis_of(reference)) >= 0.0) return pose;
-  Pose other = pose;
-  other.theta_rad = 0.5 * data::kTurn - pose.theta_rad;
-  other.phi_rad = pose.phi_rad + 0.5 * data::kTurn;
-  other.psi_rad = 0.5 * data::kTurn - pose.psi_rad - 2.0 * mark_rad;
-  return other;
+  return data::turned_over(pose, mark_rad);
 }
 
 void Forecast::start(double t_s, const Sighting& seen) {

@@ -34,8 +34,14 @@ class Recording {
   /// @throws InputError as FrameSource::next does.
   bool advance(std::size_t keep, const std::function<void(const Frame&)>& each = {});
   /// Pictures for the background: from the window and, where that is not all, from the windows
-  /// before it and the frames of the file that decode alone.
+  /// before it and the frames of the file that decode alone. The latter also where they lie outside
+  /// of SourceOptions::from and to: a camera on a stand sees the same floor there, and the body may
+  /// have gone.
   [[nodiscard]] BackgroundSamples samples();
+  /// From now on no picture outside of SourceOptions::from and to is a sample: the camera stands
+  /// still between them only. Fewer places are then seen without the body.
+  /// @return false if none was.
+  bool leave_out_the_rest();
   /// No samples will be asked for any more: what was kept for them goes.
   void stop_sampling();
 
@@ -54,6 +60,7 @@ class Recording {
   bool ended_ = false;
   std::vector<Frame> elsewhere_;  ///< pictures of other parts of the recording
   bool looked_ahead_ = false, sampled_ = true;
+  bool rest_left_out_ = false;  ///< elsewhere_ holds only what once was in the window
 };
 
 }  // namespace trochoid::tracking

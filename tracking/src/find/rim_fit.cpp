@@ -17,7 +17,7 @@ constexpr double kTukey = 4.0;    // rejection point in robust sigmas
 constexpr int kLevelSamples = 5;  // samples (2 px) that make the level beside an edge
 constexpr int kLevelGap = 3;      // samples (1.5 px) left out at the edge: optics and codec blur
 
-/// Bilinear sample; the caller keeps the point inside.
+/// A point where a normal of the rim crosses an edge.
 struct RimEdge {
   Eigen::Vector2d point_px, normal;
   double sigma_px = 0.0;
@@ -271,17 +271,14 @@ double correlation_inflation(const std::vector<RimEdge>& edges) {
 RimFit report(const EllipseFit& fit, const std::vector<RimEdge>& edges, int asked) {
   RimFit result{.ellipse = fit.ellipse()};
   double sum = 0.0;
-  std::vector<double> steps;
   for (const RimEdge& e : edges) {
     if (e.weight < 0.1) continue;
     sum += e.residual_px * e.residual_px;
-    steps.push_back(e.step_levels);
     result.edges.push_back({e.point_px, e.normal, e.sigma_px, e.residual_px});
   }
   const auto used = static_cast<double>(result.edges.size());
   result.accepted = used / asked;
   result.rms_px = std::sqrt(sum / std::max(1.0, used - 5.0));
-  result.contrast = steps.empty() ? 0.0 : data::median(steps);
   // The normal matrix holds weight / scale^2; the spread seen replaces the scale, which has a
   // floor.
   const double spread = std::max(result.rms_px, 0.03) / fit.scale_px();

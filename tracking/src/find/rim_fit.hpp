@@ -38,7 +38,6 @@ struct RimFit {
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();  ///< of the centre
   double rms_px = 0.0;    ///< of the accepted edges about the ellipse
   double accepted = 0.0;  ///< fraction of the whole rim with an accepted edge
-  double contrast = 0.0;  ///< median step across the rim [levels], sign: inside minus outside
   std::vector<EdgePoint> edges{};
 };
 

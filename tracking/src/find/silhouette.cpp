@@ -52,9 +52,6 @@ Silhouette describe(const std::vector<cv::Point>& contour, int factor, const cv:
                      d.box.br().y >= picture.height - factor;
   body.solidity = cv::contourArea(contour) / m.m00;
   body.ellipticity = m.m00 / (4.0 * data::kPi * std::sqrt(std::max(1e-9, xx * yy - xy * xy)));
-  for (const cv::Point& p : contour)
-    body.outline_px.emplace_back(static_cast<float>(scale * p.x + shift + origin.x),
-                                 static_cast<float>(scale * p.y + shift + origin.y));
   return body;
 }
 

@@ -12,13 +12,13 @@ namespace trochoid::tracking {
 /// A connected region that differs from the background.
 struct Silhouette {
   Detection detection;
-  std::vector<cv::Point2f> outline_px;  ///< its outer contour
-  double solidity = 0.0;                ///< area inside the contour over that of its convex hull
+  double solidity = 0.0;     ///< area inside the contour over that of its convex hull
   double ellipticity = 0.0;  ///< area of the hull over that of the ellipse with its moments
 };
 
 /// Regions of a picture that differ from the background (of the same brightness) in luma or colour
-/// by more than noise, largest first. Works on a picture reduced to about 400 px across.
+/// by more than noise, largest first. Works on a picture whose longer side is reduced by a whole
+/// number to 320 px or more, 639 at most.
 /// @param box part of the picture to look at; empty = all.
 [[nodiscard]] std::vector<Silhouette> find_silhouettes(const Frame& frame, const Plate& background,
                                                        cv::Rect box = {});

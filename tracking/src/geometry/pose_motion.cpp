@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trochoid/data/angle.hpp"
+
 namespace trochoid::tracking {
 
 Eigen::Vector3d node_line(const data::Pose<>& pose) {
@@ -24,6 +26,10 @@ void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose) {
   const double across = std::hypot(axis.x(), axis.y());
   pose.theta_rad = std::atan2(across, axis.z());
   if (across > kVertical) pose.phi_rad = std::atan2(axis.x(), -axis.y());
+}
+
+double lying_theta_rad(double theta_rad) {
+  return theta_rad > 0.5 * data::kPi ? data::kPi : 0.0;
 }
 
 PoseMotion::PoseMotion(const data::Body& body, const data::Support& support,
@@ -124,7 +130,7 @@ PoseMotion::Step PoseMotion::step_between(const data::Pose<>& from, const data::
 data::Pose<> PoseMotion::settled(data::Pose<> pose) const {
   switch (support_.kind) {
     case data::SupportKind::flat:
-      pose.theta_rad = pose.theta_rad > 1.5707963267948966 ? 3.141592653589793 : 0.0;
+      pose.theta_rad = lying_theta_rad(pose.theta_rad);
       pose.centre_m.z() = half_thickness_m_;
       break;
     case data::SupportKind::floor:

@@ -58,6 +58,9 @@ class PoseMotion {
 /// theta and phi of a direction; phi is kept where the axis is vertical.
 void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose);
 
+/// Tilt of a body that lies on the face it is nearer to lying on: 0 or pi [rad].
+[[nodiscard]] double lying_theta_rad(double theta_rad);
+
 /// Whether a body is held at its own middle: its pivot lies within half its thickness of the centre
 /// of this pose [m].
 [[nodiscard]] bool is_on_a_pin(const data::Body& body, const data::Support& support,

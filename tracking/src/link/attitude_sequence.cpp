@@ -56,11 +56,8 @@ class Chain {
       const double tilt = 0.5 * between_axes(axis_of(seen->pose->pose), axis_of(*image), alike_);
       nodes_.push_back({i, glimpses[i].frame->t_s, {seen->pose->pose, *image}, tilt});
     }
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < nodes_.size(); ++i)
-      steps.push_back(nodes_[i].t_s - nodes_[i - 1].t_s);
-    if (steps.empty()) return;
-    frame_s_ = data::median(std::move(steps));
+    if (nodes_.size() < 2) return;
+    frame_s_ = data::usual_step_s(nodes_, &AttitudeNode::t_s);
     lean_tells_ = lean_tells();
   }
 

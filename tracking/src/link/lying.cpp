@@ -49,7 +49,7 @@ bool axis_stays(const std::vector<Glimpse>& glimpses, std::size_t i) {
 }
 
 Pose lying(Pose pose) {
-  pose.theta_rad = pose.theta_rad > 0.5 * data::kPi ? data::kPi : 0.0;
+  pose.theta_rad = lying_theta_rad(pose.theta_rad);
   pose.phi_rad = 0.0;
   return pose;
 }

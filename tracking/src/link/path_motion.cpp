@@ -1,6 +1,7 @@
 #include "link/path_motion.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
@@ -32,6 +33,7 @@ double travel_in_radii(const BodyPath& path) {
 }
 
 Ellipse reach_of(const BodyPath& path) {
+  assert(!path.frames.empty());
   Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
   for (const auto& [index, at] : path.frames) middle_px += at.seen.centre_px;
   middle_px /= static_cast<double>(path.frames.size());
@@ -44,6 +46,7 @@ Ellipse reach_of(const BodyPath& path) {
 
 bool moves(const BodyPath& path) {
   constexpr double kTrembles_px = 0.7, kOfItsSize = 0.12, kTurns_rad = 0.3;
+  if (path.frames.empty()) return false;
   if (path.frames.begin()->second.seen.pose) return true;
   std::vector<double> turned;
   for (const auto& [index, at] : path.frames)

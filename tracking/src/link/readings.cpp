@@ -61,10 +61,7 @@ class Readings {
         alike_(finder.faces_look_alike()) {
     for (std::size_t i = 0; i < glimpses.size(); ++i)
       if (glimpses[i].posed()) nodes_.push_back({i, glimpses[i].frame->t_s, {*glimpses[i].seen}});
-    std::vector<double> steps_s;
-    for (std::size_t k = 1; k < nodes_.size(); ++k)
-      steps_s.push_back(nodes_[k].t_s - nodes_[k - 1].t_s);
-    if (!steps_s.empty()) frame_s_ = data::median(std::move(steps_s));
+    if (nodes_.size() > 1) frame_s_ = data::usual_step_s(nodes_, &ReadingNode::t_s);
   }
 
   ReadingDoubt choose() {

@@ -96,12 +96,12 @@ double likeliest_density(const Series& s, bool free_scale) {
 
 std::vector<SmoothState> smooth(const std::vector<double>& t_s, const std::vector<double>& value,
                                 const std::vector<double>& sigma) {
-  std::vector<double> steps, sigmas;
-  for (std::size_t i = 1; i < t_s.size(); ++i) steps.push_back(t_s[i] - t_s[i - 1]);
+  std::vector<double> sigmas;
   for (std::size_t i = 0; i < sigma.size(); ++i)
     if (!std::isnan(value[i]) && !std::isnan(sigma[i])) sigmas.push_back(sigma[i]);
-  const bool free_scale = sigmas.empty();
-  const double step_s = data::median(steps), unit = free_scale ? 1.0 : data::median(sigmas);
+  const double usual_sigma = data::median(sigmas);  // NaN without any
+  const bool free_scale = !(usual_sigma > 0.0);
+  const double step_s = data::usual_step_s(t_s), unit = free_scale ? 1.0 : usual_sigma;
   Series s;
   for (std::size_t i = 0; i < t_s.size(); ++i) {
     s.t.push_back(t_s[i] / step_s);

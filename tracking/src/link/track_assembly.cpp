@@ -7,6 +7,7 @@
 
 #include "link/path_scatter.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -54,25 +55,29 @@ bool lies(const BodyPath& path) {
   return data::quantile(roundness, 0.9) - data::quantile(roundness, 0.1) < kAsRound;
 }
 
+/// Metres stay unknown where no floor is seen.
 void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
   if (!rule.camera) return;
-  const Eigen::Vector3d p = rule.camera->table_from_image(seen.centre_px, 0.0);
+  Eigen::Vector3d p;
+  try {
+    p = rule.camera->table_from_image(seen.centre_px, 0.0);
+  } catch (const NumericalError&) {  // above the horizon, or where the distortion does not hold
+    return;
+  }
   const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
   const Eigen::Matrix2d m_per_px = px_per_m.inverse();
   sample.centre_m = p.head<2>();
   sample.covariance_m2 = m_per_px * seen.covariance_px2 * m_per_px.transpose();
 }
 
-/// @param mark_rad angle of the mark in the body: turned over about the axis of its mark, a body
-/// with the same mark on both faces shows the spin pi - psi - 2 mark.
+/// @param mark_rad of data::turned_over.
 void angles_from_pose(data::TrackSample& sample, const PoseMeasurement& pose, bool fold,
                       double mark_rad) {
-  double theta = pose.pose.theta_rad, phi = pose.pose.phi_rad, psi = pose.pose.psi_rad;
-  if (fold && theta > 0.5 * data::kPi)
-    theta = data::kPi - theta, phi += data::kPi, psi = data::kPi - psi - 2.0 * mark_rad;
-  if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {theta, pose.sigma_theta_rad};
-  if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {phi, pose.sigma_phi_rad};
-  if (pose.sigma_psi_rad) sample.psi = {psi, *pose.sigma_psi_rad};
+  const bool over = fold && pose.pose.theta_rad > 0.5 * data::kPi;
+  const data::Pose<> p = over ? data::turned_over(pose.pose, mark_rad) : pose.pose;
+  if (std::isfinite(pose.sigma_theta_rad)) sample.theta = {p.theta_rad, pose.sigma_theta_rad};
+  if (std::isfinite(pose.sigma_phi_rad)) sample.phi = {p.phi_rad, pose.sigma_phi_rad};
+  if (pose.sigma_psi_rad) sample.psi = {p.psi_rad, *pose.sigma_psi_rad};
 }
 
 /// Seen face on, nothing tells which way the axis leans: then the turn of the face about the

@@ -258,13 +258,8 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
   return best;
 }
 
-// How much more must speak for the attitude the prediction does not expect.
-constexpr double kClearlyBetter = 1.2;
-// Below kDoubtful the mirrored attitude may fit better; below kLeastScore the body is not there.
-constexpr double kDoubtful = 0.7, kLeastScore = 0.25;
-
 bool believable(const Fitted& fitted) {
-  constexpr double kLeastCovered = 0.35;
+  constexpr double kLeastScore = 0.25, kLeastCovered = 0.35;  // below, the body is not there
   return fitted.score >= kLeastScore && fitted.refined.covered >= kLeastCovered &&
          fitted.refined.solution.covariance.allFinite();
 }
@@ -325,16 +320,18 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   return m;
 }
 
-// The other attitude with the same outline: the faces have changed places.
-data::Pose<> turned_over(data::Pose<> pose) {
-  pose.theta_rad = data::kPi - pose.theta_rad;
-  pose.phi_rad = std::remainder(pose.phi_rad + data::kPi, data::kTurn);
-  return pose;
+// The other attitude with the same outline: the faces have changed places. Spin is left as it is,
+// for marks to tell.
+data::Pose<> faces_exchanged(const data::Pose<>& pose) {
+  data::Pose<> over = data::turned_over(pose, 0.0);
+  over.phi_rad = std::remainder(over.phi_rad, data::kTurn);
+  over.psi_rad = pose.psi_rad;
+  return over;
 }
 
 // Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
 void fold(data::Pose<>& pose) {
-  if (pose.theta_rad > 0.5 * data::kPi) pose = turned_over(pose);
+  if (pose.theta_rad > 0.5 * data::kPi) pose = faces_exchanged(pose);
 }
 
 // Reads the marks; those of the other face show that a prediction had the body the wrong way up.
@@ -342,7 +339,7 @@ std::optional<MarkReading> read_marks_of_either_face(const cv::Mat& luma, const 
                                                      const data::Camera& camera,
                                                      data::Pose<>& pose) {
   if (auto marks = read_marks(luma, body, camera, pose)) return marks;
-  const data::Pose<> over = turned_over(pose);
+  const data::Pose<> over = faces_exchanged(pose);
   auto marks = read_marks(luma, body, camera, over);
   if (marks) pose = over;
   return marks;
@@ -407,36 +404,36 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   ColourWindow colour =
       colour_window(evidence.luma, evidence.chroma, window, body_, camera_, starts.front());
   colour.site_px = evidence.chroma_site_px;
+  const bool moving = evidence.predicted && evidence.previous;
   const Scenery scenery{
-      body_, camera_, motion, LightWindow(evidence.luma, window, camera_.transfer),
-      evidence.background.empty() ? LightWindow()
-                                  : LightWindow(evidence.background, window, camera_.transfer),
-      std::move(colour), most_looks_, evidence.visit,
-      evidence.predicted && evidence.previous
-          ? PoseMotion::Step(evidence.exposure_fraction *
-                             motion.step_between(*evidence.previous, starts.front()))
-          : PoseMotion::Step(),
+      .body = body_,
+      .camera = camera_,
+      .motion = motion,
+      .picture = LightWindow(evidence.luma, window, camera_.transfer),
+      .plate = evidence.background.empty()
+                   ? LightWindow()
+                   : LightWindow(evidence.background, window, camera_.transfer),
+      .colour = std::move(colour),
+      .most_looks = most_looks_,
+      .visit = evidence.visit,
+      .smear = moving ? PoseMotion::Step(evidence.exposure_fraction *
+                                         motion.step_between(*evidence.previous, starts.front()))
+                      : PoseMotion::Step(),
       // Levels that are light mix linearly, whatever their colours.
-      camera_.transfer == data::Transfer::linear
-          ? std::nullopt
-          : tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
-      evidence.predicted && evidence.previous && evidence.exposure_fraction > 0.0
-          ? std::optional(
-                ExposureMotion(*evidence.previous, starts.front(), evidence.exposure_fraction))
-          : std::nullopt,
-      evidence.shading};
+      .tints = camera_.transfer == data::Transfer::linear
+                   ? std::nullopt
+                   : tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
+      .exposure = moving && evidence.exposure_fraction > 0.0
+                      ? std::optional(ExposureMotion(*evidence.previous, starts.front(),
+                                                     evidence.exposure_fraction))
+                      : std::nullopt,
+      .shading = evidence.shading};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
   auto best = evidence.predicted
                   ? fit_from_prediction(scenery, starts.front(), evidence.blur_px, evidence.there)
                   : fit_best(scenery, starts, mirrors);
-  if (best && evidence.predicted && mirrors && !evidence.attitude_known &&
-      best->score < kDoubtful) {
-    const data::Pose<> other = mirrored(camera_, motion, best->refined.pose);
-    auto turned = fit_from(scenery, scenery.blurred(kNearBlurPx), other);
-    if (turned && turned->speaks() > kClearlyBetter * best->speaks()) best = std::move(turned);
-  }
   if (!best) return std::nullopt;
   find_uncertainty(scenery, *best);
   if (!believable(*best)) return std::nullopt;

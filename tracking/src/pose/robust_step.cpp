@@ -350,14 +350,12 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   const std::vector<EquationRow> rows = rows_of(equations, directions);
   Solving solving{equations, rows, prior, first, n, least_scale_px};
   if (!solving.run()) return false;
-  double square = 0.0, weight = 0.0, arc = 0.0, accepted = 0.0;
+  double square = 0.0, weight = 0.0;
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     e.residual_px = e.offset_px - rows[i].dot(solving.x);
     square += e.weight * e.residual_px * e.residual_px;
     weight += e.weight;
-    arc += e.arc_px;
-    if (e.weight > 0.5) accepted += e.arc_px;
   }
   if (!(weight > 0.0)) return false;
   const auto of = [&](int i) { return solving.x[static_cast<size_t>(first + i)]; };
@@ -368,7 +366,6 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   out.polarity_px = of(n + 1);
   out.colour_shift_px = {of(n + 3), of(n + 4)};
   out.rms_px = std::sqrt(square / weight);
-  out.accepted = accepted / arc;
   return true;
 }
 

@@ -33,7 +33,8 @@ struct EdgeEquation {
   double lower_px = 0.0;
   /// The same, where the outline is narrow against where it is wide; signed [px].
   double flank_px = 0.0;
-  /// The same, where the outline turns from wide to narrow against where it turns back; signed [px].
+  /// The same, where the outline turns from wide to narrow against where it turns back; signed
+  /// [px].
   double twist_px = 0.0;
   /// Seen in the colour planes: with a shift of these planes and one along the normal as nuisances.
   bool colour = false;
@@ -51,7 +52,6 @@ struct RobustSolution {
   double swell_px = 0.0, polarity_px = 0.0;
   Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
   double rms_px = 0.0;
-  double accepted = 0.0;  ///< share of the arc with weight above one half
   // From here on by find_uncertainty.
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
   Eigen::MatrixXd common;      ///< of it, what errors common to whole sides of the outline do

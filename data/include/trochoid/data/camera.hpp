@@ -33,7 +33,9 @@ struct Camera {
   std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3
   Eigen::Matrix3d camera_from_table = Eigen::Vector3d(1, -1, -1).asDiagonal();
   Eigen::Vector3d camera_from_table_m = Eigen::Vector3d::Zero();
-  std::optional<double> frame_rate_hz;      ///< what the file says of the recording, if anything
+  /// What the file says of the recording, if anything; kept, but nothing is timed by it: times come
+  /// from the recording or CameraSettings::frame_rate_hz.
+  std::optional<double> frame_rate_hz;
   std::optional<double> exposure_fraction;  ///< shutter time as a fraction of the frame interval
   Transfer transfer = Transfer::srgb;
   std::string file;  ///< where it was read from, for messages; empty if it was made

@@ -46,12 +46,13 @@ void write_table(const Table& table, const std::filesystem::path& path);
 
 /// A file's text, refused beyond `limit_bytes` (an endless device, a video given as a table). Lines
 /// that end in \r alone throughout end in \n.
-/// @throws InputError naming the file if it is missing, a folder, unreadable or too large.
+/// @throws InputError naming the file if it is missing, a folder, unreadable (also part of it) or
+/// too large.
 [[nodiscard]] std::string read_text(const std::filesystem::path& path,
                                     std::size_t limit_bytes = std::size_t{64} << 20);
 /// Writes `text` whole or not at all. @throws InputError if the folder cannot be written.
 void write_text(const std::string& text, const std::filesystem::path& path);
-/// Hex SHA-256 of a file's bytes.
+/// Hex SHA-256 of a file's bytes. @throws InputError naming the file if not all of it can be read.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
 [[nodiscard]] std::string sha256_of_text(const std::string& text);
 

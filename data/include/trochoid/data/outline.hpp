@@ -34,7 +34,8 @@ struct OutlinePoint {
 [[nodiscard]] std::vector<OutlinePoint> visible_outline(const Body& body, const Pose<>& pose,
                                                         const Camera& camera, double step_px = 2.0);
 
-/// A closed curve of the wireframe, for drawing: points in the image and whether they are hidden.
+/// A curve of the wireframe, for drawing: points in the image and whether they are hidden. Rims are
+/// closed, the lines of the side wall are not.
 struct WireCurve {
   OutlinePoint::Edge edge;
   std::vector<Eigen::Vector2d> image_px;

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <vector>
 
 namespace trochoid::data {
@@ -9,6 +10,17 @@ namespace trochoid::data {
 
 /// The one in the middle; of an even number the mean of the two there. NaN without values.
 [[nodiscard]] double median(std::vector<double> values);
+
+/// Median of the times from each moment to the next [s]; 0 for fewer than two.
+[[nodiscard]] double usual_step_s(const std::vector<double>& t_s);
+
+/// The same of anything that has a time. @param time_s gives it: a member or a function [s].
+template <class Range, class Time>
+[[nodiscard]] double usual_step_s(const Range& moments, const Time& time_s) {
+  std::vector<double> t_s;
+  for (const auto& moment : moments) t_s.push_back(std::invoke(time_s, moment));
+  return usual_step_s(t_s);
+}
 
 /// The one in the middle; of an even number the upper one there, so that it is one of the values.
 /// NaN without values.

@@ -33,7 +33,8 @@ struct CameraSettings {
 
 /// Hints to the tracker; all optional.
 struct TrackingSettings {
-  int objects = 1;
+  static constexpr int kMostObjects = 64;
+  int objects = 1;                       ///< moving bodies, 1 to kMostObjects
   std::optional<Eigen::Vector2d> at_px;  ///< a point on the body in the first frame
   std::string from, to;                  ///< seconds ("1.5") or frames ("f120"); empty = all
 };

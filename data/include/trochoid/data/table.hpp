@@ -14,9 +14,10 @@ struct Table {
   std::vector<std::pair<std::string, std::string>> header;  ///< key, value lines
   std::vector<std::string> columns;
   Eigen::MatrixXd values;  ///< rows x columns; NaN = empty cell
+  std::string file{};      ///< where it was read from, for messages; empty if it was made
 
   [[nodiscard]] bool has(const std::string& column) const;
-  /// @throws InputError naming the column and those there are.
+  /// @throws InputError naming the file, the column and those there are.
   [[nodiscard]] Eigen::VectorXd column(const std::string& name) const;
   /// Makes `values` of cells, row after row; their number is a multiple of that of the columns.
   void set_rows(const std::vector<double>& cells);

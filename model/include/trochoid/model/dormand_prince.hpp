@@ -193,7 +193,8 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
     }
     return error;
   }
-  /// What draws in fast rounds off more than that, and shorter steps only add to it.
+  /// In strongly attracting flows rounding alone leaves that much in the derivatives: asking for
+  /// less would only shorten the steps.
   static constexpr double kFinestOfDerivatives = 1e-11;
   [[nodiscard]] double lane_error_norm(double h, int lane) const {
     const double rtol = control_.rtol > kFinestOfDerivatives ? control_.rtol : kFinestOfDerivatives;

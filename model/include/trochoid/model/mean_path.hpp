@@ -15,7 +15,7 @@ struct MeanPath {
   /// First time the heading rate falls through zero, averaged over one turn so that the remaining
   /// nutation does not decide; nothing if it stays on one side.
   [[nodiscard]] std::optional<double> inflection_s() const;
-  /// Mean heading rate in `parts` equal spans of phi.
+  /// Mean heading rate in `parts` equal spans of phi, 1 <= parts <= number of points.
   [[nodiscard]] Eigen::VectorXd heading_in_parts(int parts) const;
 };
 

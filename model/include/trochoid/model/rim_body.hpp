@@ -32,6 +32,14 @@ struct RimBody {
   [[nodiscard]] double signed_h() const { return side * h; }
 };
 
+/// @returns the `side` of the rim that touches: by the tilt, and exactly on edge by the sense of
+/// falling.
+[[nodiscard]] inline double touching_side(double theta_rad, double w1_rad_s) {
+  constexpr double kOnEdge = 1e-15;  // the cosine of the double next to pi/2 is 6e-17
+  const double c = cos(theta_rad);
+  return __builtin_fabs(c) < kOnEdge ? (w1_rad_s > 0.0 ? -1.0 : 1.0) : (c < 0.0 ? -1.0 : 1.0);
+}
+
 /// sin and cos of the tilt, height z(theta) of the centre of mass and its slope dz/dtheta;
 /// d2z/dtheta2 = -z.                                                                          (2)
 template <class S>

@@ -44,7 +44,7 @@ struct SteadyMotion {
 [[nodiscard]] double steady_rolling_spin(const RimBody& body, double theta_rad,
                                          double precession_rad_s);
 /// Precession rates of steady rolling at a tilt whose centre of mass moves at `along_m_s` along the
-/// node line: the two roots of (1), its spin being that of rolling; empty where there are none.
+/// node line: the roots of (1), up to two, its spin being that of rolling; empty where there are none.
 [[nodiscard]] std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
                                                              double along_m_s);
 
@@ -70,7 +70,8 @@ struct SteadyMotion {
 [[nodiscard]] double least_spinning_rate_rad_s(const data::Body& body, double gravity_m_s2);
 
 /// The families on both floors at the given tilts: flat, straight rolling and upright spinning (at
-/// twice the least rate), spinning at a tilt, and rolling on circles of 1, 2 and 5 rim radii.
+/// twice the least rate), spinning at a tilt, and rolling on circles of 1, 2 and 5 rim radii
+/// and, leaning outwards, of 1.
 [[nodiscard]] std::vector<SteadyMotion> steady_catalogue(const data::Body& body,
                                                          double gravity_m_s2,
                                                          const std::vector<double>& tilts_rad);

@@ -30,6 +30,7 @@ struct Ode {
   std::function<void(double t_s, const double* y, double* jacobian)> jacobian;
   int events = 0;
   std::function<void(double t_s, const double* y, double* g)> event_functions;
+  bool events_fall = false;  ///< an event is a fall through zero only, not a sign change either way
   Sensitivities sensitivities;  ///< of no parameter unless asked; cvode_bdf only
 };
 
@@ -45,7 +46,7 @@ struct SundialsOptions {
   double rtol = 1e-10;
   Eigen::VectorXd atol;  ///< one per state, >= 0; with regularised friction the velocities' must be
                          ///< well below the regularisation, or stick is not resolved
-  int max_steps = 5000000;
+  int max_steps = 5000000;  ///< from one output time to the next
   /// Outputs from the solver's own interpolation instead of steps that end there: fewer steps on a
   /// dense grid, but the derivative is also evaluated a little beyond the last time.
   bool interpolate = false;
@@ -56,14 +57,14 @@ struct SundialsRun {
   Eigen::MatrixXd sensitivities;  ///< one row per time reached: states x parameters, by column
   Eigen::VectorXd end_state;      ///< where the run ended: last time, or the event
   double end_s = 0.0;
-  int event = -1;  ///< index of the event function that changed sign, -1 if none
+  int event = -1;  ///< index of the event function that made the event, -1 if none
   Outcome outcome = Outcome::reached_end;
   std::string message;  ///< SUNDIALS' own words if it gave up
   long steps = 0, evaluations = 0, failed = 0;
 };
 
-/// Integrates from (start_s, y0) through ascending times; stops at the first sign change of an
-/// event function (times after it have no row) or when the solver gives up (outcome says so).
+/// Integrates from (start_s, y0) through ascending times; stops at the first event
+/// (times after it have no row) or when the solver gives up (outcome says so).
 /// @throws InputError if sizes do not match, a time precedes the start or the method carries no
 ///         sensitivities.
 [[nodiscard]] SundialsRun integrate_sundials(const Ode& ode, double start_s,

@@ -76,7 +76,8 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
 /// face, `height_m` the height of that rim above the floor: origin under its centre, x to the right
 /// in the picture. Of the two planes in which a circle can lie to look the same, the one the camera
 /// looks at more squarely is taken. @returns the rms distance of the points from the circle [px].
-/// @throws InputError for fewer than six points.
+/// @throws InputError for fewer than six points, all within a pixel or on a line; NumericalError if
+/// no circle settles on them, or one that is not seen from above.
 double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
                              double radius_m, double height_m);
 

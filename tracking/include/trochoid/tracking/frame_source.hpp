@@ -61,11 +61,14 @@ class FrameSource {
   [[nodiscard]] virtual const VideoInfo& info() const = 0;
   /// Next frame, or nothing at the end. Each returned frame owns its pixels.
   /// @throws InputError if the file breaks off before its promised end, or a picture of a series
-  ///         cannot be decoded, has another size or was taken with the camera held another way; the
-  ///         message says where. Also if no picture lies between from and to.
+  ///         cannot be decoded, has another size or was taken with the camera held another way, or
+  ///         its pixel format cannot be read; the message says where. Also if no picture lies
+  ///         between from and to.
   [[nodiscard]] virtual std::optional<Frame> next() = 0;
 };
 
+/// Silences the log of libavutil, which is the whole process': what is wrong with a recording is
+/// told by what is thrown. Who wants that log sets its level again after each call.
 /// @throws InputError (missing, not a video, no picture stream, no moments of a recording) before
 /// any frame is handed out.
 [[nodiscard]] std::unique_ptr<FrameSource> open_video(const std::filesystem::path& path,

@@ -80,9 +80,8 @@ struct OutlineEvidence {
   const cv::Mat& luma;                 ///< CV_8UC1
   const cv::Mat& background;           ///< CV_8UC1 of the same size, or empty
   std::optional<Detection> detection;  ///< used for a start when there is no prediction
+  /// Nearly right in its attitude: the mirror image is not considered.
   std::optional<data::Pose<>> predicted;
-  /// The predicted attitude is nearly right: its mirror image is not considered.
-  bool attitude_known = false;
   std::optional<data::Pose<>> previous{};  ///< one frame earlier or later: how fast it moves
   double exposure_fraction = 0.0;          ///< shutter time over frame interval: how far it smears
   cv::Mat chroma{};                        ///< CV_8UC2 of half the size, or empty: Frame::chroma

@@ -17,7 +17,8 @@ struct SmoothState {
 /// found by maximum likelihood.
 /// @param t_s strictly increasing; at least four are measured.
 /// @param value NaN where nothing was measured: there the result is an interpolation.
-/// @param sigma of the measurements; all NaN: found by maximum likelihood as well.
+/// @param sigma of the measurements; all NaN, or 0 for most of them, which no measurement is: found
+/// by maximum likelihood as well.
 [[nodiscard]] std::vector<SmoothState> smooth(const std::vector<double>& t_s,
                                               const std::vector<double>& value,
                                               const std::vector<double>& sigma);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "trochoid/data/scene.hpp"
+#include "trochoid/data/table.hpp"
 #include "trochoid/data/track.hpp"
 #include "trochoid/tracking/effort.hpp"
 
@@ -17,7 +18,7 @@ struct TrackOptions {
   /// given replaces the scene's; empty: the scene's, else the recording's own end.
   std::string from, to;
   Effort effort = Effort::normal;
-  std::optional<std::filesystem::path> edges;  ///< CSV of accepted edge points per frame
+  bool edges = false;  ///< also hand out the accepted edge points: TrackResult::edges
   /// Decoded pictures held in memory at once [bytes], but never fewer than 32 pictures: bodies are
   /// sought, and followed backwards, within what is held.
   std::size_t held_bytes = std::size_t{96} << 20;
@@ -41,11 +42,15 @@ struct TrackSummary {
 struct TrackResult {
   data::TrackFile file;
   TrackSummary summary;
+  /// Accepted edge points [px], one row each (docs/formats.md), if TrackOptions::edges asked for
+  /// them.
+  std::optional<data::Table> edges{};
 };
 
 /// Video -> CoM per frame. The scene may be empty: then pixels only. `camera` overrides the
 /// scene's.
-/// @throws InputError for an unreadable video or camera; a body never seen is an InputError too.
+/// @throws InputError for an unreadable video or camera, and for a readout_s longer than a frame
+/// interval; a body never seen is an InputError too.
 [[nodiscard]] TrackResult track_video(const std::filesystem::path& video, const data::Scene& scene,
                                       const std::optional<data::Camera>& camera,
                                       const TrackOptions& options = {});

@@ -1,0 +1,12 @@
+#pragma once
+#include <string>
+
+namespace trochoid::tools {
+
+/// "0.0450 ± 0.0003" or "(3.1 ± 0.2) × 10^-5": as many digits as the error justifies (two of it).
+/// Without an error (fixed, or not seen) six digits of the value.
+[[nodiscard]] std::string value_words(double value, double sigma);
+/// "0.034", "1.2e-05": short, for tables.
+[[nodiscard]] std::string short_number(double value);
+
+}  // namespace trochoid::tools
