@@ -139,7 +139,8 @@ void note_end(const SundialsRun& run, RimRunEnd<S>& end) {
   end.end_s = run.end_s;
   end.statistics = {static_cast<int>(run.steps), static_cast<int>(run.failed),
                     static_cast<int>(run.evaluations)};
-  // In the order of the systems' events; none that slips, or bears so much friction, runs here.
+  // In the order of the systems' events. The last is that of sliding; rolling's would be its slip,
+  // which without a limit of friction never comes.
   constexpr Outcome kEnds[] = {Outcome::flat, Outcome::rim_switch, Outcome::lift_off,
                                Outcome::inconsistent_contact};
   if (run.event < 0 || run.event >= 4) return;

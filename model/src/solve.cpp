@@ -51,7 +51,7 @@ std::vector<double> times_between(const std::vector<double>& t_s, double rate_ra
   if (wanted * static_cast<double>(t_s.size()) > kMostTimes)
     throw InputError(fmt::format(
         "run.until_s = {} s is too long to follow the angles of a body that turns at {:.3g} rad/s; "
-        "shorten it",
+        "shorten it, or take run.integrator = \"auto\" for a top",
         t_s.back(), rate_rad_s));
   parts = std::max(1, static_cast<int>(wanted));
   std::vector<double> fine{t_s.front()};

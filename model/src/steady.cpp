@@ -202,7 +202,7 @@ std::vector<double> steady_rolling_precessions(const RimBody& body, double theta
   // vanishes only one is left.
   const double sum = -0.5 * (a1 + std::copysign(std::sqrt(discriminant), a1));
   std::array<double, 2> roots{sum / a2, a0 / sum};
-  if (a1 >= 0.0) std::swap(roots[0], roots[1]);  // that of + the square root first
+  if (!std::signbit(a1)) std::swap(roots[0], roots[1]);  // that of + the square root first
   std::vector<double> precessions;
   for (const double root : roots)
     if (std::isfinite(root)) precessions.push_back(root);

@@ -89,8 +89,8 @@ void check(const TopSettings& top) {
   if (!(top.theta_rad >= 0.0) || top.theta_rad > M_PI)
     throw InputError(fmt::format("start.theta_rad = {} must lie between 0 and pi", top.theta_rad));
   const std::pair<const char*, double> numbers[] = {
-      {"weight times l over I", top.a_1_s2},
-      {"Is omega_s over I", top.b_1_s},
+      {"weight times l over I (body.mass_kg, l_m, I_kg_m2)", top.a_1_s2},
+      {"Is omega_s over I (body.Is_kg_m2, I_kg_m2)", top.b_1_s},
       {"start.phi_rad", top.phi_rad},
       {"start.psi_rad", top.psi_rad},
       {"start.dtheta_rad_s", top.dtheta_rad_s},

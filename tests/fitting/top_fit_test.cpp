@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -411,8 +412,29 @@ TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
     (void)fit_one(track_of({}), scene);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("leave at least one"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("take one out of fixed"), std::string::npos)
         << error.what();
+  }
+}
+
+TEST(TopFit, KeepsALengthWithinItsBoundsThoughItLiesCloseToOne) {
+  data::Scene scene = top_scene();
+  scene.fit.bounds["l_m"] = {0.0, 0.1005};
+  const data::Fit result = fit_one(track_of({.sigma_m = 1e-4}), scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "l_m", 0.1), kFar);
+  scene.fit.bounds["l_m"] = {-std::numeric_limits<double>::infinity(), 0.1005};
+  EXPECT_NEAR(fit_one(track_of({.sigma_m = 1e-4}), scene).find("l_m")->value,
+              result.find("l_m")->value, 1e-9);
+}
+
+TEST(TopFit, TakesAFirstGuessOfAnArcByItsNumber) {
+  FitOptions options;
+  options.start = {{"theta_rad@0", 1.0}};
+  EXPECT_TRUE(fit_one(track_of({}), top_scene(), options).converged);
+  for (const char* wrong : {"theta_rad@", "theta_rad@x", "tilt@0"}) {
+    options.start = {{wrong, 1.0}};
+    EXPECT_THROW((void)fit_one(track_of({}), top_scene(), options), InputError) << wrong;
   }
 }
 

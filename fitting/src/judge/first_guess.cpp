@@ -19,6 +19,14 @@ void give_friction_a_start(data::Scene& scene) {
   if (needed && !scene.model.friction) scene.model.friction = kTypical;
 }
 
+// "x_m@1" is the x_m of arc 1.
+std::string without_arc(const std::string& name) {
+  const std::size_t at = name.find('@');
+  const bool arc = at != std::string::npos && at + 1 < name.size() &&
+                   name.find_first_not_of("0123456789", at + 1) == std::string::npos;
+  return arc ? name.substr(0, at) : name;
+}
+
 }  // namespace
 
 std::set<std::string> names_in(const model::Predictor& plain, data::Scene scene) {
@@ -45,7 +53,7 @@ std::set<std::string> parameters_of(const data::Scene& given) {
 void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
                        const std::set<std::string>& known) {
   for (const auto& [name, value] : guess)
-    if (!known.contains(name.substr(0, name.find('@'))))  // "x_m@1" is that of arc 1
+    if (!known.contains(without_arc(name)))
       throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
                                    fmt::join(known, ", ")));
 }

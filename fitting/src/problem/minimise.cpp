@@ -66,7 +66,7 @@ class GeodesicDescent {
       idle = last - chi2_ < enough * chi2_ ? idle + 1 : 0;
       // A strongly damped step that gains little may be the first of many.
       constexpr double kFree = 1e-3;
-      solution.converged = moved ? idle > (damping_ < kFree ? 0 : 1) : !no_step_predicted_;
+      solution.converged = moved ? idle > (damping_ < kFree ? 0 : 1) : !no_trial_finite_;
       if (!moved || solution.converged || solution.iterations == options_.iterations || !look())
         break;
     }
@@ -131,24 +131,24 @@ class GeodesicDescent {
     constexpr double kNothing = 1e-12, kSome = 0.25;
     Way straight;
     int waited = 0;
-    no_step_predicted_ = true;
+    no_trial_finite_ = true;
     for (int attempt = 0; attempt < kAttempts && waited <= kPatience; ++attempt) {
       factorise();
       const Eigen::VectorXd step = answer(rows_);
       const double predicted = chi2_ - (rows_ + jacobian_ * step).squaredNorm();
       if (!(predicted > kNothing * chi2_)) {
-        no_step_predicted_ = false;
+        no_trial_finite_ = false;
         break;
       }
       const Eigen::VectorXd bend = bend_of(step);
       if (bend.size() > 0) {
         const Way way = tried(step + 0.5 * bend, predicted);
         if (way.chi2 < std::min(chi2_, straight.chi2)) return take(way);
-        no_step_predicted_ = no_step_predicted_ && !std::isfinite(way.chi2);
+        no_trial_finite_ = no_trial_finite_ && !std::isfinite(way.chi2);
         damp(std::isfinite(way.chi2) ? 5.0 : 30.0);
       } else if (straight.step.size() == 0) {
         Way way = tried(step, predicted);
-        no_step_predicted_ = no_step_predicted_ && !std::isfinite(way.chi2);
+        no_trial_finite_ = no_trial_finite_ && !std::isfinite(way.chi2);
         damp(std::isfinite(way.chi2) ? 4.0 : 30.0);
         if (way.kept > kSome) straight = std::move(way);
       } else {
@@ -198,7 +198,8 @@ class GeodesicDescent {
   static constexpr std::size_t kLately = 10;  // steps
   const Problem& problem_;
   const SolveOptions& options_;
-  bool no_step_predicted_ = false;  ///< in the last advance
+  bool no_trial_finite_ =
+      false;  ///< no step tried in the last advance led where anything can be predicted
   double damping_, chi2_ = 0.0;
   Eigen::VectorXd u_, rows_, scale2_, unit_;
   Eigen::MatrixXd jacobian_, normal_;

@@ -246,10 +246,11 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
           std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
   }
   suit_to_data(problem, scene);
-  if (problem.free.empty())
-    throw InputError(fmt::format(
-        "[fit] fixed names every parameter of model '{}': leave at least one of them out", model));
   if (options.rolls_at_first) tie_to_spin(scene, problem);
+  if (std::all_of(problem.free.begin(), problem.free.end(),
+                  [](const FreeParameter& parameter) { return parameter.held; }))
+    throw InputError(fmt::format(
+        "[fit] leaves no parameter of model '{}' to be fitted: take one out of fixed", model));
   check_each_determined(problem);
   const int needed = static_cast<int>(problem.free.size());
   if (problem.rows() <= needed)

@@ -267,7 +267,7 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
     const bool low = std::isfinite(lower), high = std::isfinite(upper);
     // What cannot be negative is no more so for a bound from above.
     const bool from_zero = info.logarithmic && !(lower > 0.0);
-    if (high && from_zero && upper > 0.0) return {Transform::Kind::limited, 0.0, upper};
+    if (high && from_zero && upper > 0.0) return {Transform::Kind::between, 0.0, upper};
     if (low && high) return {Transform::Kind::between, lower, upper};
     if (low && !from_zero) return {Transform::Kind::above, lower, upper};
     if (high) return {Transform::Kind::below, lower, upper};

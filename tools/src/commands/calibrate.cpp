@@ -243,9 +243,6 @@ std::size_t floor_view(const CalibrateOptions& options, const Views& views) {
 std::vector<Eigen::Vector2d> points(const fs::path& path, const char* x, const char* y,
                                     Eigen::Index fewest) {
   const data::Table table = data::read_table(path);
-  for (const char* column : {x, y})
-    if (!table.has(column))
-      throw InputError(fmt::format("{}: there is no column {}", path.string(), column));
   const Eigen::VectorXd u = table.column(x), v = table.column(y);
   if (u.size() < fewest)
     throw InputError(fmt::format("{}: {} point{}; at least {} are needed", path.string(), u.size(),

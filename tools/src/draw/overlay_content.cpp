@@ -175,6 +175,12 @@ bool OverlayContent::detected(std::int64_t frame, double t_s) const {
 const ObservedPoint* OverlayContent::observed_in(const ObjectPaths& paths, std::int64_t frame,
                                                  double t_s) const {
   const std::vector<ObservedPoint>& points = paths.observed;
+  if (!points.empty() && points.front().frame >= 0) {
+    const auto at = std::lower_bound(
+        points.begin(), points.end(), frame,
+        [](const ObservedPoint& point, std::int64_t number) { return point.frame < number; });
+    return at != points.end() && at->frame == frame ? &*at : nullptr;
+  }
   const auto away_s = [t_s](const ObservedPoint& point) { return std::abs(point.t_s - t_s); };
   auto nearest =
       std::lower_bound(points.begin(), points.end(), t_s,
@@ -184,10 +190,7 @@ const ObservedPoint* OverlayContent::observed_in(const ObjectPaths& paths, std::
     --nearest;
   if (nearest == points.end()) return nullptr;
   constexpr double kRounding_s = 1e-9;
-  const bool here = nearest->frame >= 0
-                        ? nearest->frame == frame
-                        : away_s(*nearest) <= 0.5 * paths.usual_step_s + kRounding_s;
-  return here ? &*nearest : nullptr;
+  return away_s(*nearest) <= 0.5 * paths.usual_step_s + kRounding_s ? &*nearest : nullptr;
 }
 
 std::optional<data::Pose<>> OverlayContent::tracked_pose(int object, std::int64_t frame) const {

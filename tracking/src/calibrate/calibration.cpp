@@ -286,7 +286,7 @@ double rms_of(const Eigen::VectorXd& residuals) {
 SeenCircle nearest_circle(const RimRays& rim, const SeenCircle& start) {
   constexpr int kIterations = 50;
   constexpr double kHopeless = 1e9;     // damping: no step, however small, gets nearer
-  constexpr double kSettled_px = 1e-3;  // a step that brings the rms no nearer is the last needed
+  constexpr double kSettled_px = 1e-3;  // a last step that gained less has settled
   SeenCircle x = start;
   double damping = 1e-3, gained_px = 0.0;
   for (int i = 0; i < kIterations; ++i) {
@@ -338,7 +338,7 @@ double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vect
         fmt::format("{} points of the rim; at least {} are needed", rim_px.size(), kFewest));
   const RimRays rim(camera, rim_px, radius_m);
   const SeenCircle start = rim.start();
-  // Edge on nothing tells how far away a circle is.
+  // Edge on, the circle's plane passes through the camera: nothing tells how it is turned.
   if (lie_on_a_line(rim_px))
     throw InputError(fmt::format("the {} points of the rim lie on one line", rim_px.size()));
   const SeenCircle circle = nearest_circle(rim, start);
