@@ -247,8 +247,7 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   }
   suit_to_data(problem, scene);
   if (options.rolls_at_first) tie_to_spin(scene, problem);
-  if (std::all_of(problem.free.begin(), problem.free.end(),
-                  [](const FreeParameter& parameter) { return parameter.held; }))
+  if (problem.free.empty())
     throw InputError(fmt::format(
         "[fit] leaves no parameter of model '{}' to be fitted: take one out of fixed", model));
   check_each_determined(problem);
