@@ -170,8 +170,8 @@ Trajectory simulate_free(const data::Scene& scene) {
   // No component of w exceeds what all the energy in the smallest moment would give.
   const Eigen::Vector3d& I = free.moments_kg_m2;
   const double fastest = std::sqrt(I.dot(free.w_rad_s.cwiseAbs2()) / I.minCoeff());
-  constexpr double kLargestTurn_rad =
-      0.5;  // between two looks an angle is taken the short way round
+  // Between two looks an angle is taken the short way round.
+  constexpr double kLargestTurn_rad = 0.5;
   const std::vector<double> fine = times_between(t_s, fastest, kLargestTurn_rad, parts);
   const Solution solution = run(free, fine, scene.run.tolerance, choice.method);
   Trajectory trajectory;

@@ -198,8 +198,8 @@ class GeodesicDescent {
   static constexpr std::size_t kLately = 10;  // steps
   const Problem& problem_;
   const SolveOptions& options_;
-  bool no_trial_finite_ =
-      false;  ///< no step tried in the last advance led where anything can be predicted
+  /// No step tried in the last advance led where anything can be predicted.
+  bool no_trial_finite_ = false;
   double damping_, chi2_ = 0.0;
   Eigen::VectorXd u_, rows_, scale2_, unit_;
   Eigen::MatrixXd jacobian_, normal_;

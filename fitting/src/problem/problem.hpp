@@ -138,7 +138,8 @@ const Value* said_of(const std::string& parameter, const std::map<std::string, V
 [[nodiscard]] bool leaves_choice(const std::string& name);
 
 /// A parameter to be fitted, as [fit] bounds it and knows it beforehand.
-/// @param arc  whose it is, -1: all of them share it @param value  before any fitting
+/// @param index  into predictor.parameters() @param arc  whose it is, -1: all of them share it
+/// @param value  before any fitting, in the parameter's unit
 [[nodiscard]] FreeParameter free_parameter(const model::Predictor& predictor,
                                            const data::FitSettings& settings, int index, int arc,
                                            double value);

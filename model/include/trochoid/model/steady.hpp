@@ -44,7 +44,8 @@ struct SteadyMotion {
 [[nodiscard]] double steady_rolling_spin(const RimBody& body, double theta_rad,
                                          double precession_rad_s);
 /// Precession rates of steady rolling at a tilt whose centre of mass moves at `along_m_s` along the
-/// node line: the roots of (1), up to two, its spin being that of rolling; empty where there are none.
+/// node line: the roots of (1), up to two, its spin being that of rolling; empty where there are
+/// none.
 [[nodiscard]] std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
                                                              double along_m_s);
 
