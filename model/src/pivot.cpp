@@ -236,7 +236,7 @@ Prediction PivotPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& valu
   for (std::size_t i = 0; i < kinds_.size(); ++i)
     p[kinds_[i]] = Dual8(values[static_cast<Eigen::Index>(i)]);
   for (std::size_t c = 0; c < request.derivatives.size(); ++c)
-    p[kinds_[static_cast<std::size_t>(request.derivatives[c])]].derivative[c] = 1.0;
+    set_lane(p[kinds_[static_cast<std::size_t>(request.derivatives[c])]].derivative, c, 1.0);
   fill(run_pivot(scene_, p, t_s, request.tolerance, request.max_steps), request, out);
   return out;
 }

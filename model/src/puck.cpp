@@ -236,7 +236,8 @@ Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& value
   given(p);
   int lane = 0;
   for (const int parameter : request.derivatives)
-    if (!cyclic(parameter)) p[kinds_[static_cast<std::size_t>(parameter)]].derivative[lane++] = 1.0;
+    if (!cyclic(parameter))
+      set_lane(p[kinds_[static_cast<std::size_t>(parameter)]].derivative, lane++, 1.0);
   fill(puck_path(scene_, p, t_s, request.tolerance, request.max_steps), p[kContact], request, out);
   return out;
 }

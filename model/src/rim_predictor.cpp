@@ -317,7 +317,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
     RimInput<Dual8> in = input<Dual8>(values);
     for (std::size_t lane = 0; lane < columns.size(); ++lane) {
       const int parameter = request.derivatives[static_cast<std::size_t>(columns[lane])];
-      slot(in, entries_.slots[static_cast<std::size_t>(parameter)]).derivative[lane] = 1.0;
+      set_lane(slot(in, entries_.slots[static_cast<std::size_t>(parameter)]).derivative, lane, 1.0);
     }
     const RimPath<Dual8> path = seen(run(in, call), call);
     if (from == 0) fill_values(path, call, out);

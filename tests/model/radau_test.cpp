@@ -190,7 +190,7 @@ struct Broken {
     dy[0] = -rate * y[0];
     if (t < 0.5) return;
     if (values_too) dy[0] = T(NAN);
-    if constexpr (requires { T::kLanes; }) dy[0].derivative[0] = NAN;
+    if constexpr (requires { T::kLanes; }) set_lane(dy[0].derivative, 0, NAN);
   }
   Broken<double> values() const { return {value_of(rate), values_too}; }
 };
@@ -276,7 +276,7 @@ TEST(Radau, FollowsAStiffBodyAndItsDerivativesAsSundialsDoes) {
     State<Dual<4>, n> state, rate;
     for (int i = 0; i < n; ++i) {
       state[i] = Dual<4>(y[i]);
-      for (int p = 0; p < 2; ++p) state[i].derivative[p] = s[i + p * n];
+      for (int p = 0; p < 2; ++p) set_lane(state[i].derivative, p, s[i + p * n]);
     }
     by_friction.derivative(t, state, rate);
     for (int i = 0; i < n; ++i)

@@ -1,4 +1,6 @@
 #pragma once
+#include <cstddef>
+
 #include "trochoid/model/isa.hpp"
 
 /// Scalars of the equations of motion: double, and Dual<N> = a value with N derivatives, carried
@@ -8,20 +10,66 @@
 namespace trochoid::model {
 inline namespace TROCHOID_ISA {
 
+// Lanes are whole registers: a vector type wider than the machine's is put together from single
+// numbers in memory wherever a number multiplies it, which takes longer than the arithmetic.
 template <int N>
-struct LanesOf;
+struct TwoHalves;
+template <int N>
+struct LanesOf {
+  using Type = TwoHalves<N>;
+};
 template <>
 struct LanesOf<4> {
   typedef double Type __attribute__((vector_size(32)));
 };
+#if defined(__AVX512F__)
 template <>
 struct LanesOf<8> {
   typedef double Type __attribute__((vector_size(64)));
 };
-template <>
-struct LanesOf<16> {
-  typedef double Type __attribute__((vector_size(128)));
+#endif
+
+/// Lanes of more than one register, with the operations of one.
+template <int N>
+struct TwoHalves {
+  typename LanesOf<N / 2>::Type low, high;
+
+  [[nodiscard]] TROCHOID_INLINE double operator[](std::size_t lane) const {
+    return lane < N / 2 ? low[lane] : high[lane - N / 2];
+  }
+  TROCHOID_INLINE TwoHalves& operator+=(const TwoHalves& b) { return *this = *this + b; }
+  TROCHOID_INLINE TwoHalves& operator-=(const TwoHalves& b) { return *this = *this - b; }
+  TROCHOID_INLINE TwoHalves& operator*=(double b) { return *this = *this * b; }
+
+  friend TROCHOID_INLINE TwoHalves operator-(const TwoHalves& a) { return {-a.low, -a.high}; }
+  friend TROCHOID_INLINE TwoHalves operator+(const TwoHalves& a, const TwoHalves& b) {
+    return {a.low + b.low, a.high + b.high};
+  }
+  friend TROCHOID_INLINE TwoHalves operator-(const TwoHalves& a, const TwoHalves& b) {
+    return {a.low - b.low, a.high - b.high};
+  }
+  friend TROCHOID_INLINE TwoHalves operator*(const TwoHalves& a, const TwoHalves& b) {
+    return {a.low * b.low, a.high * b.high};
+  }
+  friend TROCHOID_INLINE TwoHalves operator*(const TwoHalves& a, double b) {
+    return {a.low * b, a.high * b};
+  }
+  friend TROCHOID_INLINE TwoHalves operator*(double a, const TwoHalves& b) {
+    return {a * b.low, a * b.high};
+  }
 };
+
+template <class Lanes>
+TROCHOID_INLINE void set_lane(Lanes& lanes, std::size_t lane, double value) {
+  lanes[lane] = value;
+}
+template <int N>
+TROCHOID_INLINE void set_lane(TwoHalves<N>& lanes, std::size_t lane, double value) {
+  if (lane < N / 2)
+    set_lane(lanes.low, lane, value);
+  else
+    set_lane(lanes.high, lane - N / 2, value);
+}
 
 template <int N>
 struct Dual {
@@ -37,7 +85,7 @@ struct Dual {
   /// The variable that lane `lane` differentiates by.
   [[nodiscard]] static Dual variable(double value, int lane) {
     Dual result(value);
-    result.derivative[lane] = 1.0;
+    set_lane(result.derivative, lane, 1.0);
     return result;
   }
 

@@ -269,28 +269,48 @@ class Radau : public Stepping<Radau<System>, System::kStates> {
   /// One step of Newton's iteration, from the slopes at the stages. Values that are `found` stay:
   /// they are the same with derivatives and without.
   TROCHOID_INLINE void improve(double h, bool found) {
-    const double real = radau::kReal / h, re = radau::kRe / h, im = radau::kIm / h;
-    for (int c = 0; c < kN; ++c) {
-      S f[3];
-      for (int r = 0; r < 3; ++r)
-        f[r] = k_[0][c] * radau::kInverseT[r][0] + k_[1][c] * radau::kInverseT[r][1] +
-               k_[2][c] * radau::kInverseT[r][2];
-      change_[0][c] = f[0] - w_[0][c] * real;
-      change_[1][c] = f[1] - w_[1][c] * re + w_[2][c] * im;
-      change_[2][c] = f[2] - w_[2][c] * re - w_[1][c] * im;
+    if constexpr (requires { S::kLanes; }) {
+      improve_part<typename S::Lanes>(
+          h, [](auto& number) TROCHOID_LAMBDA_INLINE -> auto& { return number.derivative; });
+      const auto value = [](auto& number) TROCHOID_LAMBDA_INLINE -> auto& {
+        return number.value;
+      };
+      if (!found) return improve_part<double>(h, value);
+      for (Y& change : change_)
+        for (S& of_component : change.v) of_component.value = 0.0;
+    } else {
+      improve_part<S>(
+          h, [](auto& number) TROCHOID_LAMBDA_INLINE -> auto& { return number; });
     }
-    RealSide<S, kN> first{change_[0]};
-    ComplexSide<S, kN> second{change_[1], change_[2]};
+  }
+
+  /// The iteration is linear in the slopes: values and derivatives go through it each on their own,
+  /// derivatives in whole registers.
+  template <class T, class Part>
+  TROCHOID_INLINE void improve_part(double h, const Part& part) {
+    const double real = radau::kReal / h, re = radau::kRe / h, im = radau::kIm / h;
+    State<T, kN> change[3];
+    for (int c = 0; c < kN; ++c) {
+      T f[3];
+      for (int r = 0; r < 3; ++r)
+        f[r] = part(k_[0][c]) * radau::kInverseT[r][0] + part(k_[1][c]) * radau::kInverseT[r][1] +
+               part(k_[2][c]) * radau::kInverseT[r][2];
+      change[0][c] = f[0] - part(w_[0][c]) * real;
+      change[1][c] = f[1] - part(w_[1][c]) * re + part(w_[2][c]) * im;
+      change[2][c] = f[2] - part(w_[2][c]) * re - part(w_[1][c]) * im;
+    }
+    RealSide<T, kN> first{change[0]};
+    ComplexSide<T, kN> second{change[1], change[2]};
     real_.solve(first);
     complex_.solve(second);
     for (int c = 0; c < kN; ++c) {
       for (int r = 0; r < 3; ++r) {
-        if (found) change_[r][c] -= value_of(change_[r][c]);
-        w_[r][c] += change_[r][c];
+        part(change_[r][c]) = change[r][c];
+        part(w_[r][c]) += change[r][c];
       }
       for (int s = 0; s < 3; ++s)
-        z_[s][c] =
-            w_[0][c] * radau::kT[s][0] + w_[1][c] * radau::kT[s][1] + w_[2][c] * radau::kT[s][2];
+        part(z_[s][c]) = part(w_[0][c]) * radau::kT[s][0] + part(w_[1][c]) * radau::kT[s][1] +
+                         part(w_[2][c]) * radau::kT[s][2];
     }
   }
 
