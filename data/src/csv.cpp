@@ -42,9 +42,6 @@ bool tells_separator(std::string_view line) {
 }
 
 void check_columns(const std::vector<std::string>& columns, const std::string& place) {
-  if (columns.size() > kMaxColumns)
-    throw InputError(
-        fmt::format("{}: more than {} columns, not a file of this kind", place, kMaxColumns));
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty())
       throw InputError(fmt::format("{}: column {} has no name", place, i + 1));
@@ -80,6 +77,10 @@ CsvReader::CsvReader(std::string_view text, std::string where)
                                  text_.empty() ? "the file is empty" : "holds no column names"));
   separator_ = separator_of(trimmed(line));
   for (const std::string_view name : split(line)) columns_.emplace_back(name);
+  if (columns_.size() > kMaxColumns)
+    throw InputError(
+        fmt::format("{}: more than {} columns, not a file of this kind", place(), kMaxColumns));
+  for (; columns_.size() > 1 && columns_.back().empty(); ++spare_) columns_.pop_back();
   check_columns(columns_, place());
 }
 
@@ -131,6 +132,9 @@ bool CsvReader::next() {
     std::string_view line;
     if (!next_content_line(line)) return false;
     cells_ = split(line);
+    const std::size_t most = columns_.size() + spare_;
+    while (cells_.size() > columns_.size() && cells_.size() <= most && cells_.back().empty())
+      cells_.pop_back();
   } while (cells_.size() == columns_.size() && std::all_of(cells_.begin(), cells_.end(), is_empty));
   if (cells_.size() != columns_.size())
     throw InputError(fmt::format("{}: {}", place(), words_for_cells(cells_.size())));

@@ -10,8 +10,9 @@ namespace trochoid::data {
 /// Line-wise reader of a table of numbers below '#' header lines and one line of column names.
 /// Cells are separated by commas or, where the column names are, by semicolons or tabs; then
 /// numbers may have decimal commas. Tolerates CRLF, a byte order mark, a first line "sep=;" as
-/// spreadsheets have it, blanks around cells, empty lines and '#' lines anywhere, these with
-/// separators at their ends; everything else is refused with file and line.
+/// spreadsheets have it, blanks around cells, empty lines and '#' lines anywhere, and separators at
+/// the ends of '#' lines and, where that of the names has some, of rows; everything else is refused
+/// with file and line.
 class CsvReader {
  public:
   /// Reads up to the column names. `text` must outlive the reader; `where` names the file.
@@ -51,6 +52,7 @@ class CsvReader {
   char decimal_mark_ = '\0';  ///< of the numbers so far; none while all were whole
   std::vector<std::pair<std::string, std::string>> header_;
   std::vector<std::string> columns_;
+  std::size_t spare_ = 0;  ///< separators at the end of the line of names
   std::vector<std::string_view> cells_;
 };
 

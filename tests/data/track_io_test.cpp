@@ -190,6 +190,16 @@ TEST(TrackFile, MayHaveDecimalCommasWhereSemicolonsOrTabsSeparate) {
   EXPECT_EQ(points.tracks.at(0).samples[0].centre_m, Eigen::Vector2d(1.5, 2));
 }
 
+TEST(TrackFile, MayEndItsRowsInSeparatorsAsItsNamesDo) {
+  const TestFolder folder;
+  for (const char* rows : {"0,1,2,,\n1,3,4,,\n", "0,1,2\n1,3,4,\n,,,,\n"}) {
+    const TrackFile file =
+        read_track(folder.write("trailing.csv", std::string("t_s,x_m,y_m,,\n") + rows));
+    ASSERT_EQ(file.tracks.at(0).samples.size(), 2U);
+    EXPECT_EQ(file.tracks[0].samples[1].centre_m, Eigen::Vector2d(3, 4));
+  }
+}
+
 TEST(TrackFile, LeavesOutAndCountsTheRowsThatGiveNoPosition) {
   const TestFolder folder;
   const TrackFile file = read_track(
@@ -270,7 +280,11 @@ INSTANTIATE_TEST_SUITE_P(
                      ":2:", "'1,234' has a decimal comma where numbers before it have a point"},
         RefusedTrack{"ThousandsPoint", "t_s;x_m;y_m\n0;1;1.234,5\n", ":2:", "not a finite number"},
         RefusedTrack{"DoubledColumn", "t_s,x_m,y_m,x_m\n0,1,2,3\n", ":1:", "twice"},
-        RefusedTrack{"NamelessColumn", "t_s,x_m,y_m,\n0,1,2,3\n", ":1:", "no name"},
+        RefusedTrack{"NamelessColumn", "t_s,,x_m,y_m\n0,1,2,3\n", ":1:", "column 2 has no name"},
+        RefusedTrack{"NumberUnderNoName", "t_s,x_m,y_m,\n0,1,2,3\n",
+                     ":2:", "4 cells where the header names 3"},
+        RefusedTrack{"SeparatorsBehindARowAlone", "t_s,x_m,y_m\n0,1,2,\n",
+                     ":2:", "4 cells where the header names 3"},
         RefusedTrack{"Unsorted", "t_s,x_m,y_m\n0.25,1,2\n0.20,1,2\n",
                      ":3:", "t_s = 0.2 does not increase (previous 0.25); sort the track"},
         RefusedTrack{"EqualTimes", "t_s,x_m,y_m\n1,1,2\n1,1,2\n", ":3:", "does not increase"},
