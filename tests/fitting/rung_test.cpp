@@ -202,7 +202,7 @@ TEST(Rivals, WithATermMoreAreToldAndNotAllowedForWhereResidualsHangTogether) {
   allow_for_rivals(rungs, rungs[0], fit);
   EXPECT_DOUBLE_EQ(fit.parameters[0].sigma, 0.1);
   ASSERT_EQ(fit.warnings.size(), 1u);
-  EXPECT_NE(fit.warnings[0].find("rolling_friction_m would be 0.4 +- 0.5; the 1 +- 0.1 given here"),
+  EXPECT_NE(fit.warnings[0].find("rolling_friction_m would be 0.4 ± 0.5; the 1 ± 0.1 given here"),
             std::string::npos)
       << fit.warnings[0];
 }
@@ -274,7 +274,7 @@ TEST(Rivals, WithATermThatCouldBeAnythingWidenTheErrorBarsSoFarAndTheRestIsTold)
   EXPECT_EQ(
       fit.warnings[1],
       "with a gap layer is neither needed nor ruled out: with it, rolling_friction_m would be 0 "
-      "+- 0.5; the 1 +- 0.25 given here is away from that by 4 times its own error bar");
+      "± 0.5; the 1 ± 0.25 given here is away from that by 4 times its own error bar");
 }
 
 // An air couple, of which none fitted best, and on the size of which a filmed ring's pivoting
@@ -335,7 +335,7 @@ TEST(Rivals, WithATermBesideWhichAnotherOneIsNotDeterminedAreTold) {
   ASSERT_FALSE(fit.warnings.empty());
   EXPECT_EQ(fit.warnings.back(),
             "with air is neither needed nor ruled out: with it, pivoting_friction_m would not be "
-            "determined; the 5 +- 0.1 given here is what holds without it");
+            "determined; the 5 ± 0.1 given here is what holds without it");
 }
 
 // Nothing moves where none of the further loss fits best, and still it leaves another one open.
@@ -349,8 +349,8 @@ TEST(Rivals, WithATermThatLeavesAnotherOneOpenAreTold) {
   allow_for_rivals(rungs, rungs[0], fit);
   ASSERT_EQ(fit.warnings.size(), 2u);
   EXPECT_EQ(fit.warnings[1],
-            "with air is neither needed nor ruled out: with it, pivoting_friction_m would be 5 +- "
-            "2.4; the 5 +- 0.25 given here is what holds without it");
+            "with air is neither needed nor ruled out: with it, pivoting_friction_m would be 5 ± "
+            "2.4; the 5 ± 0.25 given here is what holds without it");
 }
 
 // Full error bars are had for the chosen one alone: like is compared with like.

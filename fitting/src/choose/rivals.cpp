@@ -171,10 +171,10 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
   const bool open = !std::isfinite(there->sigma);
   const double shift = std::abs(shift_of(*moved, moving->fit)) / moved->sigma;
   fit.warnings.push_back(fmt::format(
-      "{} is neither needed nor ruled out: with it, {} would {}; the {:.4g} +- {:.2g} given here "
+      "{} is neither needed nor ruled out: with it, {} would {}; the {:.4g} ± {:.2g} given here "
       "is {}",
       moving->name, moved->name,
-      open ? "not be determined" : fmt::format("be {:.4g} +- {:.2g}", there->value, there->sigma),
+      open ? "not be determined" : fmt::format("be {:.4g} ± {:.2g}", there->value, there->sigma),
       moved->value, moved->sigma,
       !open && shift > kFar ? fmt::format("away from that by {:.2g} times its own error bar", shift)
                             : "what holds without it"));

@@ -97,7 +97,7 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
   for (const Doubt& doubt : body_doubts(problem, solution.u, scene, frame_s)) {
     error.covariance += doubt.shift * doubt.shift.transpose();
     const data::Prior& prior = scene.fit.prior.at(doubt.name);
-    fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} +- {:.2g}", doubt.name,
+    fit.warnings.push_back(fmt::format("error bars allow for {} = {:.6g} ± {:.2g}", doubt.name,
                                        prior.value, prior.sigma));
   }
   heed_either_sense(problem, error, fit);

@@ -44,7 +44,7 @@ void report_parameters(const Problem& problem, const Uncertainty& error,
     parameter.note = infos[free.index].meaning;
     if (one_camera.size() > 0 && infos[free.index].role == model::ParameterInfo::Role::dynamics)
       parameter.note +=
-          fmt::format("; +- {:.2g} between clips of this scale and frame rate", one_camera[i]);
+          fmt::format("; ± {:.2g} between clips of this scale and frame rate", one_camera[i]);
     if (free.held && free.transform.is_over_decades())
       parameter.note +=
           fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);

@@ -75,7 +75,7 @@ void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
     sum += one.value / (one.sigma * one.sigma);
     const ArcData& arc = problem.arcs[static_cast<std::size_t>(one.arc)];
     list +=
-        fmt::format("{}{:.3g} +- {:.2g} (object {}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
+        fmt::format("{}{:.3g} ± {:.2g} (object {}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
                     one.value, one.sigma, arc.object, arc.t_s.front(), arc.t_s.back());
   }
   for (const Estimate& one : estimates)

@@ -246,7 +246,7 @@ void check_values(const model::Predictor& predictor, const data::FitSettings& se
     const auto refuse_prior = [&](double lower, double upper, const char* whose) {
       if (prior != nullptr && !(prior->value + kSure * prior->sigma >= lower &&
                                 prior->value - kSure * prior->sigma <= upper))
-        throw InputError(fmt::format("[fit] prior: {} = {} +- {} lies outside {} {} .. {}",
+        throw InputError(fmt::format("[fit] prior: {} = {} ± {} lies outside {} {} .. {}",
                                      info.name, prior->value, prior->sigma, whose, lower, upper));
     };
     if (const auto* bounds = said_of(info.name, settings.bounds))

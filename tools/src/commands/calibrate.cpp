@@ -336,7 +336,7 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
       left_out.empty() ? "" : fmt::format(", {} left out", left_out.size()), result.rms_px,
       worst_px, worst_name);
   fmt::print(
-      "fx {:.2f} fy {:.2f} +- {:.2f} px, centre {:.2f}, {:.2f} +- {:.2f} px, k1 {:.4f} +- "
+      "fx {:.2f} fy {:.2f} ± {:.2f} px, centre {:.2f}, {:.2f} ± {:.2f} px, k1 {:.4f} ± "
       "{:.4f}, k2 {:.4f}\n",
       c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
       result.sigma_k1, c.distortion[1]);
