@@ -10,7 +10,7 @@
 
 namespace trochoid::tracking {
 
-inline constexpr double kTilt = 0.7, kEvidence = 100.0;
+inline constexpr double kTilt = 0.7, kSupport_px = 100.0;
 inline constexpr int kFrames = 60;
 
 inline double phi_at(double t_s) {
@@ -18,7 +18,7 @@ inline double phi_at(double t_s) {
 }
 
 /// A finder that always finds what is predicted and finds the truth a little more convincing, but
-/// for some frames that speak for the mirror image.
+/// for some frames that support the mirror image.
 class Oracle : public BodyFinder {
  public:
   /// @param mirrored_larger_px  by how much the rim of a frame's mirror image should look smaller,
@@ -35,7 +35,7 @@ class Oracle : public BodyFinder {
         std::remainder(seen.pose->pose.phi_rad - phi_at(look.frame.t_s), 2.0 * std::numbers::pi);
     const bool right = std::abs(off) < 0.5 * std::numbers::pi;
     const int frame = static_cast<int>(look.frame.index);
-    seen.pose->evidence = kEvidence + (right ? bonus_of_truth_(frame) : 0.0);
+    seen.pose->support_px = kSupport_px + (right ? bonus_of_truth_(frame) : 0.0);
     seen.accepted = 0.9;
     // Edges of all frames look so much too far out.
     constexpr double kUsual_px = 0.2;

@@ -8,17 +8,17 @@
 namespace trochoid::tracking {
 namespace {
 
-/// Finds whatever is predicted, lying bodies with so much evidence.
+/// Finds whatever is predicted, lying bodies with so much support.
 class Floor final : public BodyFinder {
  public:
-  explicit Floor(double evidence_lying) : lying_(std::make_unique<Floor>()) {
-    lying_->evidence_ = evidence_lying;
+  explicit Floor(double lying_px) : lying_(std::make_unique<Floor>()) {
+    lying_->support_px_ = lying_px;
   }
   Floor() = default;
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
     Sighting seen = *look.predicted;
-    seen.pose->evidence = evidence_;
+    seen.pose->support_px = support_px_;
     seen.accepted = 0.9;
     return seen;
   }
@@ -29,7 +29,7 @@ class Floor final : public BodyFinder {
   [[nodiscard]] const BodyFinder* lying() const override { return lying_.get(); }
 
  private:
-  double evidence_ = kEvidence;
+  double support_px_ = kSupport_px;
   std::unique_ptr<Floor> lying_;
 };
 
@@ -52,7 +52,7 @@ class Lying : public GlimpsedSequence {
 };
 
 TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLooksSo) {
-  const Floor floor(0.95 * kEvidence);
+  const Floor floor(0.95 * kSupport_px);
   auto glimpses = seen_by(floor, false);
   measure_what_lies(background_, floor, glimpses);
   EXPECT_EQ(count_lying(glimpses), kFrames);
@@ -60,7 +60,7 @@ TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLooksSo) {
 
 // Raised on one side it would darken the floor there.
 TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLacksTheShadowOfATilt) {
-  const Floor floor(0.8 * kEvidence);
+  const Floor floor(0.8 * kSupport_px);
   for (const double agrees : {0.0, -1.0}) {
     auto glimpses = seen_by(floor, false);
     for (Glimpse& g : glimpses) g.seen->shadow = agrees;
@@ -70,14 +70,14 @@ TEST_F(Lying, ABodyWhoseAxisStaysLiesIfItLacksTheShadowOfATilt) {
 }
 
 TEST_F(Lying, ABodyThatPrecessesDoesNotLieWhateverItLooksLike) {
-  const Floor floor(1.5 * kEvidence);
+  const Floor floor(1.5 * kSupport_px);
   auto glimpses = seen_by(floor, true);
   measure_what_lies(background_, floor, glimpses);
   EXPECT_EQ(count_lying(glimpses), 0);
 }
 
 TEST_F(Lying, ABodyHeldTiltedDoesNotLookAsIfItLay) {
-  const Floor floor(0.6 * kEvidence);
+  const Floor floor(0.6 * kSupport_px);
   auto glimpses = seen_by(floor, false);
   measure_what_lies(background_, floor, glimpses);
   EXPECT_EQ(count_lying(glimpses), 0);

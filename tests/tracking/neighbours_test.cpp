@@ -193,7 +193,7 @@ TEST_F(Neighbours, LastFramesThatSatElsewhereAreFollowedClosely) {
       auto seen = Oracle::find(look);
       if (look.frame.index < kFirstWrong || look.there) return seen;
       seen->pose->pose.phi_rad = phi_at(look.frame.t_s) + std::numbers::pi;
-      seen->pose->evidence = kEvidence;
+      seen->pose->support_px = kSupport_px;
       return seen;
     }
   };

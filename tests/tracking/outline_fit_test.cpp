@@ -565,7 +565,7 @@ TEST(OutlineFitter, LessSpeaksForABodyThatLooksSmallerThanItIs) {
   ASSERT_TRUE(seen && of_larger);
   EXPECT_NEAR(seen->larger_px, 0.0, 0.05);
   EXPECT_NEAR(of_larger->larger_px, -0.5, 0.1);
-  EXPECT_LT(of_larger->evidence, 0.9 * seen->evidence);
+  EXPECT_LT(of_larger->support_px, 0.9 * seen->support_px);
 }
 
 // Shadows at the contact darken the floor there as well: on one as bright beside the body as
@@ -872,8 +872,8 @@ TEST(OutlineFitter, LessSpeaksForAnOutlineBesideWhichTheLightIsUneven) {
   };
   const auto even = beside_slopes(0.0), uneven = beside_slopes(8.0);
   ASSERT_TRUE(even && uneven);
-  EXPECT_NEAR(uneven->evidence / even->evidence, 1.0, 0.15) << "as many edges";
-  EXPECT_LT(uneven->speaks(), 0.8 * even->speaks());
+  EXPECT_NEAR(uneven->support_px / even->support_px, 1.0, 0.15) << "as many edges";
+  EXPECT_LT(uneven->score_px(), 0.8 * even->score_px());
   EXPECT_GT(even->evenness, 0.95);
 }
 
@@ -914,7 +914,7 @@ TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {
   const cv::Mat luma = developed(picture, 2.0, random);
   const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
   const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
-  const auto evidence = [&](double phi_rad) {
+  const auto support_px = [&](double phi_rad) {
     data::Pose<> predicted;
     predicted.theta_rad = kTheta, predicted.phi_rad = phi_rad;
     predicted.centre_m = disc.camera.table_from_image(
@@ -924,10 +924,10 @@ TEST(OutlineFitter, AWallAsBrightAsTheFloorIsToldFromItByItsColour) {
                                       .detection = {},
                                       .predicted = predicted,
                                       .chroma = chroma});
-    return seen ? seen->evidence : 0.0;
+    return seen ? seen->support_px : 0.0;
   };
   constexpr double kClearly = 1.08;  // twice what readings may differ by and be as good
-  EXPECT_GT(evidence(0.0), kClearly * evidence(std::numbers::pi));
+  EXPECT_GT(support_px(0.0), kClearly * support_px(std::numbers::pi));
 }
 
 // A disc with a dot on its upper face, predicted the wrong way up: its outline is the same.

@@ -104,15 +104,14 @@ TEST(PathOutliers, ABodyWellSeenIsKeptWhereverItIs) {
   EXPECT_EQ(forgotten(0.9, {25.0, -20.0}), std::vector<int>{});
 }
 
-// Frames 8 to 11 hidden; how much speaks for frames 5 to 7 and 12 to 14, as a share of what usually
-// does.
+// Frames 8 to 11 hidden; the support of frames 5 to 7 and 12 to 14, as a share of the usual.
 std::vector<int> forgotten_beside_a_gap(double before, double after) {
   Recorded recorded;
-  for (Glimpse& g : recorded.glimpses) g.seen->pose->evidence = 200.0;
-  for (std::size_t i = 5; i < 8; ++i) recorded.glimpses[i].seen->pose->evidence *= before;
-  for (std::size_t i = 12; i < 15; ++i) recorded.glimpses[i].seen->pose->evidence *= after;
+  for (Glimpse& g : recorded.glimpses) g.seen->pose->support_px = 200.0;
+  for (std::size_t i = 5; i < 8; ++i) recorded.glimpses[i].seen->pose->support_px *= before;
+  for (std::size_t i = 12; i < 15; ++i) recorded.glimpses[i].seen->pose->support_px *= after;
   for (std::size_t i = 8; i < 12; ++i) recorded.glimpses[i].seen.reset();
-  forget_what_is_faint_beside_gaps(recorded.glimpses);
+  forget_weak_support_beside_gaps(recorded.glimpses);
   return unseen(recorded.glimpses);
 }
 
@@ -128,10 +127,10 @@ TEST(PathOutliers, ABodySeenWellUpToAGapIsKept) {
 // No gap is near, or only the beginning of the recording.
 TEST(PathOutliers, ABodySeenLittleWithoutAGapIsKept) {
   Recorded recorded;
-  for (Glimpse& g : recorded.glimpses) g.seen->pose->evidence = 200.0;
+  for (Glimpse& g : recorded.glimpses) g.seen->pose->support_px = 200.0;
   for (const std::size_t i : {0, 1, 2, 20, 21, 22})
-    recorded.glimpses[i].seen->pose->evidence = 50.0;
-  forget_what_is_faint_beside_gaps(recorded.glimpses);
+    recorded.glimpses[i].seen->pose->support_px = 50.0;
+  forget_weak_support_beside_gaps(recorded.glimpses);
   for (const Glimpse& g : recorded.glimpses) EXPECT_TRUE(g.seen) << "frame " << g.frame->index;
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kOff_rad = 0.3, kOff_m = 1e-3;  // between the two readings of a picture
 
-/// Finds either of two attitudes, whichever it is led to, the true one with more evidence or less.
+/// Finds either of two attitudes, whichever it is led to, the true one with more support or less.
 class TwoReadings final : public BodyFinder {
  public:
   /// @param of_the_way how far off the other one is really found, of how far off it should be.
@@ -21,8 +21,8 @@ class TwoReadings final : public BodyFinder {
     const bool right = theta < kTilt + 0.5 * kOff_rad;
     theta = right ? kTilt : kTilt + found_rad_;
     seen.pose->pose.phi_rad = phi_at(look.frame.t_s);
-    seen.pose->evidence =
-        kEvidence + (right ? bonus_of_truth_(static_cast<int>(look.frame.index)) : 0.0);
+    seen.pose->support_px =
+        kSupport_px + (right ? bonus_of_truth_(static_cast<int>(look.frame.index)) : 0.0);
     seen.pose->covariance_m2 = 1e-8 * Eigen::Matrix2d::Identity();
     return seen;
   }
@@ -79,7 +79,7 @@ class Readings : public GlimpsedSequence {
 };
 
 TEST_F(Readings, ARecordingOnAnotherEdgeIsFoundOutByWhatAllPicturesSayTogether) {
-  // By a twentieth, which no picture's evidence is to be trusted with.
+  // By a twentieth, which no picture's score is to be trusted with.
   const TwoReadings finder([](int i) { return i % 2 == 0 ? 15.0 : -5.0; });
   EXPECT_EQ(count_off(chosen(finder, [](int) { return true; })), 0);
 }
@@ -121,11 +121,12 @@ TEST_F(Readings, APictureLookedAtInAnotherReadingIsDoubtedAsFarAsItLeadsThere) {
 
 // A stretch of a long recording has few frames that are looked at.
 TEST_F(Readings, WhatALongRecordingTellsApartAStretchOfItMayNot) {
-  const ReadingTally stretch{.looked_at = 2.0, .found = 2.0, .gain = -0.8, .square = 2.0};
+  const ReadingTally stretch{
+      .looked_at = 2.0, .found = 2.0, .log_score_ratio = -0.8, .square = 2.0};
   ReadingTally recording;
   for (int i = 0; i < 50; ++i) recording.add(stretch);
-  EXPECT_GT(stretch.may_be(), 1.5 * recording.may_be());
-  EXPECT_GT(recording.may_be(), 0.02);
+  EXPECT_GT(stretch.expected_square(), 1.5 * recording.expected_square());
+  EXPECT_GT(recording.expected_square(), 0.02);
 }
 
 TEST_F(Readings, WhatAllPicturesTellApartLeavesTheErrorOfTheTiltAsItIs) {

@@ -87,8 +87,8 @@ TEST_F(Shadows, MoreSpeaksForAFitThanForItsMirrorImageWithAnotherShadow) {
   look_at_shadows(lit, finder_, mirrored);
   double sum = 0.0;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    EXPECT_GT(speaks_more(*all[i].seen, *mirrored[i].seen), -0.05) << i;
-    sum += speaks_more(*all[i].seen, *mirrored[i].seen);
+    EXPECT_GT(log_score_ratio(*all[i].seen, *mirrored[i].seen), -0.05) << i;
+    sum += log_score_ratio(*all[i].seen, *mirrored[i].seen);
   }
   EXPECT_GT(sum / kFrames, 0.2);
 }
@@ -99,9 +99,9 @@ TEST_F(Shadows, ShadowsOfFitsThatCoverOtherPlacesAreNotCompared) {
   auto all = glimpses();
   Sighting one = *all[0].seen, other = one;
   one.shadow = 0.8, other.shadow = 0.1;
-  EXPECT_GT(speaks_more(one, other), 0.3);
+  EXPECT_GT(log_score_ratio(one, other), 0.3);
   other.centre_px.x() += 0.5 * one.rim.semi_major_px();
-  EXPECT_EQ(speaks_more(one, other), 0.0);
+  EXPECT_EQ(log_score_ratio(one, other), 0.0);
 }
 
 }  // namespace

@@ -63,8 +63,8 @@ TEST(TrackAssembly, WhatAllFramesMayBeOffByDoesNotHideHowFarTheyScatter) {
     at.seen.pose->covariance_m2 = kClaimed_m * kClaimed_m * Eigen::Matrix2d::Identity();
     at.seen.other_readings[0].m2 = kOff_m * kOff_m * Eigen::Matrix2d::Identity();
   }
-  // Nothing speaks for it or against it.
-  path.readings[0] = {.looked_at = 17.0, .found = 17.0, .gain = 0.0, .square = 17.0};
+  // It scores as high as the chosen one.
+  path.readings[0] = {.looked_at = 17.0, .found = 17.0, .log_score_ratio = 0.0, .square = 17.0};
   double mean_m2 = 0.0;
   for (const auto& sample : assemble_track(path, 0, {}, {}).samples)
     mean_m2 += sample.covariance_m2(0, 0) / 200.0;

@@ -326,7 +326,7 @@ class Tracking {
     constexpr double kNew = 0.3;
     if (!seed)
       seed = seed_in_plate(by_rim = find_seed_at(window, background_, *rim_finder(), at_px));
-    else if (!seed->seen.pose && seed->seen.evidence.edges < kNew)
+    else if (!seed->seen.pose && seed->seen.contrast.outline < kNew)
       seed = seed_in_plate(seed);
     if (!seed) tell_other_size(by_rim, "is at the point", "");
     if (!seed) no_rim_at_the_point();

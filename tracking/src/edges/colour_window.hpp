@@ -52,7 +52,7 @@ struct ColourWindow {
   [[nodiscard]] bool empty() const { return levels.empty(); }
   /// How body and surroundings mix where the latter are so much brighter (> 1) or darker.
   [[nodiscard]] const ColourMixing& mixing_in(double shade) const;
-  Eigen::Vector2d site_px = Eigen::Vector2d::Zero();  ///< OutlineEvidence::chroma_site_px
+  Eigen::Vector2d site_px = Eigen::Vector2d::Zero();  ///< OutlineView::chroma_site_px
   /// Where a pixel of the planes is in the picture.
   [[nodiscard]] Eigen::Vector2d place_of(int x, int y) const {
     return Eigen::Vector2d(2.0 * (corner.x + x) + 0.5, 2.0 * (corner.y + y) + 0.5) + site_px;

@@ -47,7 +47,7 @@ class RimFinder final : public BodyFinder {
                   .turned_rad = {},
                   .rms_px = fit->rms_px,
                   .accepted = fit->accepted,
-                  .evidence = evidence_of(look, fit->ellipse),
+                  .contrast = contrast_of(look, fit->ellipse),
                   .edges = std::move(fit->edges)};
     return seen;
   }
@@ -57,7 +57,7 @@ class RimFinder final : public BodyFinder {
  private:
   /// Of a body known by its rim only a band inside it is sure to be there: the middle may be a
   /// hole.
-  [[nodiscard]] static Evidence evidence_of(const Look& look, const Ellipse& rim) {
+  [[nodiscard]] static Contrast contrast_of(const Look& look, const Ellipse& rim) {
     constexpr int kPoints = 48;
     std::vector<Eigen::Vector2d> face;
     std::vector<Border> outline;
@@ -69,7 +69,7 @@ class RimFinder final : public BodyFinder {
       outline.push_back({rim.centre_px + rim.shape_px * u, (inverse * u).normalized(),
                          gap_px(look, (inverse * u).normalized(), 0.5)});
     }
-    return weigh(look.frame, look.background, face, outline);
+    return measure_contrast(look.frame, look.background, face, outline);
   }
 };
 
@@ -91,7 +91,7 @@ class CylinderFinder final : public BodyFinder {
   }
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
-    const OutlineEvidence evidence{
+    const OutlineView view{
         .luma = look.frame.luma,
         .background = look.background.luma,
         .detection = look.detection,
@@ -109,7 +109,7 @@ class CylinderFinder final : public BodyFinder {
         .shading = look.shading,
         .visit = looks_again_ ? look.shading != nullptr ? Visit::again : Visit::first : Visit::only,
         .there = look.there};
-    auto measured = fitter_.measure(evidence);
+    auto measured = fitter_.measure(view);
     if (!measured) return std::nullopt;
     Sighting seen{.centre_px = measured->centre_px,
                   .covariance_px2 = measured->covariance_px2,
@@ -118,7 +118,7 @@ class CylinderFinder final : public BodyFinder {
                   .turned_rad = {},
                   .rms_px = measured->rms_px,
                   .accepted = measured->accepted,
-                  .evidence = evidence_of(look, measured->pose),
+                  .contrast = contrast_of(look, measured->pose),
                   .edges = std::move(measured->edges)};
     measured->edges.clear();
     seen.pose = std::move(*measured);
@@ -159,7 +159,7 @@ class CylinderFinder final : public BodyFinder {
   }
 
  private:
-  [[nodiscard]] Evidence evidence_of(const Look& look, const data::Pose<>& pose) const {
+  [[nodiscard]] Contrast contrast_of(const Look& look, const data::Pose<>& pose) const {
     constexpr double kStepPx = 4.0;
     constexpr int kSpokes = 16;
     std::vector<Border> outline;
@@ -177,7 +177,7 @@ class CylinderFinder final : public BodyFinder {
             pose.centre_m + radius * (std::cos(angle) * node + std::sin(angle) * across)));
       }
     }
-    return weigh(look.frame, look.background, face, outline);
+    return measure_contrast(look.frame, look.background, face, outline);
   }
 
   /// The ellipse the outer rim of the middle plane appears as, to first order.

@@ -5,7 +5,7 @@
 
 #include "find/background.hpp"
 #include "find/cast_shadow.hpp"
-#include "find/evidence.hpp"
+#include "find/contrast.hpp"
 #include "find/rim_fit.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
@@ -20,22 +20,23 @@ struct Sighting {
   std::optional<PoseMeasurement> pose;  ///< with known body and camera
   std::optional<double> turned_rad;  ///< of the face since the seed frame, image angle, unwrapped
   double turned_sigma_rad = 0.0;
-  double rms_px = 0.0;
-  double accepted = 0.0;           ///< share of the outline with an edge
+  double rms_px = 0.0;             ///< of the accepted edges about the outline
+  double accepted = 0.0;           ///< fraction 0..1 of the outline with an accepted edge
   bool attitude_doubtful = false;  ///< it may be a mirror image, or a fit that went astray
   /// How far off each of BodyFinder::other_readings is; no covariance holds that.
   std::array<PoseSpread, 2> other_readings{};
-  /// FloorDarkening::agrees of its shadow: 0 where that is hidden or no lamp is known.
+  /// FloorDarkening::agrees of its shadow, -2..1: 0 where that is hidden or no lamp is known.
   double shadow = 0.0;
-  Evidence evidence{};
+  Contrast contrast{};
   std::vector<EdgePoint> edges;
 
-  /// How plainly the body is seen in its pose [px of its outline]; there must be one. A wrong pose
-  /// may have the longer outline and so the more evidence: how much of it has an edge counts too.
-  [[nodiscard]] double plainness() const { return pose->evidence * accepted; }
+  /// Compares how well one body is seen in different pictures, 0..about the length of its outline
+  /// [px]; needs a pose. A wrong pose may have the longer outline and so the more support: the
+  /// fraction of it with an edge counts too.
+  [[nodiscard]] double visible_support_px() const { return pose->support_px * accepted; }
 };
 
-/// Picture evidence and what is expected, for one attempt.
+/// The picture and what is expected in it, for one attempt.
 struct Look {
   const Frame& frame;
   const Plate& background;  ///< of the frame's brightness near the body

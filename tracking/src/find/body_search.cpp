@@ -43,7 +43,7 @@ std::vector<Candidate> collect(const std::vector<Frame>& held, const Background&
             return off.norm() < 1.1 * other.second || (to_unit * off).norm() < 1.0;
           }))
         continue;
-      const double score = likeness(body, finder);
+      const double score = region_score(body, finder);
       if (score > 1e-3) candidates.push_back({index, d, score});
     }
   }
@@ -53,7 +53,7 @@ std::vector<Candidate> collect(const std::vector<Frame>& held, const Background&
 /// A body keeps its size, clutter does not: candidates far from the usual size lose. Small specks
 /// are many, so the usual size is the median weighted by area.
 void weigh_by_size(std::vector<Candidate>& candidates, std::size_t frames) {
-  std::vector<std::pair<double, double>> sizes;  // semi-major axis, area x likeness
+  std::vector<std::pair<double, double>> sizes;  // semi-major axis, area x score
   double total = 0.0;
   for (const Candidate& c : candidates) {
     const double weight = c.detection.area_px2 * c.score;
@@ -79,7 +79,7 @@ void weigh_by_size(std::vector<Candidate>& candidates, std::size_t frames) {
 
 }  // namespace
 
-double likeness(const Silhouette& body, const BodyFinder& finder) {
+double region_score(const Silhouette& body, const BodyFinder& finder) {
   const Detection& d = body.detection;
   const double flatness = d.semi_minor_px / d.semi_major_px;
   double score = body.solidity * std::min(1.0, 4.0 * flatness);
@@ -95,9 +95,9 @@ double likeness(const Silhouette& body, const BodyFinder& finder) {
   return score;
 }
 
-double clarity(const Sighting& seen) {
-  const double evidence = seen.evidence.cover * seen.evidence.edges * seen.accepted;
-  return seen.pose ? evidence : evidence * 0.5 / (0.3 + seen.rms_px);
+double detection_score(const Sighting& seen) {
+  const double score = seen.contrast.face * seen.contrast.outline * seen.accepted;
+  return seen.pose ? score : score * 0.5 / (0.3 + seen.rms_px);
 }
 
 std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& background,
@@ -119,20 +119,20 @@ std::optional<Seed> find_seed(const std::vector<Frame>& held, const Background& 
     return finder.find(look);
   };
   std::optional<Seed> best;
-  double best_value = 0.0, clearest = 0.0;
+  double best_value = 0.0, best_score = 0.0;
   int good = 0;
   const auto judge = [&](const Candidate& c, const std::optional<Sighting>& seen) {
     if (!seen || seen->accepted < 0.4) return;
-    const double clear = clarity(*seen), value = clear * std::sqrt(c.score);
+    const double score = detection_score(*seen), value = score * std::sqrt(c.score);
     if (value > best_value) {
       best_value = value;
       best = Seed{c.held_index, *seen};
     }
-    clearest = std::max(clearest, clear);
-    if (clear > 0.5) ++good;
+    best_score = std::max(best_score, score);
+    if (score > 0.5) ++good;
   };
   // Two at a time, one on each core.
-  for (std::size_t k = 0; k < candidates.size() && good < kEnough && clearest <= 0.85; k += 2) {
+  for (std::size_t k = 0; k < candidates.size() && good < kEnough && best_score <= 0.85; k += 2) {
     std::array<std::optional<Sighting>, 2> seen;
     const std::size_t count = std::min(seen.size(), candidates.size() - k);
     data::in_parallel(count, 2, [&](std::size_t i) { seen[i] = tried(k + i); });
@@ -154,14 +154,15 @@ Detection rim_around(const Eigen::Vector2d& at_px, double semi_major_px, double 
   return rim;
 }
 
-/// How much of a rim is there, how closely it is an ellipse for its size - a scrap of an edge
-/// passes for a very flat one - and how near its middle the point is.
+/// For a choice between rims around a point, 0..1: how much of a rim is there, how closely it is an
+/// ellipse for its size - a scrap of an edge passes for a very flat one - and how near its middle
+/// the point is.
 /// @param off from its middle (0) to the rim (1)
-double rimness(const Sighting& seen, double off) {
+double rim_score(const Sighting& seen, double off) {
   constexpr double kExactPx = 0.1, kPerSize = 0.02, kFlattest = 0.3;
   const double minor = seen.rim.semi_minor_px();
   const double flat = std::min(1.0, minor / (kFlattest * seen.rim.semi_major_px()));
-  const double there = std::max(seen.accepted, seen.evidence.edges);
+  const double there = std::max(seen.accepted, seen.contrast.outline);
   const double rough = seen.rms_px / (kExactPx + kPerSize * minor);
   return (1.0 - 0.5 * off) * flat * there * there / (1.0 + rough * rough);
 }
@@ -189,7 +190,7 @@ std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index
     if (!seen || seen->accepted < 0.4) continue;
     const double off = (seen->rim.shape_px.inverse() * (at_px - seen->centre_px)).norm();
     if (off > 1.1) continue;
-    const double value = seen->pose ? seen->accepted / (0.5 + seen->rms_px) : rimness(*seen, off);
+    const double value = seen->pose ? seen->accepted / (0.5 + seen->rms_px) : rim_score(*seen, off);
     best = std::max(best, value);
     seen_there.emplace_back(value, std::move(*seen));
   }

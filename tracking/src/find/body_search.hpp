@@ -9,12 +9,13 @@
 
 namespace trochoid::tracking {
 
-/// How much a region looks like a body, 0..1: a filled ellipse of the expected size clear of the
-/// border; a hand, a merged pair or a shadowed body less.
-[[nodiscard]] double likeness(const Silhouette& body, const BodyFinder& finder);
+/// How much the shape of a region is that of a body, 0..1: a filled ellipse of the expected size
+/// clear of the border; a hand, a merged pair or a shadowed body less.
+[[nodiscard]] double region_score(const Silhouette& body, const BodyFinder& finder);
 
-/// How clearly a body found without a prediction is seen, 0..1.
-[[nodiscard]] double clarity(const Sighting& seen);
+/// How well a body found without a prediction is seen, 0..1: its contrast times the fraction of its
+/// outline with an edge; without a pose less, the worse the edges lie on an ellipse.
+[[nodiscard]] double detection_score(const Sighting& seen);
 
 /// Where a body may be followed from.
 struct Seed {

@@ -11,7 +11,7 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr double kFaint = 0.5;  // of what usually speaks for the body
+constexpr double kWeak = 0.5;  // relative support that something in its place has, too
 
 cv::Rect box_around(const Eigen::Vector2d& centre_px, double half_px, const cv::Size& picture) {
   const cv::Rect box(static_cast<int>(centre_px.x() - half_px),
@@ -52,14 +52,14 @@ void Follower::start(const Frame& frame, const Sighting& seen) {
   forecast_.start(frame.t_s, seen);
   usual_major_px_ = seen.rim.semi_major_px();
   usual_accepted_ = seen.accepted;
-  usual_ = seen.evidence;
-  usual_clarity_ = clarity(seen);
-  usual_evidence_ = seen.pose ? seen.pose->evidence : 0.0;
+  usual_contrast_ = seen.contrast;
+  seed_score_ = detection_score(seen);
+  usual_support_px_ = seen.pose ? seen.pose->support_px : 0.0;
   mean_shape_px_ = seen.rim.shape_px;
   shape_scatter_px_ = 1.0;
   palette_ = {};
-  palette_.learn(seen.evidence.face, background_.gain(frame.luma));
-  lost_ = strange_ = faint_ = 0;
+  palette_.learn(seen.contrast.colours, background_.gain(frame.luma));
+  lost_ = off_colour_ = weak_ = 0;
 }
 
 void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
@@ -68,48 +68,49 @@ void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
   for (std::size_t i = 1; i < seen.size(); ++i) forecast_.add(seen[i].first, seen[i].second, true);
 }
 
-/// Evidence for a sighting compared with what is usual for this body here: about 1 when all of it
-/// is seen.
-double Follower::wholeness(const Sighting& seen) const {
+/// Contrast of a sighting over what is usual for this body here, of face or outline, whichever is
+/// less: >= 0, about 1 when all of it is seen.
+double Follower::relative_contrast(const Sighting& seen) const {
   constexpr double kLeastUsual = 0.05;
-  const double cover = seen.evidence.cover / std::max(usual_.cover, kLeastUsual);
-  const double edges = seen.evidence.edges / std::max(usual_.edges, kLeastUsual);
+  const double cover = seen.contrast.face / std::max(usual_contrast_.face, kLeastUsual);
+  const double edges = seen.contrast.outline / std::max(usual_contrast_.outline, kLeastUsual);
   // Where the background knows nothing of the body (it never left), neither says anything.
-  if (usual_.cover < 0.3) return edges;
+  if (usual_contrast_.face < 0.3) return edges;
   return std::min(cover, edges);
 }
 
-/// How much speaks for a sighting compared with what is usual for this body here: far less for what
-/// hides it.
-double Follower::clearness(const Sighting& seen) const {
+/// Sighting::visible_support_px over what is usual for this body here: >= 0, about 1 when all of it
+/// is seen, far less for what hides it. Of accepted edges alone without a pose.
+double Follower::relative_support(const Sighting& seen) const {
   constexpr double kLeastUsual = 1e-6;
   const double of_outline = seen.accepted / std::max(usual_accepted_, kLeastUsual);
-  return seen.pose ? of_outline * seen.pose->evidence / std::max(usual_evidence_, kLeastUsual)
+  return seen.pose ? of_outline * seen.pose->support_px / std::max(usual_support_px_, kLeastUsual)
                    : of_outline;
 }
 
-/// A partly hidden body and a fit gone astray look alike by their evidence; what tells them apart
+/// A partly hidden body and a fit gone astray have about the same contrast; what tells them apart
 /// is that the hidden body is where it was expected. What has other colours is the body only where
-/// its outline is plainly seen, or for a few frames where it was expected: not what hides it. Nor
-/// is a body that was lost found again in what little speaks for.
+/// its outline has strong support, or for a few frames where it was expected: not what hides it.
+/// Nor is a body that was lost found again in what has weak support.
 bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double reach_px) const {
-  constexpr double kWhole = 0.75, kLeast = 0.35;
+  constexpr double kFull = 0.75, kLeast = 0.35;  // of the usual contrast
   if (seen.accepted < std::max(0.25, 0.4 * usual_accepted_)) return false;
   const double ratio = seen.rim.semi_major_px() / usual_major_px_;
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
-  constexpr int kMostStrange = 3;
-  constexpr double kPlainly = 0.7;
-  const double clear = clearness(seen);
-  const bool strange = clear < kPlainly && !palette_.fits(seen.evidence.face, gain_);
-  if (strange && (lost_ > 0 || strange_ >= kMostStrange)) return false;
-  const bool may_be_what_hides_it = strange || (lost_ > 0 && clear < kFaint);
-  const double whole = may_be_what_hides_it ? std::min(kLeast, wholeness(seen)) : wholeness(seen);
+  constexpr int kMostOffColour = 3;
+  constexpr double kStrong = 0.7;
+  const double support = relative_support(seen);
+  const bool off_colour = support < kStrong && !palette_.fits(seen.contrast.colours, gain_);
+  if (off_colour && (lost_ > 0 || off_colour_ >= kMostOffColour)) return false;
+  const bool may_be_occluder = off_colour || (lost_ > 0 && support < kWeak);
+  const double contrast =
+      may_be_occluder ? std::min(kLeast, relative_contrast(seen)) : relative_contrast(seen);
   const double surprise = forecast_.surprise_px();
   const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
-  if (whole >= kWhole) return lost_ > 3 || apart_px(seen, predicted) < far;
+  if (contrast >= kFull) return lost_ > 3 || apart_px(seen, predicted) < far;
   const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * lost_;
-  return whole >= kLeast && apart_px(seen, predicted) < near;
+  return contrast >= kLeast && apart_px(seen, predicted) < near;
 }
 
 /// A body that lies flat keeps its outline: when the shapes seen hardly scatter, their mean is
@@ -143,25 +144,25 @@ std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& ex
   return seen;
 }
 
-/// The body turns so fast that predictions of its attitude mean little, or the picture speaks for
-/// this one far less than it usually does.
-bool Follower::misgiving(const Sighting& seen) const {
+/// The body turns so fast that predictions of its attitude mean little, or this one has far less
+/// support than usual.
+bool Follower::warrants_wider_search(const Sighting& seen) const {
   constexpr double kFast = 0.15, kLittle = 0.7;
   if (!seen.pose) return false;
   return forecast_.surprise_px() > kFast * usual_major_px_ ||
-         seen.pose->evidence < kLittle * usual_evidence_;
+         seen.pose->support_px < kLittle * usual_support_px_;
 }
 
 /// Where it should be if it goes on as before; if little of it is seen there, also where it would
 /// be had it gone on otherwise or been slowed by half (an impact), and the best of these counts.
 std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& predicted,
                                             const Others& others) {
-  constexpr double kClearlySeen = 0.85;
+  constexpr double kFull = 0.85;
   const double largest = std::max(4.0, 0.6 * predicted.rim.semi_minor_px());
   const double reach = std::clamp(2.0 + 3.0 * forecast_.surprise_px() + lost_, 2.5, largest);
   std::optional<Sighting> best = look_at(frame, predicted, reach);
   if (best && is_other(best->centre_px, others)) best.reset();
-  if (best && wholeness(*best) > kClearlySeen && best->accepted > 0.8 * usual_accepted_)
+  if (best && relative_contrast(*best) > kFull && best->accepted > 0.8 * usual_accepted_)
     return best;
   if (lost_ > 2) return best;
   std::vector<Sighting> guesses = forecast_.alternatives(frame.t_s);
@@ -169,10 +170,12 @@ std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& 
   slowed.rim.centre_px = slowed.centre_px =
       0.5 * (forecast_.last().centre_px + predicted.centre_px);
   if (!predicted.pose && apart_px(slowed, predicted) > 1.0) guesses.push_back(slowed);
-  const auto worth = [&](const Sighting& s) { return s.accepted * std::min(1.0, wholeness(s)); };
+  const auto score = [&](const Sighting& s) {
+    return s.accepted * std::min(1.0, relative_contrast(s));
+  };
   for (const Sighting& guess : guesses) {
     auto seen = look_at(frame, guess, std::max(reach, 0.3 * guess.rim.semi_minor_px()));
-    if (seen && !is_other(seen->centre_px, others) && (!best || worth(*seen) > worth(*best) + 0.05))
+    if (seen && !is_other(seen->centre_px, others) && (!best || score(*seen) > score(*best) + 0.05))
       best = std::move(seen);
   }
   return best;
@@ -188,15 +191,15 @@ Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const 
   look.last = &*earlier;
   look.motion_px = found.centre_px - earlier->centre_px;
   auto again = finder_.find(look);
-  return again && again->plainness() > found.plainness() ? *again : found;
+  return again && again->visible_support_px() > found.visible_support_px() ? *again : found;
 }
 
 std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
                                              const Others& others) {
   const double size = usual_major_px_;
   // The longer it has been lost, the farther it may have gone; after a while, anywhere. What
-  // has been faint for as long may be what hides it, left behind in its place.
-  const int astray = std::max(lost_, faint_);
+  // has had weak support for as long may be what hides it, left behind in its place.
+  const int astray = std::max(lost_, weak_);
   const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
   // Of a body seen once the speed is not known; one that rolls goes its size in a frame or two.
   constexpr double kUnknown = 2.0;
@@ -218,7 +221,7 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
     if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) return;
     if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others)) return;
     const double off = std::log(d.semi_major_px / size) / 0.2;
-    candidates.push_back({favour * likeness(body, finder_) * std::exp(-0.5 * off * off), d});
+    candidates.push_back({favour * region_score(body, finder_) * std::exp(-0.5 * off * off), d});
   };
   constexpr double kInItsColours = 2.0;
   for (const Silhouette& body : find_bodies(frame, plate_, box)) consider(body, 1.0);
@@ -227,7 +230,7 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   constexpr std::size_t kMostTries = 3;
-  constexpr double kLeastEvidence = 0.55;
+  constexpr double kLeastSupport = 0.55;
   if (candidates.size() > kMostTries) candidates.resize(kMostTries);
   std::optional<Sighting> best;
   for (const Candidate& candidate : candidates) {
@@ -235,13 +238,13 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
     auto seen = finder_.find(look);
     if (seen) seen = as_it_moves(frame, *seen);
     if (!seen || seen->accepted < std::min(0.5, 0.7 * usual_accepted_) ||
-        clarity(*seen) < 0.5 * usual_clarity_)
+        detection_score(*seen) < 0.5 * seed_score_)
       continue;
-    if (seen->pose && seen->pose->evidence < kLeastEvidence * usual_evidence_) continue;
-    if (wholeness(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
+    if (seen->pose && seen->pose->support_px < kLeastSupport * usual_support_px_) continue;
+    if (relative_contrast(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
         is_other(seen->centre_px, others))
       continue;
-    if (!best || clarity(*seen) > clarity(*best)) best = std::move(seen);
+    if (!best || detection_score(*seen) > detection_score(*best)) best = std::move(seen);
   }
   return best;
 }
@@ -258,26 +261,26 @@ void Follower::read_marks(const Frame& frame, Sighting& seen, double predicted_r
 /// Learns from a sighting how far predictions miss and what the body usually looks like.
 void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predicted) {
   constexpr double kLearn = 0.1;
-  const bool whole = wholeness(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
+  const bool in_full_view = relative_contrast(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
   const double shape_off = (seen.rim.shape_px - predicted.rim.shape_px).norm();
-  strange_ = palette_.fits(seen.evidence.face, gain_) ? 0 : strange_ + 1;
-  faint_ = std::max(0, clearness(seen) < kFaint ? faint_ + 1 : faint_ - 2);
-  if (whole) {
-    palette_.learn(seen.evidence.face, gain_);
+  off_colour_ = palette_.fits(seen.contrast.colours, gain_) ? 0 : off_colour_ + 1;
+  weak_ = std::max(0, relative_support(seen) < kWeak ? weak_ + 1 : weak_ - 2);
+  if (in_full_view) {
+    palette_.learn(seen.contrast.colours, gain_);
     if (lost_ == 0)
       shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
     usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);
     usual_accepted_ += kLearn * (seen.accepted - usual_accepted_);
-    if (seen.pose) usual_evidence_ += kLearn * (seen.pose->evidence - usual_evidence_);
-    usual_.cover += kLearn * (seen.evidence.cover - usual_.cover);
-    usual_.edges += kLearn * (seen.evidence.edges - usual_.edges);
+    if (seen.pose) usual_support_px_ += kLearn * (seen.pose->support_px - usual_support_px_);
+    usual_contrast_.face += kLearn * (seen.contrast.face - usual_contrast_.face);
+    usual_contrast_.outline += kLearn * (seen.contrast.outline - usual_contrast_.outline);
     const double off = (seen.rim.shape_px - mean_shape_px_).norm();
     shape_scatter_px_ += kLearn * (off - shape_scatter_px_);
     mean_shape_px_ += kLearn * (seen.rim.shape_px - mean_shape_px_);
   }
   Sighting kept = seen;
   if (!kept.turned_rad) kept.turned_rad = predicted.turned_rad;
-  forecast_.add(frame.t_s, kept, whole);
+  forecast_.add(frame.t_s, kept, in_full_view);
   lost_ = 0;
 }
 
@@ -290,12 +293,12 @@ std::optional<Sighting> Follower::follow(const Frame& frame, const Others& other
   if (!seen) {
     constexpr int kAwhile = 12, kEvery = 3;
     if (lost_ < kAwhile || lost_ % kEvery == 0) seen = look_about(frame, predicted, others);
-  } else if (misgiving(*seen) && --patience_ <= 0) {
+  } else if (warrants_wider_search(*seen) && --patience_ <= 0) {
     constexpr double kClearlyMore = 1.05;
     constexpr int kLongest = 16;
     auto anywhere = look_about(frame, predicted, others);
     const bool helps = anywhere && anywhere->pose &&
-                       anywhere->pose->evidence > kClearlyMore * seen->pose->evidence;
+                       anywhere->pose->support_px > kClearlyMore * seen->pose->support_px;
     if (helps) seen = std::move(anywhere);
     // Searches that keep finding nothing better are made ever more rarely.
     futile_ = helps ? 0 : std::min(kLongest, 2 * futile_ + 1);

@@ -37,9 +37,9 @@ class Follower {
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
   [[nodiscard]] Sighting as_it_moves(const Frame& frame, const Sighting& found) const;
-  [[nodiscard]] double wholeness(const Sighting& seen) const;
-  [[nodiscard]] double clearness(const Sighting& seen) const;
-  [[nodiscard]] bool misgiving(const Sighting& seen) const;
+  [[nodiscard]] double relative_contrast(const Sighting& seen) const;
+  [[nodiscard]] double relative_support(const Sighting& seen) const;
+  [[nodiscard]] bool warrants_wider_search(const Sighting& seen) const;
   [[nodiscard]] bool plausible(const Sighting& seen, const Sighting& predicted,
                                double reach_px) const;
   void set_shape_knowledge(Look& look, Sighting& guess) const;
@@ -53,17 +53,18 @@ class Follower {
   Plate plate_;  ///< background at the brightness of the frame, valid near the body
   double gain_ = 1.0;
   double shape_surprise_px_ = 0.3;
-  Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();  ///< running mean of whole sightings
-  double shape_scatter_px_ = 1.0;                            ///< running deviation from it
+  // What is usual: running means over sightings of the body in full view.
+  Eigen::Matrix2d mean_shape_px_ = Eigen::Matrix2d::Zero();
+  double shape_scatter_px_ = 1.0;  ///< running deviation from it
   double usual_major_px_ = 0.0;
-  double usual_accepted_ = 0.0;
-  Evidence usual_{};             ///< running mean over whole sightings
-  double usual_clarity_ = 0.0;   ///< of the seed
-  double usual_evidence_ = 0.0;  ///< of the pose, running mean
-  Palette palette_;              ///< of whole sightings
-  int lost_ = 0;
-  int strange_ = 0;  ///< frames in a row in which what is followed has other colours
-  int faint_ = 0;    ///< frames in which little spoke for it, less those in which much did
+  double usual_accepted_ = 0.0;    ///< of Sighting::accepted, 0..1
+  Contrast usual_contrast_{};      ///< but for its colours, which palette_ has
+  double usual_support_px_ = 0.0;  ///< of PoseMeasurement::support_px
+  Palette palette_;
+  double seed_score_ = 0.0;  ///< detection_score of the sighting it started from
+  int lost_ = 0;             ///< frames since it was last seen
+  int off_colour_ = 0;       ///< frames in a row in which what is followed has other colours
+  int weak_ = 0;  ///< frames in which its support was weak, less twice those in which it was not
   int futile_ = 0, patience_ = 0;  ///< frames to wait before searching in spite of a sighting
 };
 

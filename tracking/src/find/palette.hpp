@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "find/evidence.hpp"
+#include "find/contrast.hpp"
 
 namespace trochoid::tracking {
 

@@ -162,10 +162,10 @@ std::optional<ImageAngle> SpinProfile::read(const cv::Mat& luma, const Ellipse& 
   ImageAngle angle;
   angle.angle_rad =
       (static_cast<double>(middle - reach - 1 + (best - score.begin())) + fine) * kSpoke_rad;
-  angle.likeness = at / std::sqrt(power * power_);
-  if (angle.likeness < 0.5) return std::nullopt;
+  angle.correlation = at / std::sqrt(power * power_);
+  if (angle.correlation < 0.5) return std::nullopt;
   // Noise of all samples against the slope of the reference; what is not alike counts as noise too.
-  const double unlike = (1.0 - angle.likeness * angle.likeness) * power_ / (kRings * kSpokes);
+  const double unlike = (1.0 - angle.correlation * angle.correlation) * power_ / (kRings * kSpokes);
   const double variance = (noise_ * noise_ + unlike) / (slope_power_ * independent_share_);
   angle.sigma_rad = std::max(std::sqrt(variance), 1e-3);
   return angle;

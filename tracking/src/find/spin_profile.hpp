@@ -11,7 +11,7 @@ namespace trochoid::tracking {
 struct ImageAngle {
   double angle_rad = 0.0;
   double sigma_rad = 0.0;
-  double likeness = 0.0;  ///< normalised correlation with the reference, -1..1
+  double correlation = 0.0;  ///< normalised correlation with the reference, -1..1
 };
 
 /// Reads how far a face has turned since a reference frame from whatever is painted on it: the face

@@ -25,16 +25,16 @@ struct AttitudeNode {
   std::array<Pose, 2> poses;  ///< as tracked, mirrored
   double tilt_rad;            ///< half the angle between the two axes
   bool weighed = false;
-  double shows = 0.0;               ///< how much the edges in the picture speak for the first
-  double speaks = 0.0;              ///< how much all of it does
-  double could = 0.0;               ///< how much it could, told in full
-  double shadow = 0.0;              ///< how much its shadow speaks for the first
-  std::optional<Sighting> again{};  ///< the first measured afresh, where more speaks for it then
+  double edge_score = 0.0;          ///< log odds of the first by its edges, +-1.5
+  double score = 0.0;               ///< the same by edges, shadow and size
+  double weight = 0.0;              ///< score if all of it were beyond doubt
+  double shadow_score = 0.0;        ///< the same by its shadow, +-1.5
+  std::optional<Sighting> again{};  ///< the first measured afresh, where that scores higher
   std::optional<Sighting> other{};  ///< the second
 
-  /// How well the two can be told apart: what does it, the wall, is the narrower the less the body
-  /// tilts, and errors of the edges are not.
-  [[nodiscard]] double wall() const {
+  /// How well the two can be told apart by their edges, 0..1: what does it, the wall, is the
+  /// narrower the less the body tilts, and errors of the edges are not.
+  [[nodiscard]] double separability() const {
     constexpr double kSteep_rad = 0.75;
     const double share = std::min(1.0, tilt_rad / kSteep_rad);
     return share * share;
@@ -58,7 +58,7 @@ class Chain {
     }
     if (nodes_.size() < 2) return;
     frame_s_ = data::usual_step_s(nodes_, &AttitudeNode::t_s);
-    lean_tells_ = lean_tells();
+    lean_weight_ = lean_weight();
   }
 
   [[nodiscard]] std::vector<AttitudeDoubt> decide() {
@@ -112,7 +112,7 @@ class Chain {
     return chosen;
   }
 
-  /// Measures both readings and compares what speaks for them.
+  /// Measures both readings and compares their scores.
   void weigh(const std::vector<std::size_t>& chosen) {
     constexpr double kPerShare = 9.0, kMost = 1.5, kNothingThere = 0.6;
     on_all_cores(background_, finder_, chosen.size(), [&](Measuring& measure, std::size_t k) {
@@ -121,17 +121,17 @@ class Chain {
       node.weighed = true;
       const Glimpse& glimpse = glimpses_[node.at];
       if (auto again = measured(measure, chosen[k], 0);
-          again && again->pose->speaks() > glimpse.seen->pose->speaks())
+          again && again->pose->score_px() > glimpse.seen->pose->score_px())
         node.again = std::move(again);
       node.other = measured(measure, chosen[k], 1);
       if (!node.other) {
-        node.shows = node.wall() * kNothingThere;
+        node.edge_score = node.separability() * kNothingThere;
         return;
       }
       const Sighting& own = first_of(node);
-      const double ours = own.pose->speaks(), theirs = node.other->pose->speaks();
+      const double ours = own.pose->score_px(), theirs = node.other->pose->score_px();
       const double share = (ours - theirs) / std::max({ours, theirs, 1e-9});
-      node.shows = node.wall() * std::clamp(kPerShare * share, -kMost, kMost);
+      node.edge_score = node.separability() * std::clamp(kPerShare * share, -kMost, kMost);
     });
   }
 
@@ -143,7 +143,7 @@ class Chain {
       if (node.tilt_rad < kLeastTilt) return;
       const Glimpse& g = glimpses_[node.at];
       const double other = measure.shadow(*g.frame, *g.seen, node.poses[1]);
-      node.shadow = std::clamp(kOfShadow * (g.seen->shadow - other), -kMost, kMost);
+      node.shadow_score = std::clamp(kOfShadow * (g.seen->shadow - other), -kMost, kMost);
     });
   }
 
@@ -157,26 +157,26 @@ class Chain {
   void compare_sizes() {
     constexpr std::size_t kFewest = 8;
     constexpr double kLeastSd_px = 0.1;
-    const double whole = least_whole();
+    const double least = least_accepted();
     std::vector<double> larger_px;
     for (AttitudeNode& node : nodes_) {
-      node.speaks = node.shows + node.shadow;
-      node.could = node.wall();
-      if (shows_size(node, whole))
+      node.score = node.edge_score + node.shadow_score;
+      node.weight = node.separability();
+      if (shows_size(node, least))
         larger_px.insert(larger_px.end(),
                          {first_of(node).pose->larger_px, node.other->pose->larger_px});
     }
     if (larger_px.size() < 2 * kFewest) return;
     const auto [usual_px, spread_px] = where_half_agree(std::move(larger_px));
     for (AttitudeNode& node : nodes_) {
-      if (!shows_size(node, whole)) continue;
-      node.speaks += size_speaks(node, usual_px, std::max(kLeastSd_px, spread_px));
-      node.could += 1.0;
+      if (!shows_size(node, least)) continue;
+      node.score += size_score(node, usual_px, std::max(kLeastSd_px, spread_px));
+      node.weight += 1.0;
     }
   }
 
-  /// How much its size speaks for the first reading of a node.
-  [[nodiscard]] double size_speaks(const AttitudeNode& node, double usual_px, double sd_px) const {
+  /// Log odds of the first reading of a node by its size.
+  [[nodiscard]] double size_score(const AttitudeNode& node, double usual_px, double sd_px) const {
     constexpr double kMost = 1.5;
     const Sighting &one = first_of(node), &other = *node.other;
     const double expected_px = one.rim.semi_major_px() - other.rim.semi_major_px();
@@ -194,7 +194,7 @@ class Chain {
 
   /// So much of the outline is seen of a body that nothing hides: of part of it the size is not
   /// known apart from the place.
-  [[nodiscard]] double least_whole() const {
+  [[nodiscard]] double least_accepted() const {
     constexpr double kOfUsual = 0.85;
     std::vector<double> accepted;
     for (const AttitudeNode& node : nodes_) accepted.push_back(first_of(node).accepted);
@@ -221,22 +221,22 @@ class Chain {
   }
 
   /// What pictures of one body say has errors that all of them share (a raised rim, a shadow): if
-  /// they speak for the chosen sequence by no more than that, it is not known, however many.
+  /// they support the chosen sequence by no more than that, it is not known, however many.
   void discount() {
     constexpr double kShared = 0.15, kSure = 0.38;
-    double shows = 0.0, wall = 1e-9, speaks = 0.0, could = 1e-9;
+    double edges = 0.0, separable = 1e-9, score = 0.0, weight = 1e-9;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (!nodes_[i].weighed) continue;
       const double chosen = std::copysign(1.0, margin_[i]);
-      shows += chosen * nodes_[i].shows;
-      wall += nodes_[i].wall();
-      speaks += chosen * nodes_[i].speaks;
-      could += nodes_[i].could;
+      edges += chosen * nodes_[i].edge_score;
+      separable += nodes_[i].separability();
+      score += chosen * nodes_[i].score;
+      weight += nodes_[i].weight;
     }
     // By the edges alone or together with sizes and shadows, whichever is clearer.
-    const double share = std::max(shows / wall, speaks / could);
+    const double share = std::max(edges / separable, score / weight);
     const double trust = std::clamp((share - kShared) / (kSure - kShared), 0.0, 1.0);
-    for (AttitudeNode& node : nodes_) node.speaks *= trust;
+    for (AttitudeNode& node : nodes_) node.score *= trust;
   }
 
   /// What is too little to be sure of is still the best there is to choose by: the choice of before
@@ -333,14 +333,14 @@ class Chain {
     constexpr double kLeast_rad = 0.02, kOfTurn = 0.15, kMost = 1.5;  // the rest nods
     const double turn_rad = between_axes(axis_of(from), axis_of(to), alike_);
     const double change_rad = 2.0 * between_tilts(from.theta_rad, to.theta_rad);
-    return lean_tells_ * std::min(1.0, turn_rad / kAnother_rad) *
+    return lean_weight_ * std::min(1.0, turn_rad / kAnother_rad) *
            std::min(kMost, change_rad / (kLeast_rad + kOfTurn * turn_rad));
   }
 
   /// The tilts of the two readings differ by up to twice as much as the line of sight leans. Tilts
   /// have errors, too, that go round with the axis (a lamp on one side of the body): what differs
   /// by no more than these tells nothing.
-  [[nodiscard]] double lean_tells() const {
+  [[nodiscard]] double lean_weight() const {
     constexpr double kErrors_rad = 0.05;
     double apart2 = 0.0;
     for (const AttitudeNode& node : nodes_)
@@ -379,8 +379,8 @@ class Chain {
     std::vector<Costs> until(n), beyond(n, Costs{});
     const std::vector<double> share = turned_anew();
     const auto own = [&](std::size_t i, int s) {
-      const double speaks = share[i] * nodes_[i].speaks;
-      return 0.5 * (s == 0 ? -speaks : speaks);
+      const double score = share[i] * nodes_[i].score;
+      return 0.5 * (s == 0 ? -score : score);
     };
     for (int s = 0; s < 4; ++s)
       until[1][static_cast<std::size_t>(s)] = own(0, s / 2) + own(1, s % 2);
@@ -470,7 +470,7 @@ class Chain {
   std::vector<Glimpse>& glimpses_;
   bool alike_;
   double frame_s_ = 1.0;
-  double lean_tells_ = 0.0;  ///< how much of what the two tilts differ by is more than errors
+  double lean_weight_ = 0.0;  ///< how much of what the two tilts differ by is more than errors
   std::vector<AttitudeNode> nodes_;
   std::vector<double> margin_;  ///< cost of the second reading beyond that of the first
 };

@@ -15,7 +15,7 @@ struct AttitudeDoubt {
 };
 
 /// Decides over a sequence which of a tilt and its mirror image at the line of sight was seen.
-/// One picture may speak for the wrong one; what all of them say, together with attitude and
+/// One picture may support the wrong one; what all of them say, together with attitude and
 /// angular velocity going on from frame to frame, seldom does: the most likely sequence counts
 /// [Viterbi 1967]. Frames it turns over are measured again.
 /// @return the frames in which it cannot tell, for doubt_attitudes.

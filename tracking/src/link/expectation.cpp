@@ -146,11 +146,11 @@ std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses) {
     around.clear(), off.clear();
     for (std::size_t k = i - std::min(i, kReach); k < std::min(glimpses.size(), i + kReach + 1);
          ++k)
-      if (const Glimpse& g = glimpses[k]; g.posed()) around.push_back(g.seen->plainness());
+      if (const Glimpse& g = glimpses[k]; g.posed()) around.push_back(g.seen->visible_support_px());
     if (around.size() < kFewest) continue;
     const double usual = data::median(around);
     for (const double value : around) off.push_back(std::abs(value - usual));
-    poor[i] = glimpses[i].seen->plainness() <
+    poor[i] = glimpses[i].seen->visible_support_px() <
               usual - std::max(kOfUsual * usual, kDeviations * data::median(off));
   }
   return poor;

@@ -8,7 +8,7 @@
 
 namespace trochoid::tracking {
 
-/// Frames in which clearly less speaks for the fit than in those around: it may have settled
+/// Frames in which the fit has clearly less support than in those around: it may have settled
 /// beside the body.
 [[nodiscard]] std::vector<bool> poor_fits(const std::vector<Glimpse>& glimpses);
 

@@ -48,7 +48,7 @@ double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool ali
   return std::acos(std::clamp(alike ? std::abs(cosine) : cosine, -1.0, 1.0));
 }
 
-double shadow_speaks_more(const Sighting& one, const Sighting& other) {
+double shadow_log_score_ratio(const Sighting& one, const Sighting& other) {
   // Shadows of two readings of a picture differ by about a half, their edges by a tenth.
   constexpr double kOfShadow = 0.5;
   // Beside a dark body that it does not cover, a fit would take that for its shadow.
@@ -58,10 +58,11 @@ double shadow_speaks_more(const Sighting& one, const Sighting& other) {
                                                            : 0.0;
 }
 
-double speaks_more(const Sighting& one, const Sighting& other) {
+double log_score_ratio(const Sighting& one, const Sighting& other) {
   constexpr double kLeast = 1e-9;
-  return std::log(std::max(kLeast, one.pose->speaks()) / std::max(kLeast, other.pose->speaks())) +
-         shadow_speaks_more(one, other);
+  return std::log(std::max(kLeast, one.pose->score_px()) /
+                  std::max(kLeast, other.pose->score_px())) +
+         shadow_log_score_ratio(one, other);
 }
 
 // From the middle of a body: what its outline needs, and its shadow.

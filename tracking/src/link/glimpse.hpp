@@ -20,11 +20,12 @@ struct Glimpse {
   [[nodiscard]] const data::Pose<>& pose() const { return seen->pose->pose; }
 };
 
-/// How much more speaks for one fit to a picture than for another, as a logarithm: its edges, and
-/// its shadow, where both cover about the same of the picture.
-[[nodiscard]] double speaks_more(const Sighting& one, const Sighting& other);
+/// Logarithm of how many times higher one fit to a picture scores than another: > 0 for the first,
+/// symmetric about 0; the larger, the likelier. PoseMeasurement::score_px of its edges, and its
+/// shadow where both cover about the same of the picture.
+[[nodiscard]] double log_score_ratio(const Sighting& one, const Sighting& other);
 /// The same of its shadow alone.
-[[nodiscard]] double shadow_speaks_more(const Sighting& one, const Sighting& other);
+[[nodiscard]] double shadow_log_score_ratio(const Sighting& one, const Sighting& other);
 
 /// Measures a body about a guess in one frame.
 class Measuring {

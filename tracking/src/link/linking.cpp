@@ -15,7 +15,7 @@ namespace trochoid::tracking {
 void Linking::operator()(std::size_t settled, BodyPath& path,
                          std::vector<Glimpse>& glimpses) const {
   forget_what_the_path_jumps_to(glimpses);
-  forget_what_is_faint_beside_gaps(glimpses);
+  forget_weak_support_beside_gaps(glimpses);
   if (alone)
     if (const auto lamp = find_lamp(background, finder, glimpses)) path.lamp = lamp;
   // Only what is measured again is measured with it.

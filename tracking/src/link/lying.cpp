@@ -88,8 +88,8 @@ void measure_what_lies(const Background& background, const BodyFinder& finder,
     for (std::size_t k = window.from; k < window.to; ++k) {
       if (!found[k]) continue;
       const Sighting& seen = *was[k].seen;
-      lies += found[k]->pose->speaks() * std::exp(shadow_speaks_more(*found[k], seen));
-      tilts += seen.pose->speaks();
+      lies += found[k]->pose->score_px() * std::exp(shadow_log_score_ratio(*found[k], seen));
+      tilts += seen.pose->score_px();
     }
     if (lies < kAsGood * tilts) continue;
     found[i]->turned_rad = was[i].seen->turned_rad;

@@ -23,10 +23,10 @@ class Mending {
         poor_(poor_fits(was)),
         none_(was.size(), false),
         usual_(finder, was) {
-    std::vector<double> plain;
+    std::vector<double> supports_px;
     for (const Glimpse& g : was)
-      if (g.posed()) plain.push_back(g.seen->plainness());
-    usual_plainness_ = data::median(std::move(plain));
+      if (g.posed()) supports_px.push_back(g.seen->visible_support_px());
+    usual_visible_px_ = data::median(std::move(supports_px));
   }
 
   [[nodiscard]] std::optional<Sighting> operator()(Measuring& measure, std::size_t i) const {
@@ -40,7 +40,7 @@ class Mending {
       if (!expected || (before && before->same_as(*expected))) continue;
       before = std::move(expected);
       Found found = better(measure, i, *before);
-      if (found.seen && found.gain > best.gain) best = std::move(found);
+      if (found.seen && found.likelihood_ratio > best.likelihood_ratio) best = std::move(found);
     }
     return std::move(best.seen);
   }
@@ -48,7 +48,7 @@ class Mending {
  private:
   struct Found {
     std::optional<Sighting> seen;
-    double gain = 0.0;  ///< in likelihood, over what was seen before
+    double likelihood_ratio = 0.0;  ///< to what was seen before, if anything was
   };
 
   /// How likely it is to be so far from what is expected.
@@ -57,12 +57,14 @@ class Mending {
     return 1.0 / (1.0 + off * off);
   }
 
-  /// How many times more speaks for one sighting than for another. From where the body is expected
-  /// a close look finds no longer outline of another thing: how plainly it is seen need not count.
-  [[nodiscard]] double speaks_for(const Sighting& one, const Sighting& other) const {
+  /// How much higher one sighting scores than another, > 0, times the ratio of their accepted
+  /// edges. From where the body is expected a close look finds no longer outline of another thing:
+  /// fewer accepted edges need not count.
+  [[nodiscard]] double score_ratio(const Sighting& one, const Sighting& other) const {
     constexpr double kLeast = 1e-9;
-    const double plainer = std::max(kLeast, one.accepted) / std::max(kLeast, other.accepted);
-    return std::exp(speaks_more(one, other)) * (closely_ ? std::max(plainer, 1.0) : plainer);
+    const double completer = std::max(kLeast, one.accepted) / std::max(kLeast, other.accepted);
+    return std::exp(log_score_ratio(one, other)) *
+           (closely_ ? std::max(completer, 1.0) : completer);
   }
 
   /// Looking right there cannot lead astray: less of a contradiction will do for that.
@@ -95,11 +97,11 @@ class Mending {
     if (expected.contradicts(now_off, UsualMiss::kMost_rad)) return {};
     const double now = likelihood(now_off, expected);
     if (!before) {
-      if (seen->plainness() < kUsualShare * usual_plainness_) return {};
-      const double likely = now * seen->plainness();
+      if (seen->visible_support_px() < kUsualShare * usual_visible_px_) return {};
+      const double likely = now * seen->visible_support_px();
       return {std::move(seen), likely};
     }
-    const double more = speaks_for(*seen, *before);
+    const double more = score_ratio(*seen, *before);
     const double gain = more * now / likelihood(off, expected);
     if (gain < kBetter || more < kAsGood) return {};
     seen->turned_rad = before->turned_rad;
@@ -111,7 +113,7 @@ class Mending {
   bool closely_;
   std::vector<bool> poor_, none_;
   UsualMiss usual_;
-  double usual_plainness_ = 0.0;  ///< of a sighting
+  double usual_visible_px_ = 0.0;  ///< of Sighting::visible_support_px
 };
 
 /// What the frames around still contradict may be where they say instead: its covariance holds

@@ -11,7 +11,7 @@ namespace trochoid::tracking {
 namespace {
 
 /// Follows the body from one side into frames in which it was seen elsewhere, and keeps what it
-/// finds as far as more speaks for that, taken together.
+/// finds as far as that scores higher, taken together.
 class Branch {
  public:
   Branch(const Background& background, const BodyFinder& finder, std::vector<Glimpse>& glimpses,
@@ -62,9 +62,9 @@ class Branch {
     return seen;
   }
 
-  /// False where both are one again, or nothing is found, or too little speaks for it.
+  /// False where both are one again, or nothing is found, or it scores too low.
   [[nodiscard]] bool goes_on(std::size_t i) {
-    // One frame's evidence scatters by a tenth or two: a stretch is given up at half of what it
+    // One frame's score scatters by a tenth or two: a stretch is given up at half of what it
     // had.
     constexpr double kGiveUp = 0.7, kOne = 0.5;
     const auto expected = leaves(i);
@@ -74,23 +74,23 @@ class Branch {
     if (!seen) seen = nearer(i, *expected, true);
     if (!seen) return false;
     seen->turned_rad = glimpses_[i].seen->turned_rad;
-    // Not how plainly: the rim of a face in the light is plainer than that of a wall in the shade.
-    gain_ += speaks_more(*seen, *glimpses_[i].seen);
+    // Not by accepted edges: the rim of a face in the light has more than a wall in the shade.
+    log_ratio_ += log_score_ratio(*seen, *glimpses_[i].seen);
     as_led_[i].seen = std::move(seen);
     led_.push_back(i);
-    if (gain_ > best_) best_ = gain_, kept_ = led_.size();
-    return gain_ > best_ - kGiveUp;
+    if (log_ratio_ > best_log_ratio_) best_log_ratio_ = log_ratio_, kept_ = led_.size();
+    return log_ratio_ > best_log_ratio_ - kGiveUp;
   }
 
   void close() {
     constexpr double kClearly = 0.1;  // as for a frame that its neighbours mend
-    const std::size_t kept = best_ > kClearly ? kept_ : 0;
+    const std::size_t kept = best_log_ratio_ > kClearly ? kept_ : 0;
     for (std::size_t k = 0; k < led_.size(); ++k) {
       auto &was = glimpses_[led_[k]].seen, &now = as_led_[led_[k]].seen;
       (k < kept ? was : now) = k < kept ? now : was;
     }
     led_.clear();
-    gain_ = best_ = 0.0;
+    log_ratio_ = best_log_ratio_ = 0.0;
     kept_ = 0;
   }
 
@@ -101,7 +101,7 @@ class Branch {
   int side_;
   double apart_rad_ = 0.0;
   std::vector<std::size_t> led_;  ///< frames of the branch
-  double gain_ = 0.0, best_ = 0.0;
+  double log_ratio_ = 0.0, best_log_ratio_ = 0.0;
   std::size_t kept_ = 0;  ///< frames of the branch up to the best
 };
 

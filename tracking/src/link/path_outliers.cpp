@@ -36,7 +36,7 @@ class Path {
   }
 
   /// Frames off the path, the farthest first, and where the path was. Those taken out no longer
-  /// speak for others.
+  /// count for others.
   [[nodiscard]] std::vector<std::pair<std::size_t, Place>> take_out() {
     constexpr double kFar = 6.0, kMostShare = 0.25;
     std::vector<std::pair<std::size_t, Place>> out;
@@ -204,16 +204,16 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
   }
 }
 
-void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
-  // For an arm in the body's place a third to a half speaks of what usually does, for a body half
+void forget_weak_support_beside_gaps(std::vector<Glimpse>& glimpses) {
+  // An arm in the body's place has a third to a half of the usual support, a body half
   // hidden by it half to two thirds: some of the latter go with the former.
   constexpr std::size_t kGap = 2;
-  constexpr double kFaint = 0.55;
+  constexpr double kWeak = 0.55;
   std::vector<double> usual;
   for (const Glimpse& g : glimpses)
-    if (g.posed()) usual.push_back(g.seen->plainness());
+    if (g.posed()) usual.push_back(g.seen->visible_support_px());
   if (usual.empty()) return;
-  const double least = kFaint * data::median(std::move(usual));
+  const double least = kWeak * data::median(std::move(usual));
   // From the gap on, in either direction of time; the ends of the recording are no gaps.
   const auto forget = [&](auto from, auto to) {
     std::size_t lost = 0;
@@ -221,7 +221,7 @@ void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses) {
     for (; from != to; ++from) {
       if (!from->posed()) {
         ++lost;
-      } else if (seen && lost >= kGap && from->seen->plainness() < least) {
+      } else if (seen && lost >= kGap && from->seen->visible_support_px() < least) {
         from->seen.reset();
       } else {
         lost = 0;

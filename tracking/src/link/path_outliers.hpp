@@ -16,9 +16,9 @@ void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses);
 /// is hidden, what hides it can pass for it. Their covariance then holds the place on that line.
 void doubt_what_stands_alone(std::vector<Glimpse>& glimpses);
 
-/// Forgets sightings beside gaps, up to the first one for which as much speaks as usually: while the
-/// body is hidden, what hides it is seen a little like it, for as long as it stays.
-void forget_what_is_faint_beside_gaps(std::vector<Glimpse>& glimpses);
+/// Forgets sightings beside gaps, up to the first one with about the usual support: while the body
+/// is hidden, what hides it is seen a little like it, for as long as it stays.
+void forget_weak_support_beside_gaps(std::vector<Glimpse>& glimpses);
 
 /// Forgets sightings that hardly tell where the body is, for its size.
 void forget_what_tells_nothing(std::vector<Glimpse>& glimpses);

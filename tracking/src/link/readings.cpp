@@ -37,8 +37,8 @@ struct ReadingNode {
 
 /// What a frame shows when it is looked at in another reading.
 struct Otherwise {
-  double gain;   ///< how much more speaks for it
-  double share;  ///< how far off it is, of the way to that reading
+  double log_score_ratio;  ///< of this reading to the one chosen
+  double share;            ///< how far off it is, of the way to that reading
 };
 using Otherwises =
     std::array<std::optional<Otherwise>, std::tuple_size_v<BodyFinder::OtherReadings>>;
@@ -161,10 +161,10 @@ class Readings {
     if (!(share < kFarthest) ||
         (seen.centre_px - chosen.centre_px).norm() > kNear_radii * chosen.rim.semi_major_px())
       return std::nullopt;
-    return Otherwise{speaks_more(seen, chosen), share};
+    return Otherwise{log_score_ratio(seen, chosen), share};
   }
 
-  /// Other readings of every so many frames for which about as much speaks.
+  /// Other readings of every so many frames that score about as high.
   [[nodiscard]] std::vector<Start> others() {
     constexpr double kAsGood = -0.05;
     std::vector<std::vector<Start>> found(nodes_.size() / kStride);
@@ -176,7 +176,7 @@ class Readings {
         const auto seen = read_otherwise(measure, k, others[which]);
         if (!seen) continue;
         as_tracked_[i][which] = compared(*others[which], *seen, k);
-        if (speaks_more(*seen, nodes_[k].seen()) < kAsGood) continue;
+        if (log_score_ratio(*seen, nodes_[k].seen()) < kAsGood) continue;
         for (const int side : {1, -1})
           if (const auto off = one_frame_off(k, seen->pose->pose, side))
             found[i].push_back({k, side, *seen, *off, nodes_[k].t_s - side * frame_s_});
@@ -217,7 +217,7 @@ class Readings {
         sum.looked_at += 1.0;
         if (!frame[which]) continue;
         sum.found += 1.0;
-        sum.gain += frame[which]->gain;
+        sum.log_score_ratio += frame[which]->log_score_ratio;
         sum.square += frame[which]->share * frame[which]->share;
       }
     return sums;
@@ -251,10 +251,10 @@ class Readings {
       for (auto& [k, seen] : way) add(k, std::move(seen));
   }
 
-  /// Until it is one with the path again, nothing is found, or too little speaks for it.
+  /// Until it is one with the path again, nothing is found, or its scores are too low.
   [[nodiscard]] std::vector<std::pair<std::size_t, Sighting>> followed(Measuring& measure,
                                                                        Start from) const {
-    // One frame's evidence scatters by a tenth or two: a way is given up at half of what it had.
+    // One frame's score scatters by a tenth or two: a way is given up at half of what it had.
     constexpr double kGiveUp = 0.7;
     std::vector<std::pair<std::size_t, Sighting>> found;
     double sum = 0.0, best = 0.0;
@@ -265,7 +265,7 @@ class Readings {
       const double ahead = (nodes_[k].t_s - last_s) / (last_s - from.before_s);
       auto seen = measured(measure, k, led(from.before, last, ahead), last);
       if (!seen || same(*seen, nodes_[k].seen())) break;
-      sum += speaks_more(*seen, nodes_[k].seen());
+      sum += log_score_ratio(*seen, nodes_[k].seen());
       best = std::max(best, sum);
       if (sum < best - kGiveUp) break;
       found.emplace_back(k, *seen);
@@ -348,10 +348,10 @@ class Readings {
     return std::min(kMost, 0.5 * (axis * axis + centre * centre));
   }
 
-  /// What it costs that less speaks for a reading than for the frame as tracked.
+  /// What it costs that a reading has a lower score than the frame as tracked.
   [[nodiscard]] double own_cost(std::size_t k, std::size_t c) const {
-    constexpr double kPerGain = 12.0;  // fits as good as each other scatter by a tenth or so
-    return -kPerGain * speaks_more(nodes_[k].readings[c], nodes_[k].readings[0]);
+    constexpr double kPerLogRatio = 12.0;  // fits as good as each other scatter by a tenth or so
+    return -kPerLogRatio * log_score_ratio(nodes_[k].readings[c], nodes_[k].readings[0]);
   }
 
   /// The best path; pairs of readings of successive frames are the states.
@@ -384,7 +384,7 @@ class Readings {
       nodes_[k - 2].chosen = from[k](nodes_[k - 1].chosen, nodes_[k].chosen);
   }
 
-  /// A break costs at most what five frames gain in which a tenth more speaks for another reading;
+  /// A break costs at most what five frames gain in which another reading scores a tenth higher;
   /// a leap and the way back are four breaks.
   static constexpr double kMost = 6.0;
   static constexpr std::size_t kStride = 12;  ///< of the frames that are read otherwise
@@ -432,21 +432,21 @@ void place_other_readings(const BodyFinder& finder, std::size_t settled,
 PoseSpread spread_over_readings(const ReadingTallies& of_path, const Sighting& seen) {
   PoseSpread sum;
   for (std::size_t which = 0; which < of_path.size(); ++which) {
-    const double may_be = of_path[which].may_be();
+    const double square = of_path[which].expected_square();
     const PoseSpread& spread = seen.other_readings[which];
-    sum.m2 += may_be * spread.m2;
-    sum.theta_rad2 += may_be * spread.theta_rad2;
-    sum.across_rad2 += may_be * spread.across_rad2;
+    sum.m2 += square * spread.m2;
+    sum.theta_rad2 += square * spread.theta_rad2;
+    sum.across_rad2 += square * spread.across_rad2;
   }
   return sum;
 }
 
 void ReadingTally::add(const ReadingTally& other) {
   looked_at += other.looked_at, found += other.found;
-  gain += other.gain, square += other.square;
+  log_score_ratio += other.log_score_ratio, square += other.square;
 }
 
-double ReadingTally::may_be() const {
+double ReadingTally::expected_square() const {
   // Between recordings, and between pictures: of 46 of the independent clips the mean gain of the
   // right reading was 0.12 at least and 1.0 as a rule, pictures of one scattered by 0.4. The spread
   // over what is hardly likely is no error bar: it would be as wide as nothing that was seen.
@@ -454,7 +454,7 @@ double ReadingTally::may_be() const {
   if (found == 0.0) return 0.0;
   const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / found);
   const double likely =
-      found / looked_at * 0.5 * std::erfc(-gain / found / (sd * std::numbers::sqrt2));
+      found / looked_at * 0.5 * std::erfc(-log_score_ratio / found / (sd * std::numbers::sqrt2));
   return likely > kHardly ? likely * square / found : 0.0;
 }
 

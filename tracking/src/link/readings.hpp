@@ -8,13 +8,15 @@ namespace trochoid::tracking {
 
 /// What frames of a path showed when they were looked at in one of BodyFinder::other_readings.
 struct ReadingTally {
-  double looked_at = 0.0, found = 0.0;  ///< frames
-  double gain = 0.0;    ///< sum over those found of the logarithm of how much more speaks for it
-  double square = 0.0;  ///< sum over them of its squared distance, of the way to that reading
+  double looked_at = 0.0;        ///< frames
+  double found = 0.0;            ///< frames, of these, in which there was such a reading
+  double log_score_ratio = 0.0;  ///< sum over those found: > 0 for this reading, < 0 for the chosen
+  double square = 0.0;  ///< sum over those found of its squared distance, 1 being that reading's
   void add(const ReadingTally& other);
-  /// Probability that the whole path is to be read so, times the mean square of that distance. What
-  /// all pictures of a recording say together for one of two readings has an error that they share.
-  [[nodiscard]] double may_be() const;
+  /// Expected square, >= 0, of that distance: its mean times the probability that the whole path is
+  /// to be read so. What all pictures of a recording say together for one of two readings has an
+  /// error that they share.
+  [[nodiscard]] double expected_square() const;
 };
 using ReadingTallies = std::array<ReadingTally, 2>;
 
@@ -28,8 +30,8 @@ struct ReadingDoubt {
 /// may have sat on another edge, the face taken for the whole body or the edge of its wall for that
 /// of the face; no single picture and no neighbour tells. Other readings of some frames, and where
 /// the path breaks its continuation from either side, are followed as far as the pictures bear
-/// them out; of all paths through what was found the likeliest counts [Viterbi 1967], by what
-/// speaks for its poses and by how evenly it goes on.
+/// them out; of all paths through what was found the likeliest counts [Viterbi 1967], by the scores
+/// of its poses and by how evenly it goes on.
 [[nodiscard]] ReadingDoubt choose_readings(const Background& background, const BodyFinder& finder,
                                            std::vector<Glimpse>& glimpses);
 

@@ -68,7 +68,7 @@ void measure_again(const Background& background, const BodyFinder& finder, std::
     Sighting guess = seen;
     guess.pose->blur_px = surroundings.blur_px;
     auto again = measure(*was[i].frame, std::move(guess), before, &surroundings.shading);
-    if (!again || !again->pose || again->pose->evidence < kAsGood * seen.pose->evidence) return;
+    if (!again || !again->pose || again->pose->support_px < kAsGood * seen.pose->support_px) return;
     const double off =
         std::max(between_axes(axis_of(again->pose->pose), axis_of(seen.pose->pose), alike),
                  (again->centre_px - seen.centre_px).norm() / seen.rim.semi_major_px());

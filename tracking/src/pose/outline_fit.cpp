@@ -56,13 +56,13 @@ cv::Rect window_of(const data::Body& body, const data::Camera& camera, const dat
 struct Fitted {
   Refined refined;
   double blur_px = kUsualBlurPx;
-  double score = 0.0;     ///< outline_score of the pose
-  double evidence = 0.0;  ///< evidence_of the fit
-  double evenness = 1.0;  ///< evenness_of the fit
+  double accepted = 0.0;    ///< accepted_of the fit
+  double support_px = 0.0;  ///< support_px_of the fit
+  double evenness = 1.0;    ///< evenness_of the fit
   /// Covariance of a step by which other attitudes explain the picture about as well; or empty.
   Eigen::MatrixXd attitudes{};
 
-  [[nodiscard]] double speaks() const { return evidence * evenness; }
+  [[nodiscard]] double score_px() const { return support_px * evenness; }
 };
 
 // The last stage, from a pose that is right to about the blur of the picture. Too sharp or too wide
@@ -82,15 +82,15 @@ std::optional<Fitted> fit_exactly(const Scenery& scenery, const data::Pose<>& st
     blur_px = out.blur_px;
     pose = out.refined.pose;
   }
-  out.score = outline_score(out.refined);
-  out.evidence = evidence_of(out.refined);
+  out.accepted = accepted_of(out.refined);
+  out.support_px = support_px_of(out.refined);
   out.evenness = evenness_of(out.refined);
   return out;
 }
 
 std::optional<Fitted> better(std::optional<Fitted> a, std::optional<Fitted> b) {
   if (!a || !b) return a ? a : b;
-  return a->speaks() >= b->speaks() ? a : b;
+  return a->score_px() >= b->score_px() ? a : b;
 }
 
 // @param near the scenery blurred by kNearBlurPx.
@@ -113,13 +113,13 @@ double steepest_alike(const data::Body& body) {
 // Where several attitudes explain a picture about as well, the one chosen is no better known than
 // they are apart.
 void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
-  // From start to start the evidence of one attitude differs by up to a tenth.
+  // From start to start the support of one attitude differs by up to a tenth.
   // Evenness differs by more, and would leave out attitudes that the edges alone do not tell apart.
   constexpr double kAsGood = 0.9;
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(motion.count(), motion.count());
   double count = 1.0;
   for (const Fitted& other : others) {
-    if (other.evidence < kAsGood * chosen.evidence) continue;
+    if (other.support_px < kAsGood * chosen.support_px) continue;
     const PoseMotion::Step off = motion.step_between(chosen.refined.pose, other.refined.pose);
     square += off * off.transpose();
     count += 1.0;
@@ -152,7 +152,7 @@ std::optional<Fitted> of_near_tilts(const Scenery& scenery, std::optional<Fitted
   std::vector<Fitted> others;
   const auto mirror = mirrored(scenery.camera, scenery.motion, pose);
   if (auto other = fit_exactly(scenery, mirror, outline_px, fitted->blur_px)) {
-    if (cosine > std::cos(kNearly_rad) && other->speaks() > kNoticeably * fitted->speaks())
+    if (cosine > std::cos(kNearly_rad) && other->score_px() > kNoticeably * fitted->score_px())
       std::swap(*fitted, *other);
     others.push_back(std::move(*other));
   }
@@ -182,8 +182,8 @@ double moved_px(const Scenery& scenery, const Refined& refined, const data::Pose
 }
 
 // What was outlined may be the face alone, in the light beside a wall in the shade: the body seems
-// too small then, or the edges of its wall are missing. A pose for which clearly more speaks, or
-// about as much while the body has its size, is the better one, though the outer edges of the wall
+// too small then, or the edges of its wall are missing. A pose that scores clearly higher, or
+// about as high while the body has its size, is the better one, though the outer edges of the wall
 // are less clear than those of the face. Seen from aside, wall and face are too different for that.
 std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted> fitted) {
   constexpr double kTooSmallPx = 0.35, kClearlyPx = 0.2, kAsGood = 0.85, kBetter = 1.15;
@@ -193,7 +193,7 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
     return fitted;
   const double seen_px = larger_px(fitted->refined), outline_px = fitted->refined.outline_px;
   const bool too_small = seen_px < -kTooSmallPx;
-  if (!too_small && fitted->evidence > kFewEdges * outline_px) return fitted;
+  if (!too_small && fitted->support_px > kFewEdges * outline_px) return fitted;
   std::optional<Fitted> best;
   for (const Side side : {Side::same, Side::mirrored}) {
     if (side == Side::mirrored && scenery.motion.pivoted()) break;
@@ -204,15 +204,15 @@ std::optional<Fitted> with_its_wall(const Scenery& scenery, std::optional<Fitted
     if (!other) continue;
     const bool right_size =
         too_small && std::abs(larger_px(other->refined)) < -seen_px - kClearlyPx;
-    if (other->speaks() > (right_size ? kAsGood : kBetter) * fitted->speaks() &&
-        (!best || other->speaks() > best->speaks()))
+    if (other->score_px() > (right_size ? kAsGood : kBetter) * fitted->score_px() &&
+        (!best || other->score_px() > best->score_px()))
       best = std::move(other);
   }
   return best ? std::move(best) : std::move(fitted);
 }
 
 // A prediction is mostly right to the blur: looking from farther would only let shadows and the
-// body's other edges mislead it. Where it was not, or little then speaks for it, the wider looks
+// body's other edges mislead it. Where it was not, or few edges then bear it out, the wider looks
 // have their say.
 std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Pose<>& predicted,
                                           std::optional<double> blur_px, bool there) {
@@ -220,12 +220,13 @@ std::optional<Fitted> fit_from_prediction(const Scenery& scenery, const data::Po
   std::optional<Fitted> fitted =
       fit_exactly(scenery, predicted, outline_length_px(scenery, predicted), blur_px);
   if (there) return of_near_tilts(scenery, std::move(fitted));
-  if (!fitted || fitted->score < kClear || moved_px(scenery, fitted->refined, predicted) > kFarPx) {
+  if (!fitted || fitted->accepted < kClear ||
+      moved_px(scenery, fitted->refined, predicted) > kFarPx) {
     if (const auto drawn = refine(scenery, predicted, kDraw))
       fitted =
           better(std::move(fitted), fit_exactly(scenery, drawn->pose, drawn->outline_px, blur_px));
   }
-  if (!fitted || fitted->score < kSure)
+  if (!fitted || fitted->accepted < kSure)
     fitted = better(std::move(fitted), fit_from(scenery, scenery.blurred(kNearBlurPx), predicted));
   return of_near_tilts(scenery, with_its_wall(scenery, std::move(fitted)));
 }
@@ -242,7 +243,7 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
   });
   std::vector<std::pair<double, data::Pose<>>> likely;
   for (const auto& refined : drawn)
-    if (refined) likely.emplace_back(outline_score(*refined), refined->pose);
+    if (refined) likely.emplace_back(accepted_of(*refined), refined->pose);
   std::sort(likely.begin(), likely.end(),
             [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<data::Pose<>> chosen;
@@ -259,8 +260,8 @@ std::optional<Fitted> fit_best(const Scenery& scenery, const std::vector<data::P
 }
 
 bool believable(const Fitted& fitted) {
-  constexpr double kLeastScore = 0.25, kLeastCovered = 0.35;  // below, the body is not there
-  return fitted.score >= kLeastScore && fitted.refined.covered >= kLeastCovered &&
+  constexpr double kLeastAccepted = 0.25, kLeastCovered = 0.35;  // below, the body is not there
+  return fitted.accepted >= kLeastAccepted && fitted.refined.covered >= kLeastCovered &&
          fitted.refined.solution.covariance.allFinite();
 }
 
@@ -304,8 +305,8 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   m.blur_px = fitted.blur_px;
   m.colour_off_px = r.solution.colour_off_px;
   m.colour_information = r.solution.colour_information;
-  m.accepted = fitted.score;
-  m.evidence = fitted.evidence;
+  m.accepted = fitted.accepted;
+  m.support_px = fitted.support_px;
   m.evenness = fitted.evenness;
   m.larger_px = larger_px(r);
   ShadingMemory shading;
@@ -390,49 +391,48 @@ OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camer
     throw InputError("support: kind = \"pivot\" needs pivot_m = [x, y, z] in metres");
 }
 
-std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evidence) const {
+std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) const {
   const PoseMotion motion(body_, support_, camera_);
   const bool alike = body_.faces_look_alike() && support_.kind != data::SupportKind::pivot;
   const std::vector<data::Pose<>> starts =
-      evidence.predicted   ? std::vector{motion.settled(*evidence.predicted)}
-      : evidence.detection ? starts_from_edges(body_, support_, camera_, motion, evidence)
-                           : std::vector<data::Pose<>>{};
+      view.predicted   ? std::vector{motion.settled(*view.predicted)}
+      : view.detection ? starts_from_edges(body_, support_, camera_, motion, view)
+                       : std::vector<data::Pose<>>{};
   if (starts.empty()) return std::nullopt;
-  const double margin_px = evidence.predicted ? 12.0 : 24.0;
+  const double margin_px = view.predicted ? 12.0 : 24.0;
   cv::Rect window = window_of(body_, camera_, starts.front(), margin_px);
   for (const auto& start : starts) window |= window_of(body_, camera_, start, margin_px);
   ColourWindow colour =
-      colour_window(evidence.luma, evidence.chroma, window, body_, camera_, starts.front());
-  colour.site_px = evidence.chroma_site_px;
-  const bool moving = evidence.predicted && evidence.previous;
+      colour_window(view.luma, view.chroma, window, body_, camera_, starts.front());
+  colour.site_px = view.chroma_site_px;
+  const bool moving = view.predicted && view.previous;
   const Scenery scenery{
       .body = body_,
       .camera = camera_,
       .motion = motion,
-      .picture = LightWindow(evidence.luma, window, camera_.transfer),
-      .plate = evidence.background.empty()
-                   ? LightWindow()
-                   : LightWindow(evidence.background, window, camera_.transfer),
+      .picture = LightWindow(view.luma, window, camera_.transfer),
+      .plate = view.background.empty() ? LightWindow()
+                                       : LightWindow(view.background, window, camera_.transfer),
       .colour = std::move(colour),
       .most_looks = most_looks_,
-      .visit = evidence.visit,
-      .smear = moving ? PoseMotion::Step(evidence.exposure_fraction *
-                                         motion.step_between(*evidence.previous, starts.front()))
+      .visit = view.visit,
+      .smear = moving ? PoseMotion::Step(view.exposure_fraction *
+                                         motion.step_between(*view.previous, starts.front()))
                       : PoseMotion::Step(),
       // Levels that are light mix linearly, whatever their colours.
       .tints = camera_.transfer == data::Transfer::linear
                    ? std::nullopt
-                   : tints_of(evidence.luma, evidence.chroma, body_, camera_, starts.front()),
-      .exposure = moving && evidence.exposure_fraction > 0.0
-                      ? std::optional(ExposureMotion(*evidence.previous, starts.front(),
-                                                     evidence.exposure_fraction))
+                   : tints_of(view.luma, view.chroma, body_, camera_, starts.front()),
+      .exposure = moving && view.exposure_fraction > 0.0
+                      ? std::optional(
+                            ExposureMotion(*view.previous, starts.front(), view.exposure_fraction))
                       : std::nullopt,
-      .shading = evidence.shading};
+      .shading = view.shading};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
-  auto best = evidence.predicted
-                  ? fit_from_prediction(scenery, starts.front(), evidence.blur_px, evidence.there)
+  auto best = view.predicted
+                  ? fit_from_prediction(scenery, starts.front(), view.blur_px, view.there)
                   : fit_best(scenery, starts, mirrors);
   if (!best) return std::nullopt;
   find_uncertainty(scenery, *best);
@@ -441,8 +441,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineEvidence& evi
   // A body on a pin has no end up: its axis is named upwards.
   if (alike || is_on_a_pin(body_, support_, m.pose)) fold(m.pose);
   const bool either = mirrors && !alike && body_.axle_above_m <= 0.0;
-  if (const auto marks = either ? read_marks_of_either_face(evidence.luma, body_, camera_, m.pose)
-                                : read_marks(evidence.luma, body_, camera_, m.pose)) {
+  if (const auto marks = either ? read_marks_of_either_face(view.luma, body_, camera_, m.pose)
+                                : read_marks(view.luma, body_, camera_, m.pose)) {
     m.pose.psi_rad = marks->psi_rad;
     m.sigma_psi_rad = spin_sigma_rad(m, *marks);
   }

@@ -253,7 +253,7 @@ void allow_for_shadow(double too_far_px, EdgeEquation& equation) {
   equation.model_px = std::hypot(equation.model_px, kUnsureShare * too_far_px);
 }
 
-// How much an edge off by this speaks for the pose, 0..1: an edge is certain at a gain of 3.
+// How much an edge off by this supports the pose, 0..1: an edge is certain at a gain of 3.
 double certainty(const ProfileEdge& edge, double off_px, double tolerance_px) {
   constexpr double kCertain = 3.0;
   const double misfit =
@@ -261,7 +261,7 @@ double certainty(const ProfileEdge& edge, double off_px, double tolerance_px) {
   return std::clamp((edge.gain - misfit) / kCertain, 0.0, 1.0);
 }
 
-// So much of the outline speaks for a fit by this edge of it.
+// So much of the outline supports a fit by this edge of it.
 double certain_px(const Refined& refined, size_t i) {
   constexpr double kTolerancePx = 0.1;
   const EdgeEquation& e = refined.equations[i];
@@ -585,7 +585,7 @@ void find_uncertainty(const Scenery& scenery, Refined& refined) {
   find_uncertainty(refined.equations, prior_of(scenery.motion), refined.solution);
 }
 
-double outline_score(const Refined& refined) {
+double accepted_of(const Refined& refined) {
   return refined.outline_px > 0.0 ? refined.seen_px / refined.outline_px : 0.0;
 }
 
@@ -600,21 +600,21 @@ double larger_px(const Refined& refined) {
   return rim_px > 0.0 ? sum_px / rim_px : 0.0;
 }
 
-double evidence_of(const Refined& refined) {
+double support_px_of(const Refined& refined) {
   // A residual of this size halves what an edge says, however clear it is, if it claims to be
   // exact.
   constexpr double kHalvesPx = 0.3;
-  double evidence = 0.0;
+  double support_px = 0.0;
   for (size_t i = 0; i < refined.edges.size(); ++i) {
     const EdgeEquation& e = refined.equations[i];
     const double off2 = e.residual_px * e.residual_px /
                         (kHalvesPx * kHalvesPx + e.variance_px2 + e.model_px * e.model_px);
-    evidence += certain_px(refined, i) / (1.0 + off2);
+    support_px += certain_px(refined, i) / (1.0 + off2);
   }
   // Told right from wrong readings of 20 recordings by logistic regression, half a pixel of size is
   // worth about a quarter of the edges.
   constexpr double kPerPx = 0.55, kMostPx = 0.45;
-  return evidence * std::exp(-kPerPx * std::min(kMostPx, std::abs(larger_px(refined))));
+  return support_px * std::exp(-kPerPx * std::min(kMostPx, std::abs(larger_px(refined))));
 }
 
 double evenness_of(const Refined& refined) {

@@ -81,22 +81,22 @@ struct Refined {
 /// How well the pose of an exact search is known: the rest of its solution.
 void find_uncertainty(const Scenery& scenery, Refined& refined);
 
-/// Share of the silhouette, 0..1, with an edge exactly there: near 1 for the right pose, a third or
-/// less for a pose that merely has settled among edges.
-[[nodiscard]] double outline_score(const Refined& refined);
+/// PoseMeasurement::accepted: fraction of the silhouette, 0..1, with an edge exactly there: near 1
+/// for the right pose, a third or less for a pose that merely has settled among edges.
+[[nodiscard]] double accepted_of(const Refined& refined);
 
 /// How much farther out the rim is seen than the body's size and this pose put it.
 [[nodiscard]] double larger_px(const Refined& refined);
 
-/// How much of the body is seen [px of its outline]: the gain of all edges, limited per edge so
-/// that no single one decides, less what their residuals take, and a share of it if the body, whose
-/// size is known, then looks too large or too small.
-[[nodiscard]] double evidence_of(const Refined& refined);
+/// PoseMeasurement::support_px: the gain of all edges, limited per edge so that no single one
+/// decides, less what their residuals take, and a share of it if the body, whose size is known,
+/// then looks too large or too small.
+[[nodiscard]] double support_px_of(const Refined& refined);
 
 /// 1 where the light beside all edges is even, towards 0 the more of where they lie hangs on how it
 /// changes there (ProfileEdge::shading_variance_px2). An outline beside the body's own or on other
 /// edges, such as that of its shadow, is mostly explained by such light: of two poses in one
-/// picture that with the larger product of evidence and evenness is the likelier.
+/// picture that with the larger product of support and evenness is the likelier.
 [[nodiscard]] double evenness_of(const Refined& refined);
 
 }  // namespace trochoid::tracking

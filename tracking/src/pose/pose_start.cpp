@@ -207,8 +207,8 @@ double radius_in_picture(const data::Body& body, const data::Camera& camera,
 
 std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::Support& support,
                                             const data::Camera& camera, const PoseMotion& motion,
-                                            const OutlineEvidence& evidence) {
-  const Detection& detection = *evidence.detection;
+                                            const OutlineView& view) {
+  const Detection& detection = *view.detection;
   constexpr double kCellsPerRadius = 12.0;
   constexpr int kLargestCellPx = 5;
   const double radius_px = radius_in_picture(body, camera, motion, detection.centre_px);
@@ -218,10 +218,10 @@ std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::
   const int margin = static_cast<int>(0.6 * radius_px) + 4;
   const cv::Rect window =
       (detection.box + cv::Size(2 * margin, 2 * margin) - cv::Point(margin, margin)) &
-      cv::Rect({}, evidence.luma.size());
+      cv::Rect({}, view.luma.size());
   if (window.width < 3 || window.height < 3) return {};
-  EdgeMap map(evidence.luma, evidence.background, window, cell_px);
-  if (!evidence.chroma.empty()) map.add_colours(evidence.chroma, evidence.background_chroma);
+  EdgeMap map(view.luma, view.background, window, cell_px);
+  if (!view.chroma.empty()) map.add_colours(view.chroma, view.background_chroma);
   const SilhouetteSearch search{body, camera, motion, map, radius_px};
   return best_distinct(support.kind == data::SupportKind::pivot
                            ? seek_about_pivot(search, *support.pivot_m)

@@ -11,12 +11,12 @@ namespace trochoid::tracking {
 /// Sought wherever a body of this size could be inside the detection: poses whose silhouette runs
 /// along sharp edges of the picture, best first, no two alike. The detection may hold a shadow or
 /// a hand along with the body; its outline and its centre do not matter.
-/// @param evidence with a detection.
+/// @param view with a detection.
 [[nodiscard]] std::vector<data::Pose<>> starts_from_edges(const data::Body& body,
                                                           const data::Support& support,
                                                           const data::Camera& camera,
                                                           const PoseMotion& motion,
-                                                          const OutlineEvidence& evidence);
+                                                          const OutlineView& view);
 
 /// The other attitude with (nearly) the same silhouette: the axis mirrored at the line of sight.
 [[nodiscard]] data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,

@@ -57,14 +57,15 @@ struct PoseMeasurement {
   /// Replaces `inflation` by a better one.
   void inflate(double better);
   double rms_px = 0.0;    ///< of the accepted edge points about the outline
-  double accepted = 0.0;  ///< fraction of the predicted outline with an accepted edge
-  /// Sum over the outline [px] of how much better its edges explain the picture than none would,
-  /// less their misfit: how much of the body is seen.
-  double evidence = 0.0;
+  double accepted = 0.0;  ///< fraction 0..1 of the silhouette with an accepted edge where it is
+  /// Length of the outline [px] that edges support, >= 0: each piece counts by how much better its
+  /// edge explains the picture than none would, less its misfit. Edges in colour count as well, so
+  /// that it may be more than the whole outline.
+  double support_px = 0.0;
   /// 0..1: how little of where its edges lie hangs on how the light changes beside them.
   double evenness = 1.0;
-  /// What speaks for this pose rather than for another one in the same picture.
-  [[nodiscard]] double speaks() const { return evidence * evenness; }
+  /// Compares poses in the same picture [px], >= 0: the one with the higher score is the likelier.
+  [[nodiscard]] double score_px() const { return support_px * evenness; }
   double blur_px = 0.0;  ///< of the edges of this picture, for the next one
   /// How far what colours show lies off what luma does, either coordinate by itself, and the
   /// inverse of its variance [px^-2]; 0 where they do not tell.
@@ -75,8 +76,8 @@ struct PoseMeasurement {
   std::vector<EdgePoint> edges;
 };
 
-/// Picture evidence for one measurement. `background` may be empty.
-struct OutlineEvidence {
+/// The picture and what is known of it, for one measurement. `background` may be empty.
+struct OutlineView {
   const cv::Mat& luma;                 ///< CV_8UC1
   const cv::Mat& background;           ///< CV_8UC1 of the same size, or empty
   std::optional<Detection> detection;  ///< used for a start when there is no prediction
@@ -105,7 +106,7 @@ class OutlineFitter {
   OutlineFitter(data::Body body, data::Support support, data::Camera camera,
                 Effort effort = Effort::normal);
   /// Nothing if the image does not hold the body there; never a guess.
-  [[nodiscard]] std::optional<PoseMeasurement> measure(const OutlineEvidence& evidence) const;
+  [[nodiscard]] std::optional<PoseMeasurement> measure(const OutlineView& view) const;
 
  private:
   data::Body body_;

@@ -1,4 +1,4 @@
-#include "find/evidence.hpp"
+#include "find/contrast.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -76,8 +76,9 @@ FaceColours colours_at(const Frame& frame, const std::vector<Eigen::Vector2d>& f
 
 }  // namespace
 
-Evidence weigh(const Frame& frame, const Plate& background,
-               const std::vector<Eigen::Vector2d>& face_px, const std::vector<Border>& outline) {
+Contrast measure_contrast(const Frame& frame, const Plate& background,
+                          const std::vector<Eigen::Vector2d>& face_px,
+                          const std::vector<Border>& outline) {
   // Means over five pixels differ by less than this unless something is there; codecs leave a floor
   // that the noise of single pixels does not show.
   std::vector<PlanePair> planes{
@@ -86,7 +87,7 @@ Evidence weigh(const Frame& frame, const Plate& background,
     for (const int plane : {0, 1})
       planes.push_back({frame.chroma, background.chroma, plane,
                         4.0 + 1.5 * background.chroma_noise_levels, true});
-  Evidence evidence;
+  Contrast contrast;
   int covered = 0, stepped = 0;
   for (const Eigen::Vector2d& p : face_px)
     covered += std::any_of(planes.begin(), planes.end(),
@@ -94,10 +95,10 @@ Evidence weigh(const Frame& frame, const Plate& background,
   for (const Border& border : outline)
     stepped += std::any_of(planes.begin(), planes.end(),
                            [&](const PlanePair& plane) { return plane.steps(border); });
-  if (!face_px.empty()) evidence.cover = covered / static_cast<double>(face_px.size());
-  if (!outline.empty()) evidence.edges = stepped / static_cast<double>(outline.size());
-  evidence.face = colours_at(frame, face_px);
-  return evidence;
+  if (!face_px.empty()) contrast.face = covered / static_cast<double>(face_px.size());
+  if (!outline.empty()) contrast.outline = stepped / static_cast<double>(outline.size());
+  contrast.colours = colours_at(frame, face_px);
+  return contrast;
 }
 
 }  // namespace trochoid::tracking
