@@ -6,6 +6,7 @@
 
 #include "find/body_search.hpp"
 #include "find/silhouette.hpp"
+#include "geometry/pose_change.hpp"
 #include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {

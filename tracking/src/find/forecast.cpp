@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 
@@ -29,32 +30,6 @@ struct Three {
   }
 };
 
-/// Near the vertical, precession means nothing: there the axis goes on along its great circle.
-bool steep(const Pose& pose) {
-  constexpr double kLeastSine = 0.2;
-  return std::sin(pose.theta_rad) < kLeastSine;
-}
-
-void axis_straight_on(const Pose& a, const Pose& b, double ahead, Pose& pose) {
-  const Eigen::Vector3d from = axis_of(a), to = axis_of(b);
-  const double phi = b.phi_rad;
-  set_axis((to + ahead * (to - from)).normalized(), pose);
-  pose.phi_rad = nearest(pose.phi_rad, phi, data::kTurn);
-}
-
-Pose straight_on(const Pose& a, const Pose& b, double ahead) {
-  Pose c = b;
-  c.centre_m = b.centre_m + ahead * (b.centre_m - a.centre_m);
-  c.psi_rad = b.psi_rad + ahead * std::remainder(b.psi_rad - a.psi_rad, data::kTurn);
-  if (steep(a) || steep(b)) {
-    axis_straight_on(a, b, ahead, c);
-    return c;
-  }
-  c.theta_rad = std::clamp(b.theta_rad + ahead * (b.theta_rad - a.theta_rad), 0.0, data::kPi);
-  c.phi_rad = b.phi_rad + ahead * std::remainder(b.phi_rad - a.phi_rad, data::kTurn);
-  return c;
-}
-
 /// Tilt and precession with their changes of rate; the centre's velocity turns with the precession,
 /// as it does for whatever rolls on its rim.
 Pose turning_on(const Three<Pose>& past, double t) {
@@ -66,8 +41,6 @@ Pose turning_on(const Three<Pose>& past, double t) {
   const Three<double> theta{past.t0, past.t1, past.t2, a.theta_rad, b.theta_rad, c.theta_rad};
   next.phi_rad = phi.quadratic(t);
   next.theta_rad = std::clamp(theta.quadratic(t), 0.0, data::kPi);
-  next.psi_rad = c.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
-                                 std::remainder(c.psi_rad - b.psi_rad, data::kTurn);
   const Eigen::Vector3d late = (c.centre_m - b.centre_m) / (past.t2 - past.t1);
   const double between = 0.5 * (phi_c + next.phi_rad) - 0.5 * (phi_b + phi_c);
   next.centre_m = c.centre_m + (t - past.t2) * turned_about_vertical(late, between);
@@ -84,9 +57,6 @@ Pose swinging_on(const Three<Pose>& past, double t) {
   set_axis(of(axis_of).quadratic(t).normalized(), next);
   next.phi_rad = nearest(next.phi_rad, past.v2.phi_rad, data::kTurn);
   next.centre_m = of([](const Pose& p) { return p.centre_m; }).quadratic(t);
-  next.psi_rad =
-      past.v2.psi_rad + (t - past.t2) / (past.t2 - past.t1) *
-                            std::remainder(past.v2.psi_rad - past.v1.psi_rad, data::kTurn);
   return next;
 }
 
@@ -99,11 +69,6 @@ double apart_px(const Sighting& a, const Sighting& b) {
     apart = std::max(apart, one.cross(other).norm() * a.rim.semi_major_px());
   }
   return apart;
-}
-
-Pose nearer_face(const Pose& pose, const Pose& reference, double mark_rad) {
-  if (axis_of(pose).dot(axis_of(reference)) >= 0.0) return pose;
-  return data::turned_over(pose, mark_rad);
 }
 
 void Forecast::start(double t_s, const Sighting& seen) {
@@ -159,15 +124,15 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
   }
   if (p.pose && before.seen.pose) {
     const bool poses = bent && first.seen.pose;
-    const bool level = steep(before.seen.pose->pose) || steep(last.seen.pose->pose) ||
-                       (poses && steep(first.seen.pose->pose));
+    const Pose &from = before.seen.pose->pose, &to = last.seen.pose->pose;
+    const bool steep = is_steep(from) || is_steep(to) || (poses && is_steep(first.seen.pose->pose));
     const auto pose_of = [](const Moment& m) { return m.seen.pose->pose; };
-    if (poses && manner == kTurning && !level)
+    if (poses && manner == kTurning && !steep)
       p.pose->pose = turning_on(three(pose_of), t);
     else if (poses && manner == kSwinging)
       p.pose->pose = swinging_on(three(pose_of), t);
     else
-      p.pose->pose = straight_on(before.seen.pose->pose, last.seen.pose->pose, ahead);
+      p.pose->pose = PoseChange(from, to).on(to, ahead);
     finder_.place(p);
   }
   if (p.turned_rad && before.seen.turned_rad)
@@ -209,10 +174,7 @@ std::optional<Sighting> Forecast::one_frame_before(const Sighting& seen) const {
   if (std::abs(last.t_s - before.t_s) > kSuccessive * frame_s_) return std::nullopt;
   const Pose &from = before.seen.pose->pose, &to = last.seen.pose->pose;
   Sighting earlier = seen;
-  Pose& pose = earlier.pose->pose;
-  pose.phi_rad -= std::remainder(to.phi_rad - from.phi_rad, data::kTurn);
-  pose.theta_rad -= to.theta_rad - from.theta_rad;
-  pose.centre_m -= to.centre_m - from.centre_m;
+  earlier.pose->pose = PoseChange(from, to, PoseChange::kBeside).on(seen.pose->pose, -1.0);
   finder_.place(earlier);
   return earlier;
 }

@@ -55,9 +55,4 @@ class Forecast {
 /// How far two sightings are apart [px]: their centres, or their rims as the axes differ.
 [[nodiscard]] double apart_px(const Sighting& a, const Sighting& b);
 
-/// Of the two attitudes in which a body with equal faces looks the same, the one whose axis is
-/// nearer to a reference. @param mark_rad angle of its spin mark in the body.
-[[nodiscard]] data::Pose<> nearer_face(const data::Pose<>& pose, const data::Pose<>& reference,
-                                       double mark_rad);
-
 }  // namespace trochoid::tracking

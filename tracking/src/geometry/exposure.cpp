@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "trochoid/data/angle.hpp"
-
 namespace trochoid::tracking {
 namespace {
 
@@ -105,29 +103,11 @@ std::optional<double> crossing_px(const Moved& outline, const OutlineSample& sam
 
 }  // namespace
 
-ExposureMotion::ExposureMotion(const Pose& before, const Pose& middle, double fraction) {
-  constexpr double kLeastSine = 0.1;
-  steep_ = std::min(std::sin(before.theta_rad), std::sin(middle.theta_rad)) < kLeastSine;
-  const double turn = std::remainder(middle.phi_rad - before.phi_rad, data::kTurn);
-  tilt_rad_ = fraction * (middle.theta_rad - before.theta_rad);
-  precession_rad_ = fraction * turn;
-  axis_ = fraction * (axis_of(middle) - axis_of(before));
-  // Whatever rolls on its rim turns its velocity as it turns its axis.
-  const double half_turn = steep_ ? 0.0 : 0.5 * turn;
-  shift_m_ = fraction * turned_about_vertical(middle.centre_m - before.centre_m, half_turn);
-}
+ExposureMotion::ExposureMotion(const Pose& before, const Pose& middle, double fraction)
+    : change_(before, middle, PoseChange::kWithin), fraction_(fraction) {}
 
 Pose ExposureMotion::at(const Pose& middle, double share) const {
-  Pose pose = middle;
-  if (steep_) {
-    set_axis((axis_of(middle) + share * axis_).normalized(), pose);
-    pose.centre_m += share * shift_m_;
-    return pose;
-  }
-  pose.theta_rad += share * tilt_rad_;
-  pose.phi_rad += share * precession_rad_;
-  pose.centre_m += share * turned_about_vertical(shift_m_, 0.5 * share * precession_rad_);
-  return pose;
+  return change_.on(middle, share * fraction_, PoseChange::Centre::turning);
 }
 
 double Sweep::mean_px() const {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "geometry/outline_samples.hpp"
+#include "geometry/pose_change.hpp"
 
 namespace trochoid::tracking {
 
@@ -20,10 +21,8 @@ class ExposureMotion {
   [[nodiscard]] data::Pose<> at(const data::Pose<>& middle, double share) const;
 
  private:
-  double tilt_rad_ = 0.0, precession_rad_ = 0.0;  ///< over the exposure
-  Eigen::Vector3d shift_m_;                       ///< likewise, at the middle
-  Eigen::Vector3d axis_ = Eigen::Vector3d::Zero();
-  bool steep_;  ///< so near the vertical that precession means nothing: the axis goes straight on
+  PoseChange change_;  ///< from frame to frame
+  double fraction_;
 };
 
 /// Where an outline is along the normal of its middle position while the shutter is open: at the

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include "find/forecast.hpp"
+#include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -306,19 +306,14 @@ class Chain {
     const double early = second.t_s - first.t_s, late = third.t_s - second.t_s;
     if (early > kMostFrames * frame_s_ || late > kMostFrames * frame_s_) return 0.0;
     const double ahead = late / early;
-    const Pose &pa = first.poses[static_cast<std::size_t>(a)],
-               &pb = second.poses[static_cast<std::size_t>(b)],
+    const Pose &pb = second.poses[static_cast<std::size_t>(b)],
                &pc = third.poses[static_cast<std::size_t>(c)];
-    const Eigen::Vector3d to = axis_of(pb);
-    Eigen::Vector3d from = axis_of(pa);
-    if (alike_ && from.dot(to) < 0.0) from = -from;
-    const Eigen::Vector3d is = axis_of(pc);
-    const Eigen::Vector3d straight = (to + ahead * (to - from)).normalized();
-    Pose turning = pb;
-    turning.phi_rad += ahead * std::remainder(pb.phi_rad - pa.phi_rad, data::kTurn);
-    turning.theta_rad += ahead * (pb.theta_rad - pa.theta_rad);
-    const double off =
-        std::min(between_axes(straight, is, alike_), between_axes(axis_of(turning), is, alike_));
+    Pose pa = first.poses[static_cast<std::size_t>(a)];
+    if (alike_) pa = nearer_face(pa, pb, 0.0);
+    const PoseChange change(pa, pb);
+    const Eigen::Vector3d from = axis_of(pa), to = axis_of(pb), is = axis_of(pc);
+    const double off = std::min(between_axes(change.axis_straight_on(pb, ahead), is, alike_),
+                                between_axes(change.axis_turning_on(pb, ahead), is, alike_));
     // Of the two steps the smaller: a reading that leaps must not allow for itself.
     const double step = std::min(between_axes(from, to, alike_),
                                  between_axes(to, is, alike_) / std::max(ahead, 1e-9));

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "find/forecast.hpp"
+#include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/interpolate.hpp"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "find/forecast.hpp"
+#include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -130,14 +130,8 @@ class Readings {
     const bool from_before = follows(k) && (side > 0 || !follows(k + 1));
     const std::size_t to = from_before ? k : k + 1;
     if (!follows(to)) return std::nullopt;
-    const Pose &a = nodes_[to - 1].pose(), &b = nodes_[to].pose();
-    const Pose from = alike_ ? nearer_face(a, b, 0.0) : a;
     const double share = -side * frame_s_ / (nodes_[to].t_s - nodes_[to - 1].t_s);
-    Pose off = pose;
-    off.centre_m += share * (b.centre_m - from.centre_m);
-    off.theta_rad += share * (b.theta_rad - from.theta_rad);
-    off.phi_rad += share * std::remainder(b.phi_rad - from.phi_rad, data::kTurn);
-    return off;
+    return change(nodes_[to - 1].pose(), nodes_[to].pose(), PoseChange::kBeside).on(pose, share);
   }
 
   /// Frame k in another reading; nothing if there is none or the picture leads elsewhere.
@@ -263,7 +257,7 @@ class Readings {
       const Pose last = from.seen.pose->pose;
       const double last_s = nodes_[from.at].t_s;
       const double ahead = (nodes_[k].t_s - last_s) / (last_s - from.before_s);
-      auto seen = measured(measure, k, led(from.before, last, ahead), last);
+      auto seen = measured(measure, k, change(from.before, last).on(last, ahead, centre_), last);
       if (!seen || same(*seen, nodes_[k].seen())) break;
       sum += log_score_ratio(*seen, nodes_[k].seen());
       best = std::max(best, sum);
@@ -274,26 +268,9 @@ class Readings {
     return found;
   }
 
-  /// From a to b goes on so many times as far.
-  [[nodiscard]] Pose led(const Pose& a, const Pose& b, double ahead) const {
-    constexpr double kSteep = 0.2;  // near the vertical, precession means nothing
-    const Pose from = alike_ ? nearer_face(a, b, 0.0) : a;
-    const double turn = std::remainder(b.phi_rad - from.phi_rad, data::kTurn);
-    Pose pose = b;
-    if (std::min(std::sin(from.theta_rad), std::sin(b.theta_rad)) < kSteep) {
-      set_axis((axis_of(b) + ahead * (axis_of(b) - axis_of(from))).normalized(), pose);
-    } else {
-      pose.phi_rad += ahead * turn;
-      pose.theta_rad += ahead * (b.theta_rad - from.theta_rad);
-    }
-    const Eigen::Vector3d step = b.centre_m - from.centre_m;
-    pose.centre_m += ahead * (round_ ? turned(step, turn, ahead) : step);
-    return pose;
-  }
-
-  /// A step of a centre that goes round with the precession, that much later.
-  static Eigen::Vector3d turned(const Eigen::Vector3d& step, double turn_rad, double ahead) {
-    return turned_about_vertical(step, 0.5 * (1.0 + ahead) * turn_rad);
+  [[nodiscard]] PoseChange change(const Pose& from, const Pose& to,
+                                  double least_sine = PoseChange::kBeyond) const {
+    return {alike_ ? nearer_face(from, to, 0.0) : from, to, least_sine};
   }
 
   /// Straight on, and round with the precession.
@@ -301,21 +278,16 @@ class Readings {
                                              std::size_t c) const {
     const Pose &second = nodes_[k - 1].readings[b].pose->pose,
                &third = nodes_[k].readings[c].pose->pose;
-    Pose first = nodes_[k - 2].readings[a].pose->pose;
-    if (alike_) first = nearer_face(first, second, 0.0);
+    const PoseChange step = change(nodes_[k - 2].readings[a].pose->pose, second);
     const double ahead =
         (nodes_[k].t_s - nodes_[k - 1].t_s) / (nodes_[k - 1].t_s - nodes_[k - 2].t_s);
-    const double turn = std::remainder(second.phi_rad - first.phi_rad, data::kTurn);
-    Pose on = second;
-    on.phi_rad += ahead * turn;
-    on.theta_rad += ahead * (second.theta_rad - first.theta_rad);
-    const Eigen::Vector3d to = axis_of(second), is = axis_of(third);
-    const Eigen::Vector3d straight = (to + ahead * (to - axis_of(first))).normalized();
-    const Eigen::Vector3d step = second.centre_m - first.centre_m,
-                          went = third.centre_m - second.centre_m;
-    return {{between_axes(straight, is, alike_), (went - ahead * step).head<2>().norm()},
-            {between_axes(axis_of(on), is, alike_),
-             (went - ahead * turned(step, turn, ahead)).head<2>().norm()}};
+    const Eigen::Vector3d axis = axis_of(third), went = third.centre_m - second.centre_m;
+    const auto miss = [&](const Eigen::Vector3d& expected, PoseChange::Centre centre) {
+      return Miss{between_axes(expected, axis, alike_),
+                  (went - step.shift_m(ahead, centre)).head<2>().norm()};
+    };
+    return {miss(step.axis_straight_on(second, ahead), PoseChange::Centre::straight),
+            miss(step.axis_turning_on(second, ahead), PoseChange::Centre::turning)};
   }
 
   /// How the body moves: what its path misses by as a rule, and whether its centre goes round.
@@ -332,7 +304,9 @@ class Readings {
       straight.push_back(on.centre_m), round.push_back(about.centre_m);
     }
     if (axis.empty()) return;
-    round_ = data::median(std::move(round)) < data::median(std::move(straight));
+    centre_ = data::median(std::move(round)) < data::median(std::move(straight))
+                  ? PoseChange::Centre::turning
+                  : PoseChange::Centre::straight;
     usual_ = {std::max(kLeast_rad, kOfUsual * data::median(std::move(axis))),
               std::max(kSigmas * data::median(std::move(sd)),
                        kOfUsual * data::median(std::move(centre)))};
@@ -397,7 +371,7 @@ class Readings {
   std::vector<ReadingNode> nodes_;
   std::vector<Otherwises> as_tracked_;  ///< of every kStride-th frame, beside how it was tracked
   Miss usual_{1.0, 1.0};
-  bool round_ = false;  ///< the centre goes round with the precession
+  PoseChange::Centre centre_ = PoseChange::Centre::straight;  ///< how it goes on
 };
 
 }  // namespace

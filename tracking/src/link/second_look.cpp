@@ -5,39 +5,16 @@
 #include <optional>
 #include <utility>
 
-#include "find/forecast.hpp"
+#include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
-#include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
 using Pose = data::Pose<>;
 
-/// Where a body would have been one frame before `pose`, moving as between its neighbours.
-Pose one_frame_before(const Pose& before, const Pose& pose, const Pose& after) {
-  Pose earlier = pose;
-  const double turn = 0.5 * std::remainder(after.phi_rad - before.phi_rad, data::kTurn);
-  const double turned = std::remainder(pose.phi_rad - before.phi_rad, data::kTurn) +
-                        std::remainder(after.phi_rad - pose.phi_rad, data::kTurn);
-  // More than half a turn in two frames.
-  earlier.phi_rad -= std::abs(turned) > 0.5 * data::kTurn ? 0.5 * turned : turn;
-  earlier.theta_rad -= 0.5 * (after.theta_rad - before.theta_rad);
-  earlier.centre_m -= 0.5 * (after.centre_m - before.centre_m);
-  return earlier;
-}
-
-/// As far beyond `to` as that is from `from`.
-Pose beyond(const Pose& from, const Pose& to) {
-  Pose pose = to;
-  pose.phi_rad += std::remainder(to.phi_rad - from.phi_rad, data::kTurn);
-  pose.theta_rad += to.theta_rad - from.theta_rad;
-  pose.centre_m += to.centre_m - from.centre_m;
-  return pose;
-}
-
-/// Where the body of frame i would have been one frame before it; nothing if it is not seen on
-/// either side.
+/// Where the body of frame i would have been one frame before it, moving as between its
+/// neighbours; nothing if it is not seen on either side.
 std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::size_t i,
                                      bool alike) {
   const Pose& pose = glimpses[i].pose();
@@ -47,8 +24,10 @@ std::optional<Pose> one_frame_before(const std::vector<Glimpse>& glimpses, std::
   };
   const std::optional<Pose> before = at(i - 1), after = at(i + 1);
   if (!before && !after) return std::nullopt;
-  return one_frame_before(before ? *before : beyond(*after, pose), pose,
-                          after ? *after : beyond(*before, pose));
+  const PoseChange change = before && after ? PoseChange(*before, pose, *after, PoseChange::kBeside)
+                            : before        ? PoseChange(*before, pose, PoseChange::kBeside)
+                                            : PoseChange(pose, *after, PoseChange::kBeside);
+  return change.on(pose, -1.0);
 }
 
 }  // namespace
