@@ -113,5 +113,50 @@ TEST_F(SmearedDisc, IsFoundAgainAfterAKnock) {
   EXPECT_GE(found, kKnocks - 2);
 }
 
+// Hidden for 40 ms, in which it goes three times its radius. Thirty frames of a slower recording
+// would be long enough to look for it anywhere, and to take the other disc for it.
+TEST(FastRecording, ABodyHiddenForFortyFramesOfAThousandASecondIsNotTakenForAnother) {
+  constexpr int kHiddenFrom = 10, kHiddenTo = 50, kFrames = 60;
+  constexpr double kDisc_px = 14.0, kPerFrame_px = 1.0, kFrame_s = 1e-3;
+  const cv::Mat floor = drawn_floor(300, 120, 150.0);
+  cv::Mat plate;
+  floor.convertTo(plate, CV_8U);
+  const Background background = Background::from_samples({{plate}, {}});
+  const auto finder = make_rim_finder();
+  std::mt19937 random(3);
+  const auto at = [](int i) { return Eigen::Vector2d(40.0 + kPerFrame_px * i, 60.0); };
+  const auto frame_of = [&](int i) {
+    cv::Mat picture = floor.clone();
+    draw_disc(picture, 260.0, 60.0, kDisc_px, kDisc_px, 0.0, 60.0);
+    if (i < kHiddenFrom || i >= kHiddenTo)
+      draw_disc(picture, at(i).x(), at(i).y(), kDisc_px, kDisc_px, 0.0, 60.0);
+    Frame frame;
+    frame.luma = developed(picture, 1.0, random);
+    frame.index = i;
+    frame.t_s = kFrame_s * i;
+    return frame;
+  };
+  const Frame first = frame_of(0);
+  Look look{.frame = first, .background = background.plate()};
+  Sighting guess;
+  guess.rim = Ellipse::from_axes(at(0), kDisc_px, kDisc_px, 0.0);
+  guess.centre_px = at(0);
+  look.predicted = &guess;
+  const auto one = finder->find(look);
+  ASSERT_TRUE(one);
+  Follower follower(*finder, background, nullptr);
+  follower.start(first, *one);
+  for (int i = 1; i < kFrames; ++i) {
+    const auto seen = follower.follow(frame_of(i));
+    if (i >= kHiddenFrom && i < kHiddenTo) {
+      EXPECT_FALSE(seen) << i;
+    } else if (i < kHiddenFrom || i >= kHiddenTo + 3) {
+      // After so long a search is made in every third frame.
+      ASSERT_TRUE(seen) << i;
+      EXPECT_LT((seen->centre_px - at(i)).norm(), 0.5) << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

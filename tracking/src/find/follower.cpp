@@ -3,16 +3,20 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "find/body_search.hpp"
 #include "find/silhouette.hpp"
+#include "find/usual_frames.hpp"
 #include "geometry/pose_change.hpp"
 #include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
 namespace {
 
-constexpr double kWeak = 0.5;  // relative support that something in its place has, too
+constexpr double kLongAway = 3.0;  // usual frames; then where and how it was says little
+constexpr double kWeak = 0.5;      // relative support that something in its place has, too
 
 cv::Rect box_around(const Eigen::Vector2d& centre_px, double half_px, const cv::Size& picture) {
   const cv::Rect box(static_cast<int>(centre_px.x() - half_px),
@@ -60,7 +64,9 @@ void Follower::start(const Frame& frame, const Sighting& seen) {
   shape_scatter_px_ = 1.0;
   palette_ = {};
   palette_.learn(seen.contrast.colours, background_.gain(frame.luma));
-  lost_ = off_colour_ = weak_ = 0;
+  last_s_ = frame.t_s;
+  lost_ = 0;
+  away_ = off_colour_ = weak_ = 0.0;
 }
 
 void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
@@ -99,18 +105,18 @@ bool Follower::plausible(const Sighting& seen, const Sighting& predicted, double
   const double ratio = seen.rim.semi_major_px() / usual_major_px_;
   if (ratio < 0.7 || ratio > 1.4) return false;
   if ((seen.centre_px - predicted.centre_px).norm() > reach_px) return false;
-  constexpr int kMostOffColour = 3;
+  constexpr double kMostOffColour = 2.5;  // a glint passes, a hand stays
   constexpr double kStrong = 0.7;
   const double support = relative_support(seen);
   const bool off_colour = support < kStrong && !palette_.fits(seen.contrast.colours, gain_);
-  if (off_colour && (lost_ > 0 || off_colour_ >= kMostOffColour)) return false;
+  if (off_colour && (lost_ > 0 || off_colour_ > kMostOffColour)) return false;
   const bool may_be_occluder = off_colour || (lost_ > 0 && support < kWeak);
   const double contrast =
       may_be_occluder ? std::min(kLeast, relative_contrast(seen)) : relative_contrast(seen);
   const double surprise = forecast_.surprise_px();
   const double far = reach_px + 0.15 * usual_major_px_ + 3.0 * surprise;
-  if (contrast >= kFull) return lost_ > 3 || apart_px(seen, predicted) < far;
-  const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * lost_;
+  if (contrast >= kFull) return away_ > kLongAway || apart_px(seen, predicted) < far;
+  const double near = 1.5 + 0.02 * usual_major_px_ + 1.5 * surprise + 0.3 * away_;
   return contrast >= kLeast && apart_px(seen, predicted) < near;
 }
 
@@ -160,12 +166,14 @@ std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& 
                                             const Others& others) {
   constexpr double kFull = 0.85;
   const double largest = std::max(4.0, 0.6 * predicted.rim.semi_minor_px());
-  const double reach = std::clamp(2.0 + 3.0 * forecast_.surprise_px() + lost_, 2.5, largest);
+  const double reach = std::clamp(2.0 + 3.0 * forecast_.surprise_px() + away_, 2.5, largest);
   std::optional<Sighting> best = look_at(frame, predicted, reach);
   if (best && is_other(best->centre_px, others)) best.reset();
   if (best && relative_contrast(*best) > kFull && best->accepted > 0.8 * usual_accepted_)
     return best;
-  if (lost_ > 2) return best;
+  // What no guess led to in as many frames, none will: the rest is left to look_about.
+  constexpr int kMostGuessed = 2;
+  if (lost_ > kMostGuessed) return best;
   std::vector<Sighting> guesses = forecast_.alternatives(frame.t_s);
   Sighting slowed = predicted;
   slowed.rim.centre_px = slowed.centre_px =
@@ -195,54 +203,74 @@ Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const 
   return again && again->visible_support_px() > found.visible_support_px() ? *again : found;
 }
 
-std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
-                                             const Others& others) {
-  const double size = usual_major_px_;
-  // The longer it has been lost, the farther it may have gone; after a while, anywhere. What
-  // has had weak support for as long may be what hides it, left behind in its place.
-  const int astray = std::max(lost_, weak_);
-  const double speed = (predicted.centre_px - forecast_.last().centre_px).norm();
+/// How far from its prediction the body may be: the longer it has been lost, the farther, after a
+/// while anywhere. What has had weak support for as long may be what hides it, left behind in its
+/// place.
+double Follower::farthest_px(const Sighting& predicted) const {
+  constexpr double kAnywhere = 30.0;
   // Of a body seen once the speed is not known; one that rolls goes its size in a frame or two.
   constexpr double kUnknown = 2.0;
-  const double reach = forecast_.knows_speed() ? 0.5 * size + 0.5 * speed + 0.25 * size * astray
-                                               : kUnknown * size * (1.0 + astray);
-  const double gate = astray > 30 ? 1e9 : reach;
-  cv::Rect box = gate > 1e8 ? cv::Rect({}, frame.luma.size())
-                            : box_around(predicted.centre_px, gate + 2.2 * size, frame.luma.size());
-  if (box.width < 8 || box.height < 8) return std::nullopt;
-  background_.scaled_into(plate_, gain_, box);
-  Look look{.frame = frame, .background = plate_};
-  struct Candidate {
-    double score;
-    Detection detection;
-  };
-  std::vector<Candidate> candidates;
+  const double size = usual_major_px_, astray = std::max(away_, weak_);
+  if (astray > kAnywhere) return std::numeric_limits<double>::infinity();
+  if (!forecast_.knows_speed()) return kUnknown * size * (1.0 + astray);
+  const double went = (predicted.centre_px - forecast_.last().centre_px).norm();
+  return 0.5 * size + 0.5 * went + 0.25 * size * astray;
+}
+
+/// The regions that look most like the body, best first: by their shape, size and colours.
+std::vector<Detection> Follower::regions_about(const Frame& frame, const Sighting& predicted,
+                                               double farthest_px, const cv::Rect& box,
+                                               const Others& others) const {
+  constexpr double kInItsColours = 2.0;
+  constexpr std::size_t kMostTries = 3;
+  const double size = usual_major_px_;
+  std::vector<std::pair<double, Detection>> scored;
   const auto consider = [&](const Silhouette& body, double favour) {
     const Detection& d = body.detection;
     if (d.semi_major_px < 0.6 * size || d.semi_major_px > 2.0 * size) return;
-    if ((d.centre_px - predicted.centre_px).norm() > gate || is_other(d.centre_px, others)) return;
+    if ((d.centre_px - predicted.centre_px).norm() > farthest_px || is_other(d.centre_px, others))
+      return;
     const double off = std::log(d.semi_major_px / size) / 0.2;
-    candidates.push_back({favour * region_score(body, finder_) * std::exp(-0.5 * off * off), d});
+    scored.emplace_back(favour * region_score(body, finder_) * std::exp(-0.5 * off * off), d);
   };
-  constexpr double kInItsColours = 2.0;
   for (const Silhouette& body : find_bodies(frame, plate_, box)) consider(body, 1.0);
   for (const Silhouette& body : find_coloured_like(palette_, gain_, frame, plate_, box))
     consider(body, kInItsColours);
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-  constexpr std::size_t kMostTries = 3;
-  constexpr double kLeastSupport = 0.55;
-  if (candidates.size() > kMostTries) candidates.resize(kMostTries);
+  std::sort(scored.begin(), scored.end(),
+            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<Detection> best;
+  for (std::size_t k = 0; k < std::min(scored.size(), kMostTries); ++k)
+    best.push_back(std::move(scored[k].second));
+  return best;
+}
+
+/// Whether enough is seen of a body found without a prediction, compared with what is usual.
+bool Follower::seen_well(const Sighting& seen) const {
+  constexpr double kLeastSupport = 0.55, kLeastContrast = 0.75, kOfSeed = 0.5;
+  return seen.accepted >= std::min(0.5, 0.7 * usual_accepted_) &&
+         detection_score(seen) >= kOfSeed * seed_score_ &&
+         (!seen.pose || seen.pose->support_px >= kLeastSupport * usual_support_px_) &&
+         relative_contrast(seen) >= kLeastContrast;
+}
+
+/// The best of what looks like the body about where it should be.
+std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting& predicted,
+                                             const Others& others) {
+  constexpr double kBeside = 2.2;  // of its size: all of a body that is just within reach
+  const double farthest = farthest_px(predicted);
+  const cv::Rect box = std::isinf(farthest)
+                           ? cv::Rect({}, frame.luma.size())
+                           : box_around(predicted.centre_px, farthest + kBeside * usual_major_px_,
+                                        frame.luma.size());
+  if (box.width < 8 || box.height < 8) return std::nullopt;
+  background_.scaled_into(plate_, gain_, box);
+  Look look{.frame = frame, .background = plate_};
   std::optional<Sighting> best;
-  for (const Candidate& candidate : candidates) {
-    look.detection = candidate.detection;
+  for (const Detection& region : regions_about(frame, predicted, farthest, box, others)) {
+    look.detection = region;
     auto seen = finder_.find(look);
     if (seen) seen = as_it_moves(frame, *seen);
-    if (!seen || seen->accepted < std::min(0.5, 0.7 * usual_accepted_) ||
-        detection_score(*seen) < 0.5 * seed_score_)
-      continue;
-    if (seen->pose && seen->pose->support_px < kLeastSupport * usual_support_px_) continue;
-    if (relative_contrast(*seen) < 0.75 || !plausible(*seen, predicted, gate) ||
+    if (!seen || !seen_well(*seen) || !plausible(*seen, predicted, farthest) ||
         is_other(seen->centre_px, others))
       continue;
     if (!best || detection_score(*seen) > detection_score(*best)) best = std::move(seen);
@@ -252,67 +280,83 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
 
 void Follower::read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const {
   if (!marks_) return;
-  const double window = lost_ > 3 ? data::kPi : 0.6;
+  const double window = away_ > kLongAway ? data::kPi : 0.6;
   if (const auto turned = marks_->read(frame.luma, seen.rim, predicted_rad, window)) {
     seen.turned_rad = turned->angle_rad;
     seen.turned_sigma_rad = std::hypot(turned->sigma_rad, centring_rad(seen, *marks_));
   }
 }
 
-/// Learns from a sighting how far predictions miss and what the body usually looks like.
-void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predicted) {
+/// Learns what the body usually looks like from a sighting of it in full view.
+void Follower::learn_usual(const Sighting& seen, const Sighting& predicted) {
   constexpr double kLearn = 0.1;
-  const bool in_full_view = relative_contrast(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
   const double shape_off = (seen.rim.shape_px - predicted.rim.shape_px).norm();
-  off_colour_ = palette_.fits(seen.contrast.colours, gain_) ? 0 : off_colour_ + 1;
-  weak_ = std::max(0, relative_support(seen) < kWeak ? weak_ + 1 : weak_ - 2);
-  if (in_full_view) {
-    palette_.learn(seen.contrast.colours, gain_);
-    if (lost_ == 0)
-      shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
-    usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);
-    usual_accepted_ += kLearn * (seen.accepted - usual_accepted_);
-    if (seen.pose) usual_support_px_ += kLearn * (seen.pose->support_px - usual_support_px_);
-    usual_contrast_.face += kLearn * (seen.contrast.face - usual_contrast_.face);
-    usual_contrast_.outline += kLearn * (seen.contrast.outline - usual_contrast_.outline);
-    const double off = (seen.rim.shape_px - mean_shape_px_).norm();
-    shape_scatter_px_ += kLearn * (off - shape_scatter_px_);
-    mean_shape_px_ += kLearn * (seen.rim.shape_px - mean_shape_px_);
-  }
+  palette_.learn(seen.contrast.colours, gain_);
+  if (lost_ == 0)
+    shape_surprise_px_ = std::max(0.5 * shape_off, 0.9 * shape_surprise_px_ + 0.1 * shape_off);
+  usual_major_px_ += kLearn * (seen.rim.semi_major_px() - usual_major_px_);
+  usual_accepted_ += kLearn * (seen.accepted - usual_accepted_);
+  if (seen.pose) usual_support_px_ += kLearn * (seen.pose->support_px - usual_support_px_);
+  usual_contrast_.face += kLearn * (seen.contrast.face - usual_contrast_.face);
+  usual_contrast_.outline += kLearn * (seen.contrast.outline - usual_contrast_.outline);
+  const double off = (seen.rim.shape_px - mean_shape_px_).norm();
+  shape_scatter_px_ += kLearn * (off - shape_scatter_px_);
+  mean_shape_px_ += kLearn * (seen.rim.shape_px - mean_shape_px_);
+}
+
+/// Goes on from a sighting.
+/// @param passed usual_frames since the frame before.
+void Follower::accept(const Frame& frame, Sighting& seen, const Sighting& predicted,
+                      double passed) {
+  const bool in_full_view = relative_contrast(seen) > 0.8 && seen.accepted > 0.75 * usual_accepted_;
+  off_colour_ = palette_.fits(seen.contrast.colours, gain_) ? 0.0 : off_colour_ + passed;
+  weak_ = std::max(0.0, weak_ + (relative_support(seen) < kWeak ? passed : -2.0 * passed));
+  if (in_full_view) learn_usual(seen, predicted);
   Sighting kept = seen;
   if (!kept.turned_rad) kept.turned_rad = predicted.turned_rad;
   forecast_.add(frame.t_s, kept, in_full_view);
   lost_ = 0;
+  away_ = 0.0;
+}
+
+/// Where no sighting is good enough to go on from, or a better one may be elsewhere. A search costs
+/// as much as many looks: what keeps finding nothing is made more rarely, in frames, so that one is
+/// made at most so many frames late.
+std::optional<Sighting> Follower::search(const Frame& frame, const Sighting& predicted,
+                                         const Others& others, std::optional<Sighting> seen) {
+  if (!seen) {
+    constexpr int kAwhile = 12, kEvery = 3;
+    return lost_ < kAwhile || lost_ % kEvery == 0 ? look_about(frame, predicted, others)
+                                                  : std::nullopt;
+  }
+  if (!warrants_wider_search(*seen) || --patience_ > 0) return seen;
+  constexpr double kClearlyMore = 1.05;
+  constexpr int kLongest = 16;
+  auto anywhere = look_about(frame, predicted, others);
+  const bool helps = anywhere && anywhere->pose &&
+                     anywhere->pose->support_px > kClearlyMore * seen->pose->support_px;
+  futile_ = helps ? 0 : std::min(kLongest, 2 * futile_ + 1);
+  patience_ = futile_;
+  return helps ? std::move(anywhere) : std::move(seen);
 }
 
 std::optional<Sighting> Follower::follow(const Frame& frame, const Others& others) {
   gain_ = background_.gain(frame.luma);
+  const double passed = usual_frames(std::abs(frame.t_s - std::exchange(last_s_, frame.t_s)));
   const Sighting predicted = forecast_.at(frame.t_s);
   std::optional<Sighting> seen;
   if (inside(predicted.centre_px, frame.luma.size(), 0.5 * usual_major_px_))
     seen = look_near(frame, predicted, others);
-  if (!seen) {
-    constexpr int kAwhile = 12, kEvery = 3;
-    if (lost_ < kAwhile || lost_ % kEvery == 0) seen = look_about(frame, predicted, others);
-  } else if (warrants_wider_search(*seen) && --patience_ <= 0) {
-    constexpr double kClearlyMore = 1.05;
-    constexpr int kLongest = 16;
-    auto anywhere = look_about(frame, predicted, others);
-    const bool helps = anywhere && anywhere->pose &&
-                       anywhere->pose->support_px > kClearlyMore * seen->pose->support_px;
-    if (helps) seen = std::move(anywhere);
-    // Searches that keep finding nothing better are made ever more rarely.
-    futile_ = helps ? 0 : std::min(kLongest, 2 * futile_ + 1);
-    patience_ = futile_;
-  }
+  seen = search(frame, predicted, others, std::move(seen));
   if (!seen) {
     ++lost_;
+    away_ += passed;
     return std::nullopt;
   }
   if (seen->pose && predicted.pose && finder_.faces_look_alike())
     seen->pose->pose = nearer_face(seen->pose->pose, predicted.pose->pose, finder_.mark_rad());
   read_marks(frame, *seen, predicted.turned_rad.value_or(0.0));
-  accept(frame, *seen, predicted);
+  accept(frame, *seen, predicted, passed);
   return seen;
 }
 

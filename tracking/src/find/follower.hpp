@@ -36,6 +36,11 @@ class Follower {
                                                 double reach_px);
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
+  [[nodiscard]] double farthest_px(const Sighting& predicted) const;
+  [[nodiscard]] std::vector<Detection> regions_about(const Frame& frame, const Sighting& predicted,
+                                                     double farthest_px, const cv::Rect& box,
+                                                     const Others& others) const;
+  [[nodiscard]] bool seen_well(const Sighting& seen) const;
   [[nodiscard]] Sighting as_it_moves(const Frame& frame, const Sighting& found) const;
   [[nodiscard]] double relative_contrast(const Sighting& seen) const;
   [[nodiscard]] double relative_support(const Sighting& seen) const;
@@ -44,7 +49,10 @@ class Follower {
                                double reach_px) const;
   void set_shape_knowledge(Look& look, Sighting& guess) const;
   void read_marks(const Frame& frame, Sighting& seen, double predicted_rad) const;
-  void accept(const Frame& frame, Sighting& seen, const Sighting& predicted);
+  [[nodiscard]] std::optional<Sighting> search(const Frame& frame, const Sighting& predicted,
+                                               const Others& others, std::optional<Sighting> seen);
+  void accept(const Frame& frame, Sighting& seen, const Sighting& predicted, double passed);
+  void learn_usual(const Sighting& seen, const Sighting& predicted);
 
   const BodyFinder& finder_;
   const Background& background_;
@@ -62,9 +70,12 @@ class Follower {
   double usual_support_px_ = 0.0;  ///< of PoseMeasurement::support_px
   Palette palette_;
   double seed_score_ = 0.0;  ///< detection_score of the sighting it started from
-  int lost_ = 0;             ///< frames since it was last seen
-  int off_colour_ = 0;       ///< frames in a row in which what is followed has other colours
-  int weak_ = 0;  ///< frames in which its support was weak, less twice those in which it was not
+  double last_s_ = 0.0;      ///< time of the last frame, with the body or without
+  int lost_ = 0;             ///< frames since it was last seen: each is one more look in vain
+  // How long, in usual_frames: that tells how far it may have gone.
+  double away_ = 0.0;              ///< since it was last seen
+  double off_colour_ = 0.0;        ///< in a row with what is followed in other colours
+  double weak_ = 0.0;              ///< of weak support, less twice those of better
   int futile_ = 0, patience_ = 0;  ///< frames to wait before searching in spite of a sighting
 };
 

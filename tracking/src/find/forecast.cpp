@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "find/usual_frames.hpp"
 #include "geometry/pose_change.hpp"
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
@@ -102,10 +103,10 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
   p.edges.clear();
   if (past_.size() < 2 || manner == kStill) return p;
   const Moment& before = past_[past_.size() - 2];
-  // Rates older than a few frames say little; they fade while the body stays lost.
+  // Rates older than a few usual frames say little; they fade while the body stays lost.
   constexpr double kFadeAfter = 6.0;
-  const double since = frames_since(t_s);
-  const double t = last.t_s + (t_s - last.t_s) * std::min(1.0, kFadeAfter / std::max(since, 1.0));
+  const double since = frames_since(t_s), fade_after = kFadeAfter / usual_frames(frame_s_);
+  const double t = last.t_s + (t_s - last.t_s) * std::min(1.0, fade_after / std::max(since, 1.0));
   const double ahead = (t - last.t_s) / (last.t_s - before.t_s);
   const bool bent = manner != kStraight && past_.size() >= 3;
   const Moment& first = past_.front();
@@ -117,7 +118,8 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
                      : Eigen::Vector2d(last.seen.centre_px +
                                        ahead * (last.seen.centre_px - before.seen.centre_px));
   p.rim.centre_px = p.centre_px + (last.seen.rim.centre_px - last.seen.centre_px);
-  if (since < 3.0) {
+  constexpr double kFewFrames = 3.0;  // farther on the noise of two shapes would outgrow both
+  if (since < kFewFrames) {
     const Eigen::Matrix2d shape =
         p.rim.shape_px + ahead * (last.seen.rim.shape_px - before.seen.rim.shape_px);
     if (shape.determinant() > 0.3 * p.rim.shape_px.determinant()) p.rim.shape_px = shape;
