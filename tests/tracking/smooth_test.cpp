@@ -90,6 +90,21 @@ TEST(SmoothTrack, InterpolatesShortGapsMarksThemAndLeavesLongOnes) {
   EXPECT_NEAR(smoothed.table.column("x_px")[31], 131.0, 0.05);
 }
 
+// A gap of 40 ms is short in any recording.
+TEST(SmoothTrack, InterpolatesFortyFramesOfAThousandASecond) {
+  data::TrackFile file;
+  file.tracks.emplace_back();
+  for (int i = 0; i < 120; ++i) {
+    if (i >= 40 && i < 80) continue;
+    data::TrackSample sample;
+    sample.frame = i;
+    sample.t_s = 1e-3 * i;
+    sample.centre_px = {100.0 + i, 50.0 + 0.02 * ((i * 7) % 5)};
+    file.tracks[0].samples.push_back(sample);
+  }
+  EXPECT_EQ(smooth_track(file).interpolated, 40);
+}
+
 TEST(Smooth, TellsHowManySamplesWereTooFewTogether) {
   data::TrackFile file;
   file.tracks.emplace_back();

@@ -9,7 +9,7 @@ void Repeats::add(const cv::Mat& luma) {
   constexpr int kReduced = 8;           // averages noise, and what codecs do to it, away
   constexpr double kSame_levels = 1.0;  // rounding and coding
   constexpr double kMoves_levels = 6.0;
-  constexpr int kLongestRun = 8;  // longer, it may have been at rest
+  constexpr int kLongestRun = 8;  // pictures: no rate is converted to so many times itself
   cv::Mat now;
   const cv::Size size(std::max(1, luma.cols / kReduced), std::max(1, luma.rows / kReduced));
   cv::resize(luma, now, size, 0, 0, cv::INTER_AREA);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "find/usual_frames.hpp"
 #include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -79,7 +80,7 @@ class Path {
   /// Where three frames before or after, or two on either side, lead; nothing if there are none so
   /// near.
   [[nodiscard]] std::optional<Place> expected(std::size_t k, Way way) const {
-    constexpr std::ptrdiff_t kMostFrames = 4;
+    constexpr std::ptrdiff_t kMostFrames = 4;  // farther on their noise leads anywhere
     static constexpr std::array<std::array<std::ptrdiff_t, 4>, kWays> kSteps{
         {{-3, -2, -1, 0}, {1, 2, 3, 0}, {-2, -1, 1, 2}}};
     std::vector<double> times;
@@ -112,6 +113,15 @@ struct Run {
   double accepted = 0.0;  // median
   bool torn = false;      // the path jumps at one of its ends
 };
+
+// How long a run lasts [usual_frames]: in a fast recording what hides a body is taken for it in
+// more frames, and none of them confirms another.
+double length_of(const Run& run, const std::vector<Glimpse>& glimpses) {
+  const auto frames = static_cast<double>(run.frames.size());
+  const double span_s =
+      glimpses[run.frames.back()].frame->t_s - glimpses[run.frames.front()].frame->t_s;
+  return frames > 1.0 ? frames * usual_frames(span_s / (frames - 1.0)) : 1.0;
+}
 
 // Whether the centre goes farther from one posed frame to the next than the path on either side
 // leads, by so much of the body's size that no impact does it.
@@ -182,10 +192,10 @@ void doubt_what_leaves_the_path(std::vector<Glimpse>& glimpses) {
 }
 
 void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
-  constexpr std::size_t kMost = 3;
+  constexpr double kMost = 3.5;  // usual frames: three of them
   constexpr double kOfRadius = 0.3;
   const std::vector<Run> runs = runs_of(glimpses);
-  const auto followed = [&](const Run& run) { return run.frames.size() > kMost; };
+  const auto followed = [&](const Run& run) { return length_of(run, glimpses) > kMost; };
   for (auto run = runs.begin(); run != runs.end(); ++run) {
     if (followed(*run)) continue;
     const auto before = std::find_if(std::reverse_iterator(run), runs.rend(), followed);
@@ -207,7 +217,7 @@ void doubt_what_stands_alone(std::vector<Glimpse>& glimpses) {
 void forget_weak_support_beside_gaps(std::vector<Glimpse>& glimpses) {
   // An arm in the body's place has a third to a half of the usual support, a body half
   // hidden by it half to two thirds: some of the latter go with the former.
-  constexpr std::size_t kGap = 2;
+  constexpr std::size_t kGap = 2;  // one frame may be lost for its noise alone
   constexpr double kWeak = 0.55;
   std::vector<double> usual;
   for (const Glimpse& g : glimpses)
@@ -243,7 +253,7 @@ void forget_what_tells_nothing(std::vector<Glimpse>& glimpses) {
 }
 
 void forget_what_the_path_jumps_to(std::vector<Glimpse>& glimpses) {
-  constexpr std::size_t kLongest = 12;
+  constexpr double kLongest = 12.5;  // usual frames: twelve of them
   constexpr double kLittle = 0.6;
   std::vector<double> accepted;
   for (const Glimpse& g : glimpses)
@@ -251,7 +261,7 @@ void forget_what_the_path_jumps_to(std::vector<Glimpse>& glimpses) {
   if (accepted.empty()) return;
   const double usual = data::median(std::move(accepted));
   for (const Run& run : runs_of(glimpses))
-    if (run.torn && run.frames.size() <= kLongest && run.accepted < kLittle * usual)
+    if (run.torn && length_of(run, glimpses) <= kLongest && run.accepted < kLittle * usual)
       for (const std::size_t i : run.frames) glimpses[i].seen.reset();
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "find/usual_frames.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/data/white_jerk.hpp"
@@ -144,19 +145,20 @@ struct Stretch {
 };
 
 std::vector<Stretch> stretches_of(const data::Track& track) {
-  constexpr std::int64_t kLongestGap = 30;  // frames
+  constexpr double kLongestGap = 30.0;  // usual frames: the motion across it is a guess
   std::vector<Stretch> all(1);
   for (const auto& sample : track.samples) {
     if (!all.back().frame.empty()) {
       const auto& last = *all.back().sample.back();
       const std::int64_t gap = sample.frame - last.frame;
-      if (gap > kLongestGap) {
+      const auto frames = static_cast<double>(gap);
+      if (frames * usual_frames((sample.t_s - last.t_s) / frames) > kLongestGap) {
         all.emplace_back();
       } else {
         for (std::int64_t k = 1; k < gap; ++k) {
           all.back().frame.push_back(last.frame + k);
-          all.back().t_s.push_back(last.t_s + (sample.t_s - last.t_s) * static_cast<double>(k) /
-                                                  static_cast<double>(gap));
+          all.back().t_s.push_back(last.t_s +
+                                   (sample.t_s - last.t_s) * static_cast<double>(k) / frames);
           all.back().sample.push_back(nullptr);
         }
       }
