@@ -246,7 +246,7 @@ void add_fit_parts(py::module_& module) {
           "status", [](const FitParameter& p) { return name(p.status); },
           "free, fixed, derived or prior")
       .def("__repr__", [](const FitParameter& p) {
-        return py::str("{} = {:.8g} +- {:.2g} {}").format(p.name, p.value, p.sigma, p.unit);
+        return py::str("{} = {:.8g} ± {:.2g} {}").format(p.name, p.value, p.sigma, p.unit);
       });
   py::class_<FitArc>(module, "Arc", "A stretch of a track that was fitted as one motion.")
       .def_readonly("track", &FitArc::track)

@@ -517,7 +517,7 @@ float shaded(float level, float slope, float bend, float s) {
   return level + s * (slope + s * bend);
 }
 
-// The light beside an edge that was found, and how much speaks for it.
+// The light beside an edge that was found, and how certain it is.
 void Fitting::describe_edge(size_t i) {
   StretchProfile& p = profiles_[i];
   ProfileEdge& e = p.edge;

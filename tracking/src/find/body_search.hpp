@@ -14,7 +14,8 @@ namespace trochoid::tracking {
 [[nodiscard]] double region_score(const Silhouette& body, const BodyFinder& finder);
 
 /// How well a body found without a prediction is seen, 0..1: its contrast times the fraction of its
-/// outline with an edge; without a pose less, the worse the edges lie on an ellipse.
+/// outline with an edge; without a pose more or less (up to 1.7 times), the worse the edges lie on
+/// an ellipse.
 [[nodiscard]] double detection_score(const Sighting& seen);
 
 /// Where a body may be followed from.

@@ -103,9 +103,12 @@ Sighting Forecast::guess(Manner manner, double t_s) const {
   p.edges.clear();
   if (past_.size() < 2 || manner == kStill) return p;
   const Moment& before = past_[past_.size() - 2];
-  // Rates older than a few usual frames say little; they fade while the body stays lost.
+  // Rates older than a few usual frames say little; they fade while the body stays lost. What is
+  // bent comes from three frames, and what they are wrong by grows with the square of the frames it
+  // is carried on, however soon these follow each other.
   constexpr double kFadeAfter = 6.0;
-  const double since = frames_since(t_s), fade_after = kFadeAfter / usual_frames(frame_s_);
+  const double since = frames_since(t_s);
+  const double fade_after = manner == kStraight ? kFadeAfter / usual_frames(frame_s_) : kFadeAfter;
   const double t = last.t_s + (t_s - last.t_s) * std::min(1.0, fade_after / std::max(since, 1.0));
   const double ahead = (t - last.t_s) / (last.t_s - before.t_s);
   const bool bent = manner != kStraight && past_.size() >= 3;

@@ -22,8 +22,8 @@ class PoseChange {
   /// Sine of the tilt below which a body is steep. Whoever follows a body beyond what was seen
   /// carries on what the axis is wrong by: kBeyond. Over part of an exposure that is less: kWithin.
   /// One frame off a pose that was measured, where only how far it smears is asked, the rates are
-  /// better than the chord however steep it is: kBeside. By one limit for all, CoM and tilt of the
-  /// blurred coin (s4) were 7 % and 17 % worse.
+  /// better than the chord however steep it is: kBeside. By one limit for all, CoM and tilt of a
+  /// blurred, wobbling coin were 7 % and 17 % worse.
   static constexpr double kBeyond = 0.2, kWithin = 0.1, kBeside = 0.0;
 
   /// @param from, to of one face: nearer_face.
@@ -32,7 +32,8 @@ class PoseChange {
   PoseChange(const Pose& before, const Pose& now, const Pose& after, double least_sine);
 
   /// `pose`, which is `to` or near it, `share` of the change further on; back where share < 0: -1
-  /// leads from `to` to `from`.
+  /// leads from `to` to `from`. The tilt stays within 0..pi: an axis that would pass the vertical
+  /// stops there.
   [[nodiscard]] Pose on(const Pose& pose, double share, Centre centre = Centre::straight) const;
 
   /// The parts, for whoever has reason to know which of two holds: the axis, steep or not, along

@@ -25,10 +25,10 @@ struct AttitudeNode {
   std::array<Pose, 2> poses;  ///< as tracked, mirrored
   double tilt_rad;            ///< half the angle between the two axes
   bool weighed = false;
-  double edge_score = 0.0;          ///< log odds of the first by its edges, +-1.5
+  double edge_score = 0.0;          ///< log odds of the first by its edges, -1.5..1.5
+  double shadow_score = 0.0;        ///< the same by its shadow, -1.5..1.5
   double score = 0.0;               ///< the same by edges, shadow and size
-  double weight = 0.0;              ///< score if all of it were beyond doubt
-  double shadow_score = 0.0;        ///< the same by its shadow, +-1.5
+  double weight = 0.0;              ///< of edges and size in a score, where it has any
   std::optional<Sighting> again{};  ///< the first measured afresh, where that scores higher
   std::optional<Sighting> other{};  ///< the second
 

@@ -421,9 +421,10 @@ void ReadingTally::add(const ReadingTally& other) {
 }
 
 double ReadingTally::expected_square() const {
-  // Between recordings, and between pictures: of 46 of the independent clips the mean gain of the
-  // right reading was 0.12 at least and 1.0 as a rule, pictures of one scattered by 0.4. The spread
-  // over what is hardly likely is no error bar: it would be as wide as nothing that was seen.
+  // Between recordings, and between pictures: of 46 of the independent clips the mean score ratio
+  // of the right reading was 0.12 at least and 1.0 as a rule, pictures of one scattered by 0.4. The
+  // spread over what is hardly likely is no error bar: it would be as wide as nothing that was
+  // seen.
   constexpr double kShared = 0.2, kOfOne = 0.2, kHardly = 0.02;
   if (found == 0.0) return 0.0;
   const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / found);

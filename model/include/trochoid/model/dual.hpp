@@ -22,7 +22,7 @@ template <>
 struct LanesOf<4> {
   typedef double Type __attribute__((vector_size(32)));
 };
-#if defined(__AVX512F__)
+#if TROCHOID_REGISTER_LANES == 8
 template <>
 struct LanesOf<8> {
   typedef double Type __attribute__((vector_size(64)));

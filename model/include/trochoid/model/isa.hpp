@@ -9,6 +9,11 @@
 #ifndef TROCHOID_ISA
 #define TROCHOID_ISA isa_baseline
 #endif
+/// How many numbers a register holds (dual.hpp): of that instruction set, not of the machine's that
+/// an includer is compiled for, or the same type would have two layouts.
+#ifndef TROCHOID_REGISTER_LANES
+#define TROCHOID_REGISTER_LANES 4
+#endif
 
 #define TROCHOID_INLINE __attribute__((always_inline)) inline
 #define TROCHOID_LAMBDA_INLINE __attribute__((always_inline))
