@@ -23,7 +23,7 @@ class PoseChange {
   /// carries on what the axis is wrong by: kBeyond. Over part of an exposure that is less: kWithin.
   /// One frame off a pose that was measured, where only how far it smears is asked, the rates are
   /// better than the chord however steep it is: kBeside. By one limit for all, CoM and tilt of a
-  /// blurred, wobbling coin were 7 % and 17 % worse.
+  /// blurred, wobbling coin were worse.
   static constexpr double kBeyond = 0.2, kWithin = 0.1, kBeside = 0.0;
 
   /// @param from, to of one face: nearer_face.

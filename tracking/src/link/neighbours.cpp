@@ -48,7 +48,7 @@ class Mending {
  private:
   struct Found {
     std::optional<Sighting> seen;
-    double likelihood_ratio = 0.0;  ///< to what was seen before, if anything was
+    double likelihood_ratio = 0.0;  ///< to what was seen before; of nothing, its likelihood alone
   };
 
   /// How likely it is to be so far from what is expected.

@@ -4,9 +4,9 @@
 #include "trochoid/model/isa.hpp"
 
 /// Scalars of the equations of motion: double, and Dual<N> = a value with N derivatives, carried
-/// forward through every operation (chain rule, exact to rounding). The derivatives are one vector
-/// of N lanes (N = 4, 8 or 16), so that gcc keeps them in whole registers; unused lanes cost
-/// nothing extra and stay zero. Comparisons and branches look at the value alone.
+/// forward through every operation (chain rule, exact to rounding). The derivatives are N lanes
+/// (N = 4, 8 or 16) in whole registers; unused lanes cost nothing extra and stay zero. Comparisons
+/// and branches look at the value alone.
 namespace trochoid::model {
 inline namespace TROCHOID_ISA {
 
