@@ -188,20 +188,70 @@ cv::Mat above(const cv::Mat& image, double threshold) {
   return mask;
 }
 
-cv::Mat restless_of(const Quantiles& q, double noise) {
-  return above(q.half, 8.0 + 4.0 * noise);
+/// Pixels that changed.
+struct Changes {
+  cv::Mat ever;    ///< in some sample
+  cv::Mat often;   ///< in a quarter of the samples, and back
+  cv::Mat always;  ///< so that no half of the samples agrees
+
+  static Changes of(const Quantiles& q, double noise, double least) {
+    const double often = 8.0 + 4.0 * noise;
+    return {above(q.range, least), above(q.spread, often), above(q.half, often)};
+  }
+};
+
+using Outlines = std::vector<std::vector<cv::Point>>;
+
+Outlines outlines_of(const cv::Mat& mask) {
+  Outlines outlines;
+  cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_SIMPLE);
+  return outlines;
 }
 
-/// Replaces, in one plane of the plate, what does not look like the static surroundings.
-void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const cv::Mat& active,
-             const cv::Mat& restless, double noise) {
-  const int count = cv::countNonZero(active);
-  if (count == 0 || count > kMostStirred * static_cast<double>(active.total())) return;
-  const StaticSurroundings around = StaticSurroundings::of(plane, active);
-  const cv::Mat doubtful = smoothed_mask(restless);
+cv::Mat filled(const Outlines& outlines, const cv::Size& size) {
+  cv::Mat mask = cv::Mat::zeros(size, CV_8U);
+  cv::drawContours(mask, outlines, -1, 255, cv::FILLED);
+  return mask;
+}
+
+/// Places in the middle of what changed often, which need not go all the way round them, and a
+/// margin: the mask's own is wide.
+cv::Mat middle_of(const Changes& changes) {
+  const auto disc = [](int width_px) {
+    return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
+  };
+  constexpr int kSliver_px = 7, kMargin_px = 15;
+  const cv::Mat often = smoothed_mask(changes.often);
+  Outlines around = outlines_of(often);
+  for (std::vector<cv::Point>& one : around) {
+    std::vector<cv::Point> hull;
+    cv::convexHull(one, hull);
+    one = std::move(hull);
+  }
+  const cv::Size size = often.size();
+  cv::Mat middle = filled(around, size) & filled(outlines_of(changes.ever), size) & ~often;
+  cv::morphologyEx(middle, middle, cv::MORPH_OPEN, disc(kSliver_px));
+  cv::dilate(middle, middle, disc(kMargin_px));
+  return middle;
+}
+
+bool mostly_static(const cv::Mat& active) {
+  return cv::countNonZero(active) <= kMostStirred * static_cast<double>(active.total());
+}
+
+/// Replaces, in one plane of the plate, what does not look like the static surroundings. A body
+/// that wobbles in one place never leaves the middle of it: a plain face looks as still there as a
+/// floor.
+void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const Changes& changes,
+             double noise) {
+  if (cv::countNonZero(changes.ever) == 0 || !mostly_static(changes.ever)) return;
+  const cv::Mat middle = middle_of(changes), moved = changes.ever | middle;
+  if (!mostly_static(moved)) return;
+  const cv::Mat doubtful = smoothed_mask(changes.always) | middle;
+  const StaticSurroundings around = StaticSurroundings::of(plane, moved);
   // The rim of what changed changed too, by less than counts.
   cv::Mat changed;
-  cv::dilate(active, changed, cv::Mat::ones(5, 5, CV_8U));
+  cv::dilate(moved, changed, cv::Mat::ones(5, 5, CV_8U));
   std::array<int, kSamples> levels{};
   for (int y = 0; y < plane.rows; ++y)
     for (int x = 0; x < plane.cols; ++x) {
@@ -331,11 +381,11 @@ Background Background::estimated(const BackgroundSamples& samples) {
   Plate& plate = background.plate_;
   plate.luma = q.median;
   plate.noise_levels = noise_of(q);
-  background.active_ = above(q.range, least_change(plate.noise_levels));
-  const cv::Mat restless = restless_of(q, plate.noise_levels);
-  background.restless_ =
-      static_cast<double>(cv::countNonZero(restless)) / static_cast<double>(restless.total());
-  uncover(plate.luma, level, background.active_, restless, plate.noise_levels);
+  const Changes changes = Changes::of(q, plate.noise_levels, least_change(plate.noise_levels));
+  background.active_ = changes.ever;
+  background.restless_ = static_cast<double>(cv::countNonZero(changes.always)) /
+                         static_cast<double>(changes.always.total());
+  uncover(plate.luma, level, changes, plate.noise_levels);
   if (!samples.chroma.empty()) background.estimate_chroma(samples.chroma, gains);
   return background;
 }
@@ -352,17 +402,19 @@ void Background::estimate_chroma(const std::vector<cv::Mat>& samples,
   }
   const std::array<Quantiles, 2> q{quantiles_of(planes[0]), quantiles_of(planes[1])};
   const double noise = std::max(noise_of(q[0]), noise_of(q[1]));
-  cv::Mat active;
-  cv::resize(active_, active, samples[0].size(), 0, 0, cv::INTER_NEAREST);
-  for (const Quantiles& plane : q)
-    cv::bitwise_or(active, above(plane.range, std::max(10.0, 7.0 * noise)), active);
-  const cv::Mat restless = restless_of(q[0], noise) | restless_of(q[1], noise);
+  Changes changes{{}, {}, {}};
+  cv::resize(active_, changes.ever, samples[0].size(), 0, 0, cv::INTER_NEAREST);
+  changes.often = changes.always = cv::Mat::zeros(samples[0].size(), CV_8U);
+  for (const Quantiles& plane : q) {
+    const Changes own = Changes::of(plane, noise, std::max(10.0, 7.0 * noise));
+    changes = {changes.ever | own.ever, changes.often | own.often, changes.always | own.always};
+  }
   std::array<cv::Mat, 2> estimate{q[0].median, q[1].median};
-  for (std::size_t c = 0; c < 2; ++c) uncover(estimate[c], planes[c], active, restless, noise);
+  for (std::size_t c = 0; c < 2; ++c) uncover(estimate[c], planes[c], changes, noise);
   cv::merge(estimate.data(), 2, plate_.chroma);
   plate_.chroma_noise_levels = noise;
   cv::Mat full;
-  cv::resize(active, full, active_.size(), 0, 0, cv::INTER_NEAREST);
+  cv::resize(changes.ever, full, active_.size(), 0, 0, cv::INTER_NEAREST);
   cv::bitwise_or(active_, full, active_);
 }
 

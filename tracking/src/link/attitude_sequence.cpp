@@ -428,11 +428,12 @@ class Chain {
       if (std::abs(margin_[i]) >= kDoubtful) return;
       // What the picture does not bear out now, its neighbours may bring back.
       doubts[i] = AttitudeDoubt{node.at};
-      if (!seen || !seen->pose || !other) return;
-      doubts[i]->off_px = 0.5 * (other->centre_px - seen->centre_px);
-      doubts[i]->off_m = 0.5 * (other->pose->pose.centre_m - seen->pose->pose.centre_m).head<2>();
-      doubts[i]->off_theta_rad =
-          between_tilts(seen->pose->pose.theta_rad, other->pose->pose.theta_rad);
+      if (!seen || !seen->pose) return;
+      if (other) doubts[i]->off_px = 0.5 * (other->centre_px - seen->centre_px);
+      const Pose& chosen = seen->pose->pose;
+      const Pose rival = other ? other->pose->pose : finder_.mirror_image(chosen).value_or(chosen);
+      doubts[i]->off_m = 0.5 * (rival.centre_m - chosen.centre_m).head<2>();
+      doubts[i]->off_theta_rad = between_tilts(chosen.theta_rad, rival.theta_rad);
     });
     return with_frames_between(doubts);
   }
