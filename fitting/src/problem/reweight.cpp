@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "observe/smoothing.hpp"
@@ -32,13 +34,15 @@ double length(const Reading& reading, const Eigen::VectorXd& residuals) {
                                               : std::abs(residuals[reading.row]);
 }
 
-// Scale of a channel from the weighted squares of its inliers; robust start from the median.
-double channel_scale(const Problem& problem, const RawResiduals& raw, Channel channel) {
+// Scale of a channel from the weighted squares of its inliers, nothing where too few are read;
+// robust start from the median.
+std::optional<double> channel_scale(const Problem& problem, const RawResiduals& raw,
+                                    Channel channel) {
   std::vector<double> lengths;
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
     for (const Reading& reading : problem.arcs[arc].readings)
       if (reading.channel == channel) lengths.push_back(length(reading, raw.per_arc[arc]));
-  if (lengths.size() < 5) return 1.0;
+  if (lengths.size() < 5) return std::nullopt;
   const bool planar = channel == Channel::position;
   // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
   double scale = median(lengths) / (planar ? 1.1774 : 0.6745);
@@ -65,15 +69,29 @@ double channel_scale(const Problem& problem, const RawResiduals& raw, Channel ch
   return std::max(scale * std::sqrt(rows / std::max(1.0, rows - used)), 1e-12);
 }
 
+// Scales of all channels. A motion that is wrong may leave nothing in one of them, as a body that
+// is taken to lie leaves nothing across its axis: what the others know of the noise bounds that.
+std::array<double, kChannels> channel_scales(const Problem& problem, const RawResiduals& raw) {
+  constexpr double kLeastBesideOthers = 0.01;
+  std::array<std::optional<double>, kChannels> known;
+  double most = 0.0;
+  for (int c = 0; c < kChannels; ++c) {
+    known[c] = channel_scale(problem, raw, static_cast<Channel>(c));
+    most = std::max(most, known[c].value_or(0.0));
+  }
+  std::array<double, kChannels> scales{};
+  for (int c = 0; c < kChannels; ++c)
+    scales[c] = known[c] ? std::max(*known[c], kLeastBesideOthers * most) : 1.0;
+  return scales;
+}
+
 }  // namespace
 
 double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
   const RawResiduals raw = raw_residuals(problem, u);
   if (!raw.ok) return 0.0;
   double change = 0.0;
-  std::array<double, kChannels> spread = problem.noise_scale;
-  for (int c = 0; c < kChannels; ++c)
-    spread[c] = channel_scale(problem, raw, static_cast<Channel>(c));
+  const std::array<double, kChannels> spread = channel_scales(problem, raw);
   if (rescale) {
     for (int c = 0; c < kChannels; ++c)
       change = std::max(change, std::abs(std::log(spread[c] / problem.noise_scale[c])));
