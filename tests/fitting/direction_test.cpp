@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "observe/observations.hpp"
+#include "problem/prepare.hpp"
+#include "problem/problem.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
@@ -195,6 +197,25 @@ TEST_F(NearlyFlatCoin, IsNotGivenALossByDirectionsThatItsTrackerMadeUp) {
       EXPECT_NEAR(parameter->value, truth, kSigmas * parameter->sigma) << name << ", seed " << seed;
     }
   }
+}
+
+// A coin at rest lies with its axis along the vertical: what was seen of the axis is off along its
+// meridian and never across.
+TEST_F(NearlyFlatCoin, TakenToLieThroughoutIsNotThoughtPreciseAcrossItsAxis) {
+  constexpr double kLeast = 1e-3;  // of the scale along the axis
+  const data::Track rolls = track(1);
+  const auto predictor = model::make_predictor(scene_);
+  FitOptions options;
+  options.start = kTruth;
+  options.start["w2_rad_s"] = 0.0;  // falls within three samples
+  Problem problem = prepare(std::span(&rolls, 1), *predictor, scene_, options);
+  problem.base[0] = values_with(*predictor, options.start);
+  reweight(problem, problem.start(), true);
+  const auto scale = [&](Channel channel) {
+    return problem.noise_scale[static_cast<std::size_t>(channel)];
+  };
+  EXPECT_GT(scale(Channel::theta), 1.0);
+  EXPECT_GT(scale(Channel::phi), kLeast * scale(Channel::theta));
 }
 
 }  // namespace
