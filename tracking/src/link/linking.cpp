@@ -9,6 +9,7 @@
 #include "link/readings.hpp"
 #include "link/second_look.hpp"
 #include "link/shadows.hpp"
+#include "link/spin_sequence.hpp"
 
 namespace trochoid::tracking {
 
@@ -39,6 +40,7 @@ void Linking::operator()(std::size_t settled, BodyPath& path,
   doubt_what_leaves_the_path(glimpses);
   doubt_what_stands_alone(glimpses);
   forget_what_tells_nothing(glimpses);
+  forget_spins_off_their_sequence(glimpses);
   place_other_readings(finder, settled, glimpses);
   for (std::size_t which = 0; which < path.readings.size(); ++which)
     path.readings[which].add(reading.tallies[which]);

@@ -1,0 +1,111 @@
+#include "link/spin_sequence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "trochoid/data/angle.hpp"
+#include "trochoid/data/quantile.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+double wrapped_rad(double angle_rad) {
+  return std::remainder(angle_rad, data::kTurn);
+}
+
+class SpinSequence {
+ public:
+  explicit SpinSequence(const std::vector<Glimpse>& glimpses) {
+    for (std::size_t i = 0; i < glimpses.size(); ++i)
+      if (glimpses[i].posed() && glimpses[i].seen->pose->sigma_psi_rad)
+        readings_.push_back({i, glimpses[i].frame->t_s, glimpses[i].pose()});
+    if (readings_.size() > 1) frame_s_ = data::usual_step_s(readings_, &Reading::t_s);
+  }
+
+  /// Frames whose spin is off.
+  [[nodiscard]] std::vector<std::size_t> off() const {
+    std::vector<std::size_t> frames;
+    for (std::size_t k = 0; k < readings_.size(); ++k)
+      if (contradicted(k)) frames.push_back(readings_[k].frame);
+    return frames;
+  }
+
+ private:
+  struct Reading {
+    std::size_t frame;
+    double t_s;
+    data::Pose<> pose;
+  };
+
+  /// About the body's own axis, modulo a turn: what precession turns the node line by, from which
+  /// spin is counted, is part of it.
+  static double turn_rad(const Reading& from, const Reading& to) {
+    const double cosine = 0.5 * (std::cos(from.pose.theta_rad) + std::cos(to.pose.theta_rad));
+    return wrapped_rad(to.pose.psi_rad - from.pose.psi_rad +
+                       cosine * wrapped_rad(to.pose.phi_rad - from.pose.phi_rad));
+  }
+
+  /// The first and one beyond the last reading within so many frames of reading k.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> around(std::size_t k, double frames) const {
+    const auto near = [&](std::size_t i) {
+      return std::abs(readings_[i].t_s - readings_[k].t_s) < (frames + 0.5) * frame_s_;
+    };
+    std::size_t from = k, to = k + 1;
+    while (from > 0 && near(from - 1)) --from;
+    while (to < readings_.size() && near(to)) ++to;
+    return {from, to};
+  }
+
+  /// What the body turns by in so long about reading k, by the others alone: of all their turns the
+  /// one that the rest are closest to; nothing of only a few.
+  [[nodiscard]] std::optional<double> usual_turn_rad(std::size_t k, double duration_s) const {
+    constexpr double kReach_frames = 10.0;
+    constexpr std::size_t kFewest = 3;
+    const auto [from, to] = around(k, kReach_frames);
+    std::vector<double> turns;
+    for (std::size_t i = from; i < to; ++i)
+      for (std::size_t j = i + 1; j < to; ++j)
+        if (i != k && j != k &&
+            std::abs(readings_[j].t_s - readings_[i].t_s - duration_s) < 0.1 * frame_s_)
+          turns.push_back(turn_rad(readings_[i], readings_[j]));
+    if (turns.size() < kFewest) return std::nullopt;
+    std::optional<double> usual;
+    double least = std::numeric_limits<double>::infinity();
+    for (const double one : turns) {
+      double apart = 0.0;
+      for (const double other : turns) apart += std::abs(wrapped_rad(other - one));
+      if (apart < least) least = apart, usual = one;
+    }
+    return usual;
+  }
+
+  [[nodiscard]] bool contradicted(std::size_t k) const {
+    constexpr double kNext_frames = 3.0, kFar_rad = 1.0, kMost = 0.75;
+    constexpr int kFewest = 3;
+    const auto [from, to] = around(k, kNext_frames);
+    int asked = 0, against = 0;
+    for (std::size_t i = from; i < to; ++i) {
+      if (i == k) continue;
+      const Reading &early = readings_[std::min(i, k)], &late = readings_[std::max(i, k)];
+      const auto usual = usual_turn_rad(k, late.t_s - early.t_s);
+      if (!usual) continue;
+      ++asked;
+      against += std::abs(wrapped_rad(turn_rad(early, late) - *usual)) > kFar_rad;
+    }
+    return asked >= kFewest && against >= kMost * asked;
+  }
+
+  std::vector<Reading> readings_;
+  double frame_s_ = 1.0;
+};
+
+}  // namespace
+
+void forget_spins_off_their_sequence(std::vector<Glimpse>& glimpses) {
+  for (const std::size_t frame : SpinSequence(glimpses).off())
+    glimpses[frame].seen->pose->sigma_psi_rad.reset();
+}
+
+}  // namespace trochoid::tracking
