@@ -85,6 +85,42 @@ TEST(Consensus, ARestThatEndsIsNotTakenForAllThereIs) {
   }
 }
 
+// Thrown, a body slides to a stop within few frames and wobbles on the spot from then on, slowly:
+// by how evenly it does, all that was before looks torn.
+Walk thrown(int sliding, int samples) {
+  constexpr double kSigma_m = 8e-6, kFrame_s = 0.005, kThrown_m_s = 0.16, kWobble_m = 3e-4;
+  Walk path = walk(samples, 5);
+  std::mt19937_64 generator(6);
+  std::normal_distribution<double> noise(0.0, kSigma_m);
+  double x_m = 0.0;
+  for (int i = 0; i < samples; ++i) {
+    const double left = std::max(0.0, 1.0 - static_cast<double>(i) / sliding);
+    const double since_s = kFrame_s * std::max(0, i - sliding);
+    path.t_s[static_cast<std::size_t>(i)] = kFrame_s * i;
+    path.sigma_m[static_cast<std::size_t>(i)] = kSigma_m;
+    path.xy_m(i, 0) = x_m + kWobble_m * std::sin(20.0 * since_s) + noise(generator);
+    path.xy_m(i, 1) = 0.8 * x_m + kWobble_m * std::cos(20.0 * since_s) + noise(generator);
+    x_m += kFrame_s * kThrown_m_s * std::sqrt(left);
+  }
+  return path;
+}
+
+TEST(Consensus, ABriefSlideBeforeALongWobbleIsMotion) {
+  constexpr int kSliding = 14, kSamples = 95;
+  const Walk path = thrown(kSliding, kSamples);
+  EXPECT_EQ(consistent_path(path.t_s, path.xy_m, path.sigma_m).size(), std::size_t{kSamples});
+}
+
+// As many, but elsewhere: the way back is a leap.
+TEST(Consensus, AsManyWrongPlacesBeforeItAreNone) {
+  constexpr int kWrong = 14, kSamples = 95;
+  Walk path = thrown(kWrong, kSamples);
+  path.xy_m.topRows(kWrong).col(1).array() -= 0.02;
+  const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+  ASSERT_FALSE(kept.empty());
+  EXPECT_GE(kept.front(), kWrong);
+}
+
 // No chain leads from one side of a cut to the other, but both have wrong places.
 TEST(Consensus, DoubtsWrongPlacesOnBothSidesOfACut) {
   constexpr int kCut = 200, kSamples = 500;

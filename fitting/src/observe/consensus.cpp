@@ -151,10 +151,27 @@ SampleChain best_chain(const NoisyPath& path, int from, int to) {
   return best_chain(path, from, to, jerk2_s);
 }
 
+// Whether samples [from, to) follow each other without a leap: no step is much longer than both
+// beside it.
+bool without_leap(const NoisyPath& path, int from, int to) {
+  constexpr double kLonger = 2.0, kNoises = 5.0;
+  std::vector<double> steps_m;
+  for (int i = from + 1; i < to; ++i)
+    steps_m.push_back((path.xy_m.row(i) - path.xy_m.row(i - 1)).norm());
+  for (std::size_t i = 1; i + 1 < steps_m.size(); ++i) {
+    const int at = from + static_cast<int>(i);
+    const double noise_m = std::hypot(path.sigma_m[at], path.sigma_m[at + 1]);
+    if (steps_m[i] > kLonger * std::max(steps_m[i - 1], steps_m[i + 1]) + kNoises * noise_m)
+      return false;
+  }
+  return true;
+}
+
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
-// rest that is struck, one that begins to wobble. What lies beyond its ends is looked at by itself.
+// rest that is struck, one that begins to wobble. What lies beyond its ends is looked at by itself;
+// so few samples that they may be wrong places are kept where they lead up to it.
 void keep_consistent(const NoisyPath& path, int from, int to, std::vector<int>& kept) {
-  constexpr int kMostWrong = 20, kFewest = 12;
+  constexpr int kMostWrong = 20, kFewest = 12, kFewestBeyond = 5;
   const std::vector<int> chain = best_chain(path, from, to).samples;
   // What hardly hangs together anywhere is not doubted.
   if (static_cast<int>(chain.size()) < kFewest ||
@@ -162,9 +179,17 @@ void keep_consistent(const NoisyPath& path, int from, int to, std::vector<int>& 
     for (int at = from; at < to; ++at) kept.push_back(at);
     return;
   }
-  if (chain.front() - from > kMostWrong) keep_consistent(path, from, chain.front(), kept);
+  // Some of the chain on the way, to see how it goes on.
+  constexpr int kOfChain = 3;
+  const auto beyond = [&](int first, int last, int seen_from, int seen_to) {
+    if (last - first > kMostWrong)
+      keep_consistent(path, first, last, kept);
+    else if (last - first >= kFewestBeyond && without_leap(path, seen_from, seen_to))
+      for (int at = first; at < last; ++at) kept.push_back(at);
+  };
+  beyond(from, chain.front(), from, std::min(to, chain.front() + kOfChain));
   kept.insert(kept.end(), chain.begin(), chain.end());
-  if (to - 1 - chain.back() > kMostWrong) keep_consistent(path, chain.back() + 1, to, kept);
+  beyond(chain.back() + 1, to, std::max(from, chain.back() + 1 - kOfChain), to);
 }
 
 }  // namespace
