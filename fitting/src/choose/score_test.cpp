@@ -1,7 +1,5 @@
 #include "choose/score_test.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
 #include "judge/statistics.hpp"
+#include "observe/decompositions.hpp"
 #include "observe/observed.hpp"
 #include "problem/linearise.hpp"
 #include "problem/prepare.hpp"
@@ -71,8 +70,7 @@ Tangent condensed(Tangent at) {
   if (at.jacobian.rows() <= columns + 1) return at;
   Eigen::MatrixXd both(at.jacobian.rows(), columns + 1);
   both << at.jacobian, at.residuals;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(both);
-  const Eigen::MatrixXd upper = qr.matrixQR().topRows(columns + 1).triangularView<Eigen::Upper>();
+  const Eigen::MatrixXd upper = Reflections(both).triangle();
   at.jacobian = upper.leftCols(columns);
   at.residuals = upper.col(columns);
   return at;
@@ -111,7 +109,7 @@ Least find_least(const Tangent& at, const std::set<int>& zero, const std::set<in
   for (const int i : zero) residuals += at.nothing[i] * at.jacobian.col(i);
   const std::vector<int> columns = all_but(at, zero, held);
   const Eigen::MatrixXd active = at.jacobian(Eigen::all, columns);
-  const Eigen::VectorXd step = active.colPivHouseholderQr().solve(-residuals);
+  const Eigen::VectorXd step = LeastSquares(active).solve(-residuals);
   // Where some would be negative, one of them at least is zero: chi-square falls on a straight way
   // from any other place to here.
   Least best;
@@ -141,13 +139,10 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
   active = active * size.cwiseInverse().asDiagonal();
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(at.nothing.size());
   constexpr double kApart = 1e-9;  // as in the error bars of a fit
-  auto qr = active.colPivHouseholderQr();
-  qr.setThreshold(kApart);
-  if (qr.rank() < active.cols()) return variance;
+  if (LeastSquares(active).rank(kApart) < active.cols()) return variance;
   const Eigen::MatrixXd inverse =
-      (active.transpose() * active)
-          .ldlt()
-          .solve(Eigen::MatrixXd::Identity(active.cols(), active.cols()));
+      SymmetricEquations(active.transpose() * active)
+          .solve_each(Eigen::MatrixXd::Identity(active.cols(), active.cols()));
   variance(columns) = inverse.diagonal().cwiseMax(0.0).cwiseQuotient(size.cwiseAbs2());
   return variance;
 }

@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
 
@@ -265,7 +265,7 @@ double polynomial_chi2(const Problem& problem, int arc, int degree) {
     for (int k = 0; k <= degree; ++k, power *= t) basis.block<2, 2>(2 * i, 2 * k) = power * wt;
     right.segment<2>(2 * i) = wt * reading.value;
   }
-  const Eigen::VectorXd c = basis.colPivHouseholderQr().solve(right);
+  const Eigen::VectorXd c = LeastSquares(basis).solve(right);
   constexpr double kRounding = 1e-13;
   const double left = (right - basis * c).norm();
   return left > kRounding * right.norm() ? left * left : 0.0;

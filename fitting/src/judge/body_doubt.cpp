@@ -1,6 +1,5 @@
 #include "judge/body_doubt.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "observe/decompositions.hpp"
 #include "observe/observed.hpp"
 #include "problem/linearise.hpp"
 #include "start/strategy.hpp"
@@ -111,7 +111,7 @@ Eigen::VectorXd follow(const Linearised& all, const Eigen::VectorXd& change) {
   right.head(change.size()) = change;
   const Eigen::VectorXd size = all.jacobian.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = all.jacobian * size.cwiseInverse().asDiagonal();
-  return -scaled.completeOrthogonalDecomposition().solve(right).cwiseQuotient(size);
+  return -NearestLeastSquares(scaled).solve(right).cwiseQuotient(size);
 }
 
 }  // namespace

@@ -1,9 +1,8 @@
 #include "judge/influence.hpp"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 
+#include "observe/decompositions.hpp"
 #include "problem/linearise.hpp"
 
 namespace trochoid::fitting {
@@ -21,13 +20,12 @@ Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
   const Eigen::MatrixXd jacobian = linearise(problem, u).jacobian;
   const Eigen::VectorXd sizes = jacobian.colwise().norm().cwiseMax(1e-300);
   const Eigen::Index rank = std::min(jacobian.rows(), jacobian.cols());
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(jacobian * sizes.cwiseInverse().asDiagonal());
-  const Eigen::MatrixXd triangle = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeThinU);
-  const auto seen = (svd.singularValues().array() > kSeen * svd.singularValues()[0]).count();
+  const Reflections reflections(jacobian * sizes.cwiseInverse().asDiagonal());
+  const Axes axes = left_singular(reflections.triangle());
+  const auto seen = (axes.values.array() > kSeen * axes.values[0]).count();
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(jacobian.rows(), seen);
-  basis.topRows(rank) = svd.matrixU().leftCols(seen);
-  return qr.householderQ() * basis;
+  basis.topRows(rank) = axes.directions.leftCols(seen);
+  return reflections.turned(basis);
 }
 
 // The share a sample with these readings has in the direction of the parameters it says most of: 1
@@ -44,7 +42,7 @@ double leverage_of(const std::vector<const Reading*>& readings, const Eigen::Mat
     own.conservativeResize(own.rows() + width, Eigen::NoChange);
     own.bottomRows(width) = rows.middleRows(reading->row, width);
   }
-  const double largest = Eigen::JacobiSVD<Eigen::MatrixXd>(own).singularValues()[0];
+  const double largest = largest_singular_value(own);
   return largest * largest;
 }
 

@@ -2,13 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "problem/linearise.hpp"
 #include "problem/valley.hpp"
@@ -104,15 +103,9 @@ struct Directions {
 Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
                          Uncertainty& result) {
   const Eigen::Index count = scaled.cols();
-  Eigen::MatrixXd triangle = scaled;
-  if (scaled.rows() > count)
-    triangle = Eigen::HouseholderQR<Eigen::MatrixXd>(scaled)
-                   .matrixQR()
-                   .topRows(count)
-                   .triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
+  const Axes axes = right_singular(scaled.rows() > count ? Reflections(scaled).triangle() : scaled);
   Eigen::VectorXd singular = Eigen::VectorXd::Zero(count);
-  singular.head(svd.singularValues().size()) = svd.singularValues();
+  singular.head(axes.values.size()) = axes.values;
   const double largest = std::max(singular.maxCoeff(), 1e-300);
   // 1e-9: below that the derivatives themselves (integrated at ~1e-8) are rounding.
   const double floor = 1e-9 * largest;
@@ -120,7 +113,7 @@ Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
   // large, and with small residuals 1 / floor would read as a sharp measurement.
   const double unseen = std::max(1.0 / floor, 1e3);
   Directions seen{
-      svd.matrixV(), Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count), {}};
+      axes.directions, Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count), {}};
   for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::VectorXd direction = seen.axes.col(i);
     const bool sees = singular[i] > floor;
@@ -234,7 +227,8 @@ Eigen::VectorXd variances_given(const Eigen::MatrixXd& covariance, const std::ve
   if (known.empty()) return covariance.diagonal();
   const Eigen::MatrixXd across = covariance(Eigen::all, known);
   Eigen::VectorXd rest =
-      (covariance - across * covariance(known, known).ldlt().solve(across.transpose()))
+      (covariance -
+       across * SymmetricEquations(covariance(known, known)).solve_each(across.transpose()))
           .diagonal()
           .cwiseMax(0.0);
   for (const int i : known) rest[i] = 0.0;

@@ -2,13 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
 #include "observe/angles.hpp"
+#include "observe/decompositions.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -35,8 +35,8 @@ Circle circle_through(const ArcData& arc, const Eigen::Vector2d& pivot_m, bool d
     const double t = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
     for (int k = 0; k <= highest; ++k) powers(i, k) = std::pow(t, k);
   }
-  return {powers.leftCols(highest).colPivHouseholderQr().solve(xy.rowwise().norm()),
-          powers.colPivHouseholderQr().solve(azimuth)};
+  return {LeastSquares(powers.leftCols(highest)).solve(xy.rowwise().norm()),
+          LeastSquares(powers).solve(azimuth)};
 }
 
 double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector2d& pivot_m) {

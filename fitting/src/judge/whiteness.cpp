@@ -1,10 +1,9 @@
 #include "judge/whiteness.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "observe/decompositions.hpp"
 
 namespace trochoid::fitting {
 
@@ -36,15 +35,13 @@ Eigen::MatrixXd taken_from(const Eigen::MatrixXd& scaled, const Eigen::MatrixXd&
                            const Rows& rows, const std::vector<int>& columns) {
   constexpr double kMainly = 0.5;  // of what is known of the direction
   const Eigen::MatrixXd part = scaled(rows, columns);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(part);
+  const Reflections reflections(part);
   const Eigen::Index rank = std::min(part.rows(), part.cols());
-  const Eigen::MatrixXd triangle = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle * unit_steps(columns, Eigen::all),
-                                              Eigen::ComputeThinU);
-  const Eigen::Index kept = (svd.singularValues().array().square() > kMainly).count();
+  const Axes axes = left_singular(reflections.triangle() * unit_steps(columns, Eigen::all));
+  const Eigen::Index kept = (axes.values.array().square() > kMainly).count();
   Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(part.rows(), kept);
-  directions.topRows(rank) = svd.matrixU().leftCols(kept);
-  return qr.householderQ() * directions;
+  directions.topRows(rank) = axes.directions.leftCols(kept);
+  return reflections.turned(directions);
 }
 
 NoiseGroup group_of(const Problem& problem, const Linearised& all, Channel channel, int arc,
@@ -132,7 +129,7 @@ Leftover leftover(const NoiseKind& kind, const NoiseGroup& group) {
     right += left.taken.back().transpose() * left.residuals.back();
   }
   if (taken == 0) return left;
-  const Eigen::VectorXd share = normal.ldlt().solve(right);
+  const Eigen::VectorXd share = SymmetricEquations(normal).solve(right);
   for (std::size_t i = 0; i < left.taken.size(); ++i) left.residuals[i] -= left.taken[i] * share;
   return left;
 }
@@ -170,13 +167,13 @@ struct Normal {
   }
   // What chi-square loses by the best change of the parameters, and by how many of them.
   [[nodiscard]] std::pair<double, int> gain() const {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(matrix);
-    const double least = 1e-9 * axes.eigenvalues().maxCoeff();
+    const Axes axes = principal_axes(matrix);
+    const double least = 1e-9 * axes.values.maxCoeff();
     std::pair<double, int> sum;
     for (Eigen::Index i = 0; i < right.size(); ++i) {
-      if (!(axes.eigenvalues()[i] > least)) continue;
-      const double along = axes.eigenvectors().col(i).dot(right);
-      sum.first += along * along / axes.eigenvalues()[i];
+      if (!(axes.values[i] > least)) continue;
+      const double along = axes.directions.col(i).dot(right);
+      sum.first += along * along / axes.values[i];
       ++sum.second;
     }
     return sum;

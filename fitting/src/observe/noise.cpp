@@ -1,10 +1,11 @@
 #include "observe/noise.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "observe/decompositions.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -109,9 +110,9 @@ void add(const std::vector<Eigen::MatrixXd>& group, const NoiseKind& kind, Likel
     sum.left += static_cast<double>(rows.cols());
   }
   if (taken == 0) return;
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(normal);
-  sum.squares -= right.dot(ldlt.solve(right));
-  sum.log_determinant += ldlt.vectorD().cwiseMax(1e-300).array().log().sum();
+  const SymmetricEquations equations(normal);
+  sum.squares -= right.dot(equations.solve(right));
+  sum.log_determinant += equations.log_determinant();
   sum.left -= static_cast<double>(taken);
 }
 

@@ -1,8 +1,8 @@
 #include "problem/linearise.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 
+#include "observe/decompositions.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -24,9 +24,8 @@ void project_on_others(const std::vector<int>& kept, Linearised& all) {
   }
   Eigen::MatrixXd rest = all.jacobian(Eigen::all, others);
   rest.array().rowwise() /= rest.colwise().norm().array().max(1e-300);
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> span(rest);
-  for (const int i : kept)
-    all.jacobian.col(i) = rest * span.solve(Eigen::VectorXd(all.jacobian.col(i)));
+  const NearestLeastSquares span(rest);
+  for (const int i : kept) all.jacobian.col(i) = rest * span.solve(all.jacobian.col(i));
 }
 
 }  // namespace

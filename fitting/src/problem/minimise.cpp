@@ -1,11 +1,11 @@
 #include <fmt/core.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <limits>
 
+#include "observe/decompositions.hpp"
 #include "problem/problem.hpp"
 
 // Levenberg-Marquardt with geodesic acceleration: what is left of the residuals beyond the tangent
@@ -103,13 +103,14 @@ class GeodesicDescent {
 
   // The damped linear problem's answer to these residuals.
   [[nodiscard]] Eigen::VectorXd answer(const Eigen::VectorXd& rows) const {
-    return unit_.cwiseProduct(ldlt_.solve(unit_.cwiseProduct(-(jacobian_.transpose() * rows))));
+    return unit_.cwiseProduct(
+        equations_.solve(unit_.cwiseProduct(-(jacobian_.transpose() * rows))));
   }
   void factorise() {
     Eigen::MatrixXd damped = normal_;
     damped.diagonal() += damping_ * scale2_;
     unit_ = damped.diagonal().cwiseSqrt().cwiseInverse();
-    ldlt_.compute(unit_.asDiagonal() * damped * unit_.asDiagonal());
+    equations_ = SymmetricEquations(unit_.asDiagonal() * damped * unit_.asDiagonal());
   }
   void damp(double times) {
     constexpr double kSome = 1e-9;
@@ -203,7 +204,7 @@ class GeodesicDescent {
   double damping_, chi2_ = 0.0;
   Eigen::VectorXd u_, rows_, scale2_, unit_;
   Eigen::MatrixXd jacobian_, normal_;
-  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+  SymmetricEquations equations_;
 };
 
 }  // namespace

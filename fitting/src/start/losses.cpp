@@ -1,8 +1,8 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "observe/decompositions.hpp"
 #include "start/strategy.hpp"
 
 // Losses are fitted by their logarithm, where nothing pulls one that has vanished back.
@@ -83,16 +83,16 @@ Probe most_missed(const Problem& problem, const std::vector<int>& vanished) {
     if (!problem.free[i].held && std::find(vanished.begin(), vanished.end(), i) == vanished.end())
       others.push_back(i);
   const Eigen::MatrixXd active = j(Eigen::all, others);
-  const auto qr = active.colPivHouseholderQr();
+  const LeastSquares by_others(active);
   for (const int i : vanished) {
     // The derivative by the logarithm is what as much again does.
-    const Eigen::VectorXd alone = j.col(i) - active * qr.solve(j.col(i));
+    const Eigen::VectorXd alone = j.col(i) - active * by_others.solve(j.col(i));
     const double size2 = alone.squaredNorm();
     const double times = size2 > 0.0 ? -r.dot(alone) / size2 : 0.0;
     const double gain = times * times * size2;
     if (times > 0.0 && gain > best.gain)
       best = {i, problem.base[0][problem.free[i].index] * (1.0 + times), gain, others,
-              qr.solve(-r - times * j.col(i))};
+              by_others.solve(-r - times * j.col(i))};
   }
   return best;
 }

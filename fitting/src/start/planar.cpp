@@ -1,10 +1,10 @@
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "observe/angles.hpp"
+#include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "start/starts.hpp"
 #include "trochoid/data/integral.hpp"
@@ -20,7 +20,7 @@ Eigen::MatrixXd polynomial(const std::vector<double>& t_s, double t0, const Eige
   Eigen::MatrixXd basis(n, degree + 1);
   for (int i = 0; i < n; ++i)
     for (int k = 0; k <= degree; ++k) basis(i, k) = std::pow((t_s[i] - t0) / scale, k);
-  Eigen::MatrixXd c = basis.colPivHouseholderQr().solve(y);
+  Eigen::MatrixXd c = LeastSquares(basis).solve_each(y);
   for (int k = 1; k <= degree; ++k) c.row(k) /= std::pow(scale, k);
   return c;
 }
@@ -36,7 +36,7 @@ Eigen::VectorXd non_negative(const Eigen::MatrixXd& m, const Eigen::VectorXd& ri
     for (int c = 0; c < columns; ++c)
       if (c >= losses || (subset & (1 << c))) used.push_back(c);
     const Eigen::MatrixXd part = m(Eigen::all, used);
-    const Eigen::VectorXd x = part.colPivHouseholderQr().solve(right);
+    const Eigen::VectorXd x = LeastSquares(part).solve(right);
     const double squares = (right - part * x).squaredNorm();
     const int positive = static_cast<int>(used.size()) - (columns - losses);
     if ((positive > 0 && x.head(positive).minCoeff() < 0.0) || squares >= least) continue;

@@ -1,9 +1,9 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "observe/angles.hpp"
+#include "observe/decompositions.hpp"
 #include "start/strategy.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -215,7 +215,7 @@ class Shooter {
     }
     Eigen::VectorXd diagonal = normal.diagonal().cwiseMax(1e-12 * normal.diagonal().maxCoeff());
     normal.diagonal() += damping_ * diagonal;
-    const Eigen::VectorXd delta = normal.ldlt().solve(right);
+    const Eigen::VectorXd delta = SymmetricEquations(normal).solve(right);
     if (!delta.allFinite()) return false;
     step.p = delta.tail(np);
     step.s.clear();
