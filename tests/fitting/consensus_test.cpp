@@ -121,6 +121,23 @@ TEST(Consensus, AsManyWrongPlacesBeforeItAreNone) {
   EXPECT_GE(kept.front(), kWrong);
 }
 
+// Here and there, without any way: at the end of a smooth path and at its beginning.
+TEST(Consensus, PlacesScatteredAtAnEndAreWrong) {
+  constexpr int kSamples = 300;
+  for (const int wrong : {6, 10, 15, 20})
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Walk path = walk(kSamples, seed);
+      std::mt19937_64 generator(seed);
+      std::uniform_real_distribution<double> anywhere_m(-0.1, 0.1);
+      for (int i = kSamples - wrong; i < kSamples; ++i)
+        path.xy_m.row(i) += Eigen::RowVector2d(anywhere_m(generator), anywhere_m(generator));
+      const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
+      const auto wrongly =
+          std::count_if(kept.begin(), kept.end(), [&](int i) { return i >= kSamples - wrong; });
+      EXPECT_LT(2 * wrongly, wrong) << wrong << " scattered, seed " << seed;
+    }
+}
+
 // No chain leads from one side of a cut to the other, but both have wrong places.
 TEST(Consensus, DoubtsWrongPlacesOnBothSidesOfACut) {
   constexpr int kCut = 200, kSamples = 500;

@@ -17,7 +17,8 @@ struct Spinning {
   std::vector<Frame> frames{kGlimpses};
   std::vector<Glimpse> glimpses;
 
-  explicit Spinning(double faster_from_middle_rad_s = 0.0) {
+  explicit Spinning(double faster_rad_s = 0.0, int from_frame = kGlimpses / 2,
+                    double slower_by_rad_s2 = 0.0) {
     double turned_rad = 0.0;
     for (int i = 0; i < kGlimpses; ++i) {
       Frame& frame = frames[static_cast<std::size_t>(i)];
@@ -28,8 +29,8 @@ struct Spinning {
       pose.pose.phi_rad = kPrecession_rad_s * frame.t_s;
       pose.pose.psi_rad = turned_rad - std::cos(0.5) * pose.pose.phi_rad + 0.02 * (i % 3 - 1);
       pose.sigma_psi_rad = 0.02;
-      turned_rad +=
-          kFrame_s * (kRate_rad_s + (2 * i >= kGlimpses ? faster_from_middle_rad_s : 0.0));
+      turned_rad += kFrame_s * (kRate_rad_s + (i >= from_frame ? faster_rad_s : 0.0) -
+                                slower_by_rad_s2 * frame.t_s);
     }
   }
 
@@ -64,7 +65,12 @@ TEST(SpinSequence, GapsAreNoReason) {
 }
 
 TEST(SpinSequence, AnImpactThatChangesTheSpinIsNone) {
-  EXPECT_TRUE(Spinning(-60.0).forgotten().empty());
+  for (const int frame : {3, 4, 5, 6, 8, kGlimpses / 2, kGlimpses - 4})
+    EXPECT_TRUE(Spinning(-90.0, frame).forgotten().empty()) << frame;
+}
+
+TEST(SpinSequence, NorIsASpinThatDiesFast) {
+  EXPECT_TRUE(Spinning(0.0, 0, 1200.0).forgotten().empty());
 }
 
 TEST(SpinSequence, WhereTooFewAreNearNothingIsForgotten) {

@@ -151,20 +151,25 @@ SampleChain best_chain(const NoisyPath& path, int from, int to) {
   return best_chain(path, from, to, jerk2_s);
 }
 
-// Whether samples [from, to) follow each other without a leap: no step is much longer than both
-// beside it.
-bool without_leap(const NoisyPath& path, int from, int to) {
-  constexpr double kLonger = 2.0, kNoises = 5.0;
-  std::vector<double> steps_m;
-  for (int i = from + 1; i < to; ++i)
-    steps_m.push_back((path.xy_m.row(i) - path.xy_m.row(i - 1)).norm());
-  for (std::size_t i = 1; i + 1 < steps_m.size(); ++i) {
-    const int at = from + static_cast<int>(i);
-    const double noise_m = std::hypot(path.sigma_m[at], path.sigma_m[at + 1]);
-    if (steps_m[i] > kLonger * std::max(steps_m[i - 1], steps_m[i + 1]) + kNoises * noise_m)
+// Whether samples [from, to) are one smooth way: velocities change little as a rule from one to the
+// next, and none is much larger than both beside it.
+bool goes_smoothly(const NoisyPath& path, int from, int to) {
+  constexpr double kLonger = 2.0, kNoises = 5.0, kSmooth = 0.5;
+  std::vector<Eigen::RowVector2d> m_s;
+  std::vector<double> noises_m_s;
+  for (int i = from + 1; i < to; ++i) {
+    const double tau = path.t_s[i] - path.t_s[i - 1];
+    m_s.emplace_back((path.xy_m.row(i) - path.xy_m.row(i - 1)) / tau);
+    noises_m_s.push_back(kNoises * std::hypot(path.sigma_m[i - 1], path.sigma_m[i]) / tau);
+  }
+  std::vector<double> changes;
+  for (std::size_t i = 1; i < m_s.size(); ++i) {
+    const double before = m_s[i - 1].norm(), now = m_s[i].norm();
+    changes.push_back((m_s[i] - m_s[i - 1]).norm() / std::max({before, now, 1e-300}));
+    if (i + 1 < m_s.size() && now > kLonger * std::max(before, m_s[i + 1].norm()) + noises_m_s[i])
       return false;
   }
-  return true;
+  return !changes.empty() && median(std::move(changes)) < kSmooth;
 }
 
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
@@ -184,7 +189,7 @@ void keep_consistent(const NoisyPath& path, int from, int to, std::vector<int>& 
   const auto beyond = [&](int first, int last, int seen_from, int seen_to) {
     if (last - first > kMostWrong)
       keep_consistent(path, first, last, kept);
-    else if (last - first >= kFewestBeyond && without_leap(path, seen_from, seen_to))
+    else if (last - first >= kFewestBeyond && goes_smoothly(path, seen_from, seen_to))
       for (int at = first; at < last; ++at) kept.push_back(at);
   };
   beyond(from, chain.front(), from, std::min(to, chain.front() + kOfChain));

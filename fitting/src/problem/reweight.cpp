@@ -70,7 +70,8 @@ std::optional<double> channel_scale(const Problem& problem, const RawResiduals& 
 }
 
 // Scales of all channels. A motion that is wrong may leave nothing in one of them, as a body that
-// is taken to lie leaves nothing across its axis: what the others know of the noise bounds that.
+// is taken to lie leaves nothing across its axis: what the others know of the noise bounds that, up
+// to what is stated.
 std::array<double, kChannels> channel_scales(const Problem& problem, const RawResiduals& raw) {
   constexpr double kLeastBesideOthers = 0.01;
   std::array<std::optional<double>, kChannels> known;
@@ -79,9 +80,9 @@ std::array<double, kChannels> channel_scales(const Problem& problem, const RawRe
     known[c] = channel_scale(problem, raw, static_cast<Channel>(c));
     most = std::max(most, known[c].value_or(0.0));
   }
+  const double least = std::min(1.0, kLeastBesideOthers * most);
   std::array<double, kChannels> scales{};
-  for (int c = 0; c < kChannels; ++c)
-    scales[c] = known[c] ? std::max(*known[c], kLeastBesideOthers * most) : 1.0;
+  for (int c = 0; c < kChannels; ++c) scales[c] = known[c] ? std::max(*known[c], least) : 1.0;
   return scales;
 }
 

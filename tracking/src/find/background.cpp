@@ -125,6 +125,19 @@ struct StaticSurroundings {
   static constexpr int kFactor = 2;
   cv::Mat level, scatter;  ///< CV_32F; level < 0 where nothing static is near
 
+  /// What the surroundings let expect of a pixel of full size, and what it may differ by.
+  struct Expected {
+    double level, tolerance;
+    [[nodiscard]] bool explains(double value) const { return std::abs(value - level) <= tolerance; }
+  };
+  [[nodiscard]] std::optional<Expected> at(int x, int y, double noise) const {
+    const int sy = std::min(y / kFactor, level.rows - 1);
+    const int sx = std::min(x / kFactor, level.cols - 1);
+    const double here = level.at<float>(sy, sx);
+    if (here < 0.0) return std::nullopt;
+    return Expected{here, 5.0 + 2.5 * (noise + scatter.at<float>(sy, sx))};
+  }
+
   static StaticSurroundings of(const cv::Mat& plate, const cv::Mat& active) {
     const cv::Size size((plate.cols + 1) / kFactor, (plate.rows + 1) / kFactor);
     cv::Mat value, hidden, weight;
@@ -167,12 +180,12 @@ struct StaticSurroundings {
 };
 
 /// Mean of the samples that the surroundings would explain; nothing if there is none.
-std::optional<double> floor_like(const std::array<int, kSamples>& levels, double level,
-                                 double tolerance) {
+std::optional<double> floor_like(const std::array<int, kSamples>& levels,
+                                 const StaticSurroundings::Expected& expected) {
   double sum = 0.0;
   int count = 0;
   for (const int v : levels)
-    if (std::abs(v - level) <= tolerance) sum += v, ++count;
+    if (expected.explains(v)) sum += v, ++count;
   if (count == 0) return std::nullopt;
   return sum / count;
 }
@@ -210,17 +223,19 @@ Outlines outlines_of(const cv::Mat& mask) {
 
 cv::Mat filled(const Outlines& outlines, const cv::Size& size) {
   cv::Mat mask = cv::Mat::zeros(size, CV_8U);
-  cv::drawContours(mask, outlines, -1, 255, cv::FILLED);
+  // Of outlines drawn together, those that overlap would cancel each other.
+  for (int i = 0; i < static_cast<int>(outlines.size()); ++i)
+    cv::drawContours(mask, outlines, i, 255, cv::FILLED);
   return mask;
 }
 
-/// Places in the middle of what changed often, which need not go all the way round them, and a
-/// margin: the mask's own is wide.
+cv::Mat disc_of(int width_px) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
+}
+
+/// Places in the middle of what changed often, which need not go all the way round them.
 cv::Mat middle_of(const Changes& changes) {
-  const auto disc = [](int width_px) {
-    return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
-  };
-  constexpr int kSliver_px = 7, kMargin_px = 15;
+  constexpr int kSliver_px = 7;
   const cv::Mat often = smoothed_mask(changes.often);
   Outlines around = outlines_of(often);
   for (std::vector<cv::Point>& one : around) {
@@ -230,22 +245,47 @@ cv::Mat middle_of(const Changes& changes) {
   }
   const cv::Size size = often.size();
   cv::Mat middle = filled(around, size) & filled(outlines_of(changes.ever), size) & ~often;
-  cv::morphologyEx(middle, middle, cv::MORPH_OPEN, disc(kSliver_px));
-  cv::dilate(middle, middle, disc(kMargin_px));
+  cv::morphologyEx(middle, middle, cv::MORPH_OPEN, disc_of(kSliver_px));
   return middle;
+}
+
+/// Of such places, with a margin, those that a body never leaves: it covers what is right beside
+/// them most of the time. What a body goes round, or a ring's hole, is bare most of the time.
+cv::Mat never_left(const cv::Mat& middle, const cv::Mat& plane, const StaticSurroundings& around,
+                   double noise) {
+  constexpr int kMargin_px = 15;
+  cv::Mat labels, covered = cv::Mat::zeros(middle.size(), CV_8U);
+  const int count = cv::connectedComponents(middle, labels);
+  for (int label = 1; label < count; ++label) {
+    cv::Mat wide;
+    cv::dilate(labels == label, wide, disc_of(kMargin_px));
+    int beside = 0, unlike_floor = 0;
+    for (int y = 0; y < plane.rows; ++y)
+      for (int x = 0; x < plane.cols; ++x) {
+        if (wide.at<std::uint8_t>(y, x) == 0 || labels.at<int>(y, x) == label) continue;
+        const auto expected = around.at(x, y, noise);
+        if (!expected) continue;
+        ++beside;
+        unlike_floor += !expected->explains(plane.at<std::uint8_t>(y, x));
+      }
+    if (2 * unlike_floor > beside) covered |= wide;
+  }
+  return covered;
 }
 
 bool mostly_static(const cv::Mat& active) {
   return cv::countNonZero(active) <= kMostStirred * static_cast<double>(active.total());
 }
 
-/// Replaces, in one plane of the plate, what does not look like the static surroundings. A body
-/// that wobbles in one place never leaves the middle of it: a plain face looks as still there as a
-/// floor.
+/// Replaces, in one plane of the plate, what does not look like the static surroundings. A plain
+/// body that wobbles in one place looks as still in the middle, which it never leaves, as a floor.
 void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const Changes& changes,
              double noise) {
   if (cv::countNonZero(changes.ever) == 0 || !mostly_static(changes.ever)) return;
-  const cv::Mat middle = middle_of(changes), moved = changes.ever | middle;
+  cv::Mat middle = middle_of(changes);
+  if (cv::countNonZero(middle) > 0)
+    middle = never_left(middle, plane, StaticSurroundings::of(plane, changes.ever | middle), noise);
+  const cv::Mat moved = changes.ever | middle;
   if (!mostly_static(moved)) return;
   const cv::Mat doubtful = smoothed_mask(changes.always) | middle;
   const StaticSurroundings around = StaticSurroundings::of(plane, moved);
@@ -256,19 +296,15 @@ void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const Changes&
   for (int y = 0; y < plane.rows; ++y)
     for (int x = 0; x < plane.cols; ++x) {
       if (changed.at<std::uint8_t>(y, x) == 0) continue;
-      const int sy = std::min(y / StaticSurroundings::kFactor, around.level.rows - 1);
-      const int sx = std::min(x / StaticSurroundings::kFactor, around.level.cols - 1);
-      const double level = around.level.at<float>(sy, sx);
-      if (level < 0.0) continue;
-      const double tolerance = 5.0 + 2.5 * (noise + around.scatter.at<float>(sy, sx));
+      const auto expected = around.at(x, y, noise);
       std::uint8_t& plate = plane.at<std::uint8_t>(y, x);
-      if (std::abs(plate - level) <= tolerance) continue;
+      if (!expected || expected->explains(plate)) continue;
       for (std::size_t k = 0; k < kSamples; ++k)
         levels[k] = samples[k * samples.size() / kSamples].at<std::uint8_t>(y, x);
-      if (const auto floor = floor_like(levels, level, tolerance))
+      if (const auto floor = floor_like(levels, *expected))
         plate = cv::saturate_cast<std::uint8_t>(*floor);
       else if (doubtful.at<std::uint8_t>(y, x) != 0)
-        plate = cv::saturate_cast<std::uint8_t>(level);
+        plate = cv::saturate_cast<std::uint8_t>(expected->level);
     }
 }
 

@@ -429,11 +429,15 @@ class Chain {
       // What the picture does not bear out now, its neighbours may bring back.
       doubts[i] = AttitudeDoubt{node.at};
       if (!seen || !seen->pose) return;
-      if (other) doubts[i]->off_px = 0.5 * (other->centre_px - seen->centre_px);
-      const Pose& chosen = seen->pose->pose;
-      const Pose rival = other ? other->pose->pose : finder_.mirror_image(chosen).value_or(chosen);
-      doubts[i]->off_m = 0.5 * (rival.centre_m - chosen.centre_m).head<2>();
-      doubts[i]->off_theta_rad = between_tilts(chosen.theta_rad, rival.theta_rad);
+      Sighting rival = other ? *other : *seen;
+      if (!other) {
+        rival.pose->pose = finder_.mirror_image(seen->pose->pose).value_or(seen->pose->pose);
+        finder_.place(rival);
+      }
+      const Pose &chosen = seen->pose->pose, &mirrored = rival.pose->pose;
+      doubts[i]->off_px = 0.5 * (rival.centre_px - seen->centre_px);
+      doubts[i]->off_m = 0.5 * (mirrored.centre_m - chosen.centre_m).head<2>();
+      doubts[i]->off_theta_rad = between_tilts(chosen.theta_rad, mirrored.theta_rad);
     });
     return with_frames_between(doubts);
   }

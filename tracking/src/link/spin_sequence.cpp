@@ -81,7 +81,24 @@ class SpinSequence {
     return usual;
   }
 
+  /// Whether the body turns by the same from the first of three readings one after the other, as
+  /// far apart, to the second and from that to the third.
+  [[nodiscard]] bool even(std::size_t first) const {
+    constexpr double kEven_rad = 0.7;
+    if (first + 2 >= readings_.size()) return false;
+    const Reading &a = readings_[first], &b = readings_[first + 1], &c = readings_[first + 2];
+    return std::abs(c.t_s - b.t_s - (b.t_s - a.t_s)) < 0.1 * frame_s_ &&
+           std::abs(wrapped_rad(turn_rad(b, c) - turn_rad(a, b))) < kEven_rad;
+  }
+
+  /// Whether a reading goes with those right before, right after or on both sides of it: the rate
+  /// may have changed there, or change fast.
+  [[nodiscard]] bool goes_on(std::size_t k) const {
+    return even(k) || (k >= 1 && even(k - 1)) || (k >= 2 && even(k - 2));
+  }
+
   [[nodiscard]] bool contradicted(std::size_t k) const {
+    if (goes_on(k)) return false;
     constexpr double kNext_frames = 3.0, kFar_rad = 1.0, kMost = 0.75;
     constexpr int kFewest = 3;
     const auto [from, to] = around(k, kNext_frames);

@@ -9,7 +9,8 @@ namespace trochoid::tracking {
 /// look more like the mark than the mark does. A body turns about its own axis at a rate that
 /// hardly changes within some frames; a spin is off if from three in four of the frames next to it
 /// the body would have turned more than a radian otherwise than it turns between others as far
-/// apart. Where fewer than three are near nothing is forgotten.
+/// apart. Not where it goes evenly with the two before it, the two after it or one on each side: an
+/// impact changes the rate. Where fewer than three are near nothing is forgotten.
 void forget_spins_off_their_sequence(std::vector<Glimpse>& glimpses);
 
 }  // namespace trochoid::tracking
