@@ -254,21 +254,29 @@ cv::Mat middle_of(const Changes& changes) {
 cv::Mat never_left(const cv::Mat& middle, const cv::Mat& plane, const StaticSurroundings& around,
                    double noise) {
   constexpr int kMargin_px = 15;
-  cv::Mat labels, covered = cv::Mat::zeros(middle.size(), CV_8U);
-  const int count = cv::connectedComponents(middle, labels);
+  const cv::Rect picture({}, middle.size());
+  cv::Mat labels, stats, centres, covered = cv::Mat::zeros(middle.size(), CV_8U);
+  const int count = cv::connectedComponentsWithStats(middle, labels, stats, centres);
   for (int label = 1; label < count; ++label) {
+    const int* of = stats.ptr<int>(label);
+    const cv::Rect box =
+        picture & cv::Rect(of[cv::CC_STAT_LEFT] - kMargin_px, of[cv::CC_STAT_TOP] - kMargin_px,
+                           of[cv::CC_STAT_WIDTH] + 2 * kMargin_px,
+                           of[cv::CC_STAT_HEIGHT] + 2 * kMargin_px);
+    const cv::Mat own = labels(box) == label;
     cv::Mat wide;
-    cv::dilate(labels == label, wide, disc_of(kMargin_px));
+    cv::dilate(own, wide, disc_of(kMargin_px));
     int beside = 0, unlike_floor = 0;
-    for (int y = 0; y < plane.rows; ++y)
-      for (int x = 0; x < plane.cols; ++x) {
-        if (wide.at<std::uint8_t>(y, x) == 0 || labels.at<int>(y, x) == label) continue;
-        const auto expected = around.at(x, y, noise);
+    for (int y = 0; y < box.height; ++y)
+      for (int x = 0; x < box.width; ++x) {
+        if (wide.at<std::uint8_t>(y, x) == 0 || own.at<std::uint8_t>(y, x) != 0) continue;
+        const int at_x = box.x + x, at_y = box.y + y;
+        const auto expected = around.at(at_x, at_y, noise);
         if (!expected) continue;
         ++beside;
-        unlike_floor += !expected->explains(plane.at<std::uint8_t>(y, x));
+        unlike_floor += !expected->explains(plane.at<std::uint8_t>(at_y, at_x));
       }
-    if (2 * unlike_floor > beside) covered |= wide;
+    if (2 * unlike_floor > beside) covered(box) |= wide;
   }
   return covered;
 }
