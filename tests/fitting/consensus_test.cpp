@@ -121,7 +121,7 @@ TEST(Consensus, AsManyWrongPlacesBeforeItAreNone) {
   EXPECT_GE(kept.front(), kWrong);
 }
 
-// Here and there, without any way: at the end of a smooth path and at its beginning.
+// Here and there, without any way, after a smooth path.
 TEST(Consensus, PlacesScatteredAtAnEndAreWrong) {
   constexpr int kSamples = 300;
   for (const int wrong : {6, 10, 15, 20})

@@ -154,7 +154,8 @@ SampleChain best_chain(const NoisyPath& path, int from, int to) {
 // Whether samples [from, to) are one smooth way: velocities change little as a rule from one to the
 // next, and none is much larger than both beside it.
 bool goes_smoothly(const NoisyPath& path, int from, int to) {
-  constexpr double kLonger = 2.0, kNoises = 5.0, kSmooth = 0.5;
+  constexpr double kLonger = 2.0, kNoises = 5.0;
+  constexpr double kSmooth = 0.5;  // of the larger one; between places without a way more than 1
   std::vector<Eigen::RowVector2d> m_s;
   std::vector<double> noises_m_s;
   for (int i = from + 1; i < to; ++i) {

@@ -40,7 +40,7 @@ class SymmetricEquations {
   [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
   /// Each column of b by itself.
   [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::MatrixXd& b) const;
-  /// Logarithm of the determinant, with 1e-300 for each pivot that is none.
+  /// Logarithm of the determinant, with 1e-300 for each pivot below that.
   [[nodiscard]] double log_determinant() const;
 
  private:

@@ -73,7 +73,7 @@ std::optional<double> channel_scale(const Problem& problem, const RawResiduals& 
 // is taken to lie leaves nothing across its axis: what the others know of the noise bounds that, up
 // to what is stated.
 std::array<double, kChannels> channel_scales(const Problem& problem, const RawResiduals& raw) {
-  constexpr double kLeastBesideOthers = 0.01;
+  constexpr double kLeastBesideOthers = 0.01;  // what trackers state differs by ten times at most
   std::array<std::optional<double>, kChannels> known;
   double most = 0.0;
   for (int c = 0; c < kChannels; ++c) {

@@ -99,9 +99,13 @@ Quantiles quantiles_of(const std::vector<cv::Mat>& samples) {
   return q;
 }
 
+cv::Mat disc_of(int width_px) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
+}
+
 /// A mask without specks, its gaps closed and a margin added.
 cv::Mat smoothed_mask(const cv::Mat& mask) {
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5});
+  const cv::Mat disc = disc_of(5);
   cv::Mat smooth;
   cv::morphologyEx(mask, smooth, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));
   cv::morphologyEx(smooth, smooth, cv::MORPH_CLOSE, disc, {-1, -1}, 3);
@@ -144,7 +148,7 @@ struct StaticSurroundings {
     cv::resize(plate, value, size, 0, 0, cv::INTER_AREA);
     // A reduced pixel counts only if all of it was static, a margin for blur and shadow included.
     cv::Mat wide;
-    cv::dilate(active, wide, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
+    cv::dilate(active, wide, disc_of(5));
     cv::resize(wide, hidden, size, 0, 0, cv::INTER_AREA);
     cv::threshold(hidden, hidden, 0, 1, cv::THRESH_BINARY_INV);
     hidden.convertTo(weight, CV_32F);
@@ -229,10 +233,6 @@ cv::Mat filled(const Outlines& outlines, const cv::Size& size) {
   return mask;
 }
 
-cv::Mat disc_of(int width_px) {
-  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
-}
-
 /// Places in the middle of what changed often, which need not go all the way round them.
 cv::Mat middle_of(const Changes& changes) {
   constexpr int kSliver_px = 7;
@@ -253,7 +253,7 @@ cv::Mat middle_of(const Changes& changes) {
 /// them most of the time. What a body goes round, or a ring's hole, is bare most of the time.
 cv::Mat never_left(const cv::Mat& middle, const cv::Mat& plane, const StaticSurroundings& around,
                    double noise) {
-  constexpr int kMargin_px = 15;
+  constexpr int kMargin_px = 15;  // more than smoothed_mask() adds to what changed
   const cv::Rect picture({}, middle.size());
   cv::Mat labels, stats, centres, covered = cv::Mat::zeros(middle.size(), CV_8U);
   const int count = cv::connectedComponentsWithStats(middle, labels, stats, centres);
@@ -446,7 +446,7 @@ void Background::estimate_chroma(const std::vector<cv::Mat>& samples,
   }
   const std::array<Quantiles, 2> q{quantiles_of(planes[0]), quantiles_of(planes[1])};
   const double noise = std::max(noise_of(q[0]), noise_of(q[1]));
-  Changes changes{{}, {}, {}};
+  Changes changes;
   cv::resize(active_, changes.ever, samples[0].size(), 0, 0, cv::INTER_NEAREST);
   changes.often = changes.always = cv::Mat::zeros(samples[0].size(), CV_8U);
   for (const Quantiles& plane : q) {
