@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
+#include "choose/exchange.hpp"
 #include "choose/terms.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -50,6 +52,22 @@ TEST_F(Contested, ARungThatWasOnlyScoreTestedIsFittedBesideAnother) {
   EXPECT_TRUE(is_known(rungs, tested.terms));
   EXPECT_LT(tested.bic, rungs[1].bic);
   EXPECT_TRUE(add_neighbours(contest_, std::span(&both, 1), rungs[1], rungs).empty());
+}
+
+// The search for it had ended elsewhere, and its terms were thought to explain less than nothing.
+TEST_F(Contested, ALargerRungThatExplainsLessThanOneItContainsIsFittedAnewFromThere) {
+  const int air = term("air force"), pivoting = term("pivoting friction");
+  Rungs rungs{fitted({air, pivoting})};
+  Rung& larger = rungs.emplace_back(rung_with(ladder_, {air, pivoting, term("rolling friction")}));
+  larger.fit = rungs[0].fit;
+  larger.fitted = true;
+  larger.parameters = rungs[0].parameters + 1;
+  larger.bic = rungs[0].bic + 1e3;
+  const Rung* chosen = exchange_while_worth(contest_, rungs);
+  EXPECT_EQ(chosen, &rungs[0]);
+  EXPECT_NE(larger.fit.find("rolling_friction_m"), nullptr);
+  const double paid = std::log(chosen->fit.dof + chosen->parameters);
+  EXPECT_LT(larger.bic, chosen->bic + paid + 0.1);
 }
 
 // A later test, beside another rung, had taken the place of a better one.

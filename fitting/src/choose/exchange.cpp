@@ -110,9 +110,35 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   return worth;
 }
 
+// Rungs that have all of a known one's terms and more, and yet explain less than it does: the search
+// for them ended elsewhere. Nothing is learned of their terms there.
+std::vector<Rung*> stuck_above(const Rung& known, Rungs& rungs) {
+  const double rows = known.fit.dof + known.parameters;
+  std::vector<Rung*> stuck;
+  for (Rung& rung : rungs) {
+    const double paid = (rung.parameters - known.parameters) * std::log(rows);
+    if (rung.terms != known.terms && rung.fitted && !rung.by_score_test &&
+        has_all_terms_of(rung, known) && rung.bic > known.bic + paid + kBareMention)
+      stuck.push_back(&rung);
+  }
+  return stuck;
+}
+
+// Fits what is stuck above a known rung anew, from there.
+void fit_stuck_anew(const Contest& contest, const Rung& known, Rungs& rungs) {
+  if (!explains(known)) return;
+  side_by_side(contest, stuck_above(known, rungs),
+               [&](std::size_t, Rung& rung, const FitOptions& options) {
+                 Rung again = rung_with(contest.ladder, rung.terms);
+                 fit_neighbour(contest.tracks, known, options, again);
+                 if (again.fitted && again.bic < rung.bic) rung = std::move(again);
+               });
+}
+
 // Adds what may do as well as a known rung beside it. @returns the rung to go on from.
 const Rung* exchange_terms(const Contest& contest, const Rung& known, Rungs& rungs) {
   constexpr std::size_t kFirst = 2;
+  fit_stuck_anew(contest, known, rungs);
   const std::vector<Neighbour> worth = worth_exchanging(contest, known, rungs);
   // Where something is missing, the likeliest leads on, and changes what the others gain.
   if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
@@ -129,7 +155,6 @@ const Rung* exchange_terms(const Contest& contest, const Rung& known, Rungs& run
 // which alone they are exchanged. Those of a sliding body are dear.
 const Rung* as_good(const Rungs& rungs, const Rung& chosen,
                     const std::set<const Rung*>& exchanged) {
-  constexpr double kBareMention = 2.0;  // of BIC
   const Rung* best = nullptr;
   if (chosen.fit.model == "sliding") return best;
   for (const Rung& rung : rungs)

@@ -19,7 +19,7 @@ namespace trochoid::fitting {
 // Evidence by differences of BIC (Kass and Raftery, J. Am. Stat. Assoc. 90, 773, 1995): up to 2
 // "not worth more than a bare mention", above 6 "strong", above 10 "very strong". Trackers err a
 // little with the motion itself: a further term needs strong evidence.
-inline constexpr double kStrong = 6.0, kVeryStrong = 10.0;
+inline constexpr double kBareMention = 2.0, kStrong = 6.0, kVeryStrong = 10.0;
 /// p-value above which residuals count as white.
 inline constexpr double kWhite = 0.01;
 
