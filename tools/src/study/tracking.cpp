@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -195,8 +196,7 @@ std::int64_t frames_tracked(fs::path track_file) {
 }
 
 /// False if the recording could not be tracked.
-bool study(const fs::path& folder, const TrackingStudyOptions& options) {
-  const Recording r = recording_in(folder);
+bool study(const Recording& r, const TrackingStudyOptions& options) {
   const fs::path target = options.out / (r.name + ".track.csv");
   fmt::print("{}\n", r.name);
   std::fflush(stdout);
@@ -220,17 +220,33 @@ bool study(const fs::path& folder, const TrackingStudyOptions& options) {
   return true;
 }
 
-void run(const TrackingStudyOptions& options) {
-  make_folder(options.out);
-  int refused = 0;
-  for (const fs::path& folder : options.folders) {
+/// All of them before the first is tracked, which takes its time.
+std::vector<Recording> recordings_in(const std::vector<fs::path>& folders) {
+  std::map<std::string, fs::path> named;
+  std::vector<Recording> recordings;
+  for (const fs::path& folder : folders) {
     // What a shell's * brings along: a README beside the folders.
     if (fs::is_regular_file(folder)) continue;
-    if (!study(folder, options)) ++refused;
+    recordings.push_back(recording_in(folder));
+    const std::string& name = recordings.back().name;
+    if (const auto [other, is_new] = named.emplace(name, folder); !is_new)
+      throw InputError(fmt::format(
+          "{} and {}: both tracks would be {}.track.csv; score the folders one after the other, "
+          "each with its own --out",
+          other->second.string(), folder.string(), name));
   }
+  return recordings;
+}
+
+void run(const TrackingStudyOptions& options) {
+  const std::vector<Recording> recordings = recordings_in(options.folders);
+  make_folder(options.out);
+  int refused = 0;
+  for (const Recording& recording : recordings)
+    if (!study(recording, options)) ++refused;
   if (refused > 0)
     throw NotGood(
-        fmt::format("{} of {} recordings could not be tracked", refused, options.folders.size()));
+        fmt::format("{} of {} recordings could not be tracked", refused, recordings.size()));
 }
 
 }  // namespace
