@@ -230,6 +230,18 @@ TEST(Independent, ABodyThatCreepsAllTheTimeIsNotTakenToRollFirst) {
   EXPECT_NEAR(friction->value, 0.23750619856065908, kSigmas * friction->sigma);
 }
 
+// The same slower. It was taken to roll, against rolling friction twenty times as large as what acts.
+TEST(Independent, ABodyThatCreepsIsNotTakenToRollAgainstFriction) {
+  const Comparison found = comparison_of("creeps_like_rolling");
+  EXPECT_EQ(found.fit.model, "sliding") << found.fit.recommendation;
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
+  expect_found(found.fit, {{"theta_rad", 1.21834414}, {"phi_rad", 0.13438168}});
+  const data::FitParameter* rolling = found.fit.find("rolling_friction_m");
+  EXPECT_TRUE(rolling == nullptr || std::abs(rolling->value - 1.652568997495191e-06) <
+                                        kSigmas * rolling->sigma)
+      << found.fit.recommendation;
+}
+
 // What comes before it is not looked at: first parts are counted from where the fit begins.
 TEST(Independent, ABodyThatSlidesLaterIsFittedFromAnyTimeOn) {
   data::Track track = track_of("slides_later");

@@ -11,6 +11,7 @@
 #include "choose/exchange.hpp"
 #include "choose/leave_out.hpp"
 #include "choose/rung_words.hpp"
+#include "choose/slide.hpp"
 #include "choose/softness.hpp"
 #include "choose/terms.hpp"
 #include "judge/adequacy.hpp"
@@ -124,6 +125,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   Rungs rungs = climb(contest);
   let_go_of_friction(contest, rungs);
   const Rung* chosen = exchange_while_worth(contest, rungs);
+  if (chosen != nullptr && creep_instead_of_rolling(contest, *chosen, rungs))
+    chosen = exchange_while_worth(contest, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};
     none.fit.comparison = table_of(rungs, nullptr);

@@ -451,6 +451,19 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
   });
 }
 
+void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
+                  const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  own.start = extended_start(rolling, rung);
+  own.start["friction"] = *rung.scene.model.friction;  // a little of it holds nothing
+  own.strategy = Strategy::single;
+  own.rolls_at_first = rung.rolls_at_first = true;
+  try_rung(rung, [&] {
+    fit_softly(tracks, own, rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung) {

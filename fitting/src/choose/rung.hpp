@@ -122,6 +122,11 @@ void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
 void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
                          const FitOptions& options, Rung& rung);
 
+/// Fits a sliding rung from a rolling one's solution: it rolls at first, and creeps from then on as
+/// friction that sets in gently lets it, or slips where Coulomb's law does as well.
+void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
+                  const FitOptions& options, Rung& rung);
+
 /// Fits a rung from near its solution.
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,

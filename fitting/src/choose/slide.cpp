@@ -96,4 +96,17 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
   return false;
 }
 
+// With all that usually acts, among which rolling friction had to stand for the creep; then fewer.
+bool creep_instead_of_rolling(const Contest& contest, const Rung& rolling, Rungs& rungs) {
+  const Terms terms = all_that_usually_acts(contest.ladder, rolling.terms);
+  if (terms.empty() || rolling.fit.model != "rolling" || !explains(rolling) ||
+      rolling.fit.whiteness_p >= kWhite || is_known(rungs, terms))
+    return false;
+  Rung creeps = rung_with(contest.ladder, terms);
+  fit_creeping(contest.tracks, rolling, options_for(creeps, contest.options), creeps);
+  if (!creeps.fitted || !creeps.fit.converged || creeps.bic > rolling.bic) return false;
+  step_down(contest, rungs.emplace_back(std::move(creeps)), rungs);
+  return true;
+}
+
 }  // namespace trochoid::fitting

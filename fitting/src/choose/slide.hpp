@@ -10,4 +10,9 @@ namespace trochoid::fitting {
 /// on from.
 bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs);
 
+/// Friction that sets in gently lets a body creep that seems to roll, which takes energy as rolling
+/// friction does: tried beside a rolling rung that leaves residuals which hang together.
+/// @returns whether rungs were added against which that one has to stand.
+bool creep_instead_of_rolling(const Contest& contest, const Rung& rolling, Rungs& rungs);
+
 }  // namespace trochoid::fitting

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "find/cast_shadow.hpp"
+#include "find/quantiles.hpp"
 #include "find/rim_fit.hpp"
 
 namespace trochoid::tracking {
@@ -28,7 +29,7 @@ struct BackgroundSamples {
 class Background {
  public:
   /// Number of frames the estimate works with; fewer are repeated.
-  static constexpr int kSamples = 16;
+  static constexpr int kSamples = Quantiles::kSamples;
 
   /// Per-pixel median of the samples, each brought to the brightness of one of them. Where pixels
   /// changed and the median does not look like the static surroundings - a body rested or hovered
