@@ -8,6 +8,7 @@
 #include "start/starts.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/model/inertia.hpp"
+#include "trochoid/model/steady.hpp"
 #include "values_with.hpp"
 
 // Starts for bodies on their rim, from paths whose motion is known.
@@ -136,6 +137,39 @@ TEST(RimStarts, OneSpinsAsFastAsTheVeeringOfThePathAsks) {
     return std::abs(off("theta_rad")) <= 0.076 && std::abs(off("w3_rad_s")) < 0.3 * 80.0 &&
            std::abs(std::remainder(off("phi_rad"), 2.0 * std::numbers::pi)) < 0.2;
   }));
+}
+
+// A centre that runs on a small circle does so ahead of the contact or behind it.
+TEST(RimStarts, ALookAlikeRollsSteadilyTheSameWayLeaningTheOtherWay) {
+  const model::RimBody body = per_mass(sliding_disc());
+  constexpr double kTilt_rad = 1.2, kAzimuth_rad = 0.4, kRate_rad_s = 48.0;
+  const double w2 = kRate_rad_s * std::sin(kTilt_rad);
+  const double w3 = model::steady_rolling_spin(body, kTilt_rad, kRate_rad_s);
+  const double along_m_s = body.h * w2 - body.R * w3;
+  const Start known{"multistart",
+                    {{"theta_rad", kTilt_rad},
+                     {"phi_rad", kAzimuth_rad},
+                     {"w1_rad_s", 0.0},
+                     {"w2_rad_s", w2},
+                     {"w3_rad_s", w3},
+                     {"vx_m_s", along_m_s * std::cos(kAzimuth_rad)},
+                     {"vy_m_s", along_m_s * std::sin(kAzimuth_rad)},
+                     {"rolling_friction_m", 1e-5}}};
+  ASSERT_LT(slip_of(known.values, body).norm(), 1e-12);
+  const std::vector<Start> others = leaning_otherwise(body, known);
+  ASSERT_FALSE(others.empty());
+  for (const Start& other : others) {
+    const std::map<std::string, double>& state = other.values;
+    EXPECT_GT(std::abs(state.at("theta_rad") - kTilt_rad), 0.05);
+    EXPECT_NEAR(std::remainder(state.at("phi_rad") - kAzimuth_rad, 2.0 * std::numbers::pi),
+                std::copysign(std::numbers::pi, state.at("phi_rad") - kAzimuth_rad), 1e-9);
+    const double rate = state.at("w2_rad_s") / std::sin(state.at("theta_rad"));
+    EXPECT_NEAR(rate, kRate_rad_s, 1e-9);
+    EXPECT_NEAR(state.at("w3_rad_s"), model::steady_rolling_spin(body, state.at("theta_rad"), rate),
+                1e-4);
+    EXPECT_LT(slip_of(state, body).norm(), 1e-12);
+    EXPECT_EQ(state.at("rolling_friction_m"), 1e-5);
+  }
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   Rungs rungs = climb(contest);
   let_go_of_friction(contest, rungs);
   const Rung* chosen = exchange_while_worth(contest, rungs);
-  if (chosen != nullptr && creep_instead_of_rolling(contest, *chosen, rungs))
+  if (chosen != nullptr && creep_instead(contest, *chosen, rungs))
     chosen = exchange_while_worth(contest, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "choose/exchange.hpp"
 #include "choose/leave_out.hpp"
+#include "choose/softness.hpp"
 #include "choose/terms.hpp"
 
 namespace trochoid::fitting {
@@ -96,15 +98,37 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
   return false;
 }
 
+namespace {
+
+// The likeliest rung that rolls and at least follows the track; null where none does.
+const Rung* best_that_rolls(const Rungs& rungs) {
+  const Rung* best = nullptr;
+  for (const Rung& rung : rungs)
+    if (rung.fitted && rung.fit.converged && rung.fit.model == "rolling" &&
+        rung.fit.verdict != data::FitVerdict::unexplained &&
+        (best == nullptr || rung.bic < best->bic))
+      best = &rung;
+  return best;
+}
+
+// -2 ln of a rung's likelihood, but for a constant.
+double misfit(const Rung& rung) {
+  return rung.bic - rung.parameters * std::log(rung.fit.dof + rung.parameters);
+}
+
+}  // namespace
+
 // With all that usually acts, among which rolling friction had to stand for the creep; then fewer.
-bool creep_instead_of_rolling(const Contest& contest, const Rung& rolling, Rungs& rungs) {
-  const Terms terms = all_that_usually_acts(contest.ladder, rolling.terms);
-  if (terms.empty() || rolling.fit.model != "rolling" || !explains(rolling) ||
-      rolling.fit.whiteness_p >= kWhite || is_known(rungs, terms))
-    return false;
+bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
+  const bool rolls = chosen.fit.model == "rolling" && chosen.fit.whiteness_p < kWhite;
+  const Rung* rolling = best_that_rolls(rungs);
+  if (rolling == nullptr || !(rolls || softness_is_open(chosen))) return false;
+  const Terms terms = all_that_usually_acts(contest.ladder, rolling->terms);
+  if (terms.empty() || is_known(rungs, terms)) return false;
   Rung creeps = rung_with(contest.ladder, terms);
-  fit_creeping(contest.tracks, rolling, options_for(creeps, contest.options), creeps);
-  if (!creeps.fitted || !creeps.fit.converged || creeps.bic > rolling.bic) return false;
+  fit_creeping(contest.tracks, *rolling, options_for(creeps, contest.options), creeps);
+  if (!creeps.fitted || !creeps.fit.converged || misfit(creeps) > misfit(chosen) - kStrong)
+    return false;
   step_down(contest, rungs.emplace_back(std::move(creeps)), rungs);
   return true;
 }

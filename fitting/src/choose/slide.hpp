@@ -10,9 +10,11 @@ namespace trochoid::fitting {
 /// on from.
 bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs);
 
-/// Friction that sets in gently lets a body creep that seems to roll, which takes energy as rolling
-/// friction does: tried beside a rolling rung that leaves residuals which hang together.
+/// Friction that sets in gently lets a body creep, which takes energy as rolling friction does, or
+/// looks as if it rolled first and slid later under weak friction: tried, from the best rung that
+/// rolls, beside a chosen one that rolls and leaves residuals which hang together, or that slides
+/// by Coulomb's law.
 /// @returns whether rungs were added against which that one has to stand.
-bool creep_instead_of_rolling(const Contest& contest, const Rung& rolling, Rungs& rungs);
+bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
 
 }  // namespace trochoid::fitting

@@ -304,7 +304,8 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
     problem_.partial = std::make_shared<Partial>();
   const bool start_given = !options_.start.empty() || scene_.start.theta_rad.has_value();
   const Found found = search_without_outliers(
-      problem_, {starter_for(*problem_.predictor, scene_), &options_, start_given, relatives});
+      problem_, {starter_for(*problem_.predictor, scene_), &options_, start_given, relatives,
+                 lookalikes_for(*problem_.predictor, scene_)});
   fit_.start_path = found.path;
   cut_short_ = found.cut_short;
   // Any start explains a few samples.

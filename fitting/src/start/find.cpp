@@ -80,14 +80,28 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
 
 constexpr double kRoughly = 0.05;  // of the variance: somewhere near the right valley
 
+// The best of a solution and what its look-alikes lead to.
+Found unlike(const Problem& problem, const SearchRequest& asked, Found found) {
+  if (!asked.lookalikes) return found;
+  const int all = static_cast<int>(problem.arcs[0].t_s.size());
+  const Start known = start_at(problem, found.solution.u, found.path);
+  for (const Start& start : asked.lookalikes(known)) {
+    Found other = grow(problem, start, std::max(24, all / 8));
+    if (better(other, found)) found = std::move(other);
+  }
+  return found;
+}
+
 // Without angles neighbouring valleys explain the path nearly as well as the right one; a sliding
 // body has some with them too. About a path that is not even roughly the body's there is nothing.
-Found look_about(const Problem& problem, Found found) {
+Found look_about(const Problem& problem, const SearchRequest& asked, Found found) {
   constexpr int kMisses = 3;
   const bool seen = problem.arcs[0].observable_index(model::Observable::phi_rad) >= 0;
   const bool slides = problem.predictor->model_name() == "sliding";
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   if (!rim || (seen && !slides) || found.unexplained > kRoughly) return found;
+  if ((seen || !slides) && surely_explained(problem, found)) return found;
+  if (!seen) found = unlike(problem, asked, std::move(found));
   if ((seen || !slides) && surely_explained(problem, found)) return found;
   return basin_hop(problem, std::move(found), kMisses);
 }
@@ -157,7 +171,7 @@ Found search_path(const Problem& problem, const SearchRequest& asked) {
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   const auto take = [&](Found found) {
     const Problem kept = without_samples(problem, found.strays_s);
-    found = look_about(kept, std::move(found));
+    found = look_about(kept, asked, std::move(found));
     if (better(found, best)) best = std::move(found);
     return surely_found(problem, best);
   };
@@ -286,7 +300,7 @@ Found rolls_first(const Problem& problem, const SearchRequest& asked) {
     part.set_base(solution.u);
     rolling.base = part.base;
     Found found = grow_into_sliding(problem, start_from(rolling, "rolls_first"), before, window);
-    if (found.solution.usable) return look_about(problem, std::move(found));
+    if (found.solution.usable) return look_about(problem, asked, std::move(found));
   }
   return {};
 }

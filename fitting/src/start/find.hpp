@@ -18,7 +18,8 @@ struct SearchRequest {
   bool start_given = false;
   /// Easier relatives of the model, tried first: a sliding body may nearly roll, and the equations
   /// of a softer friction law are less stiff. Their parameters are found by name.
-  std::vector<Relative> relatives;
+  std::vector<Relative> relatives = {};
+  Lookalikes lookalikes = {};
 };
 
 /// Every arc alone (in parallel), without a guess or from the given start; then all arcs together

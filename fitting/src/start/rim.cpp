@@ -295,4 +295,34 @@ std::vector<Start> rim_starts(const ArcData& window, const model::RimBody& body,
   return starts;
 }
 
+std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& known) {
+  constexpr double kFlattest = 0.05, kSteepest = 1.55, kStep = 0.05;  // tilts looked at
+  constexpr int kHalvings = 20;
+  const double theta = known.values.at("theta_rad"), w2 = known.values.at("w2_rad_s");
+  const double along_m_s = body.R * known.values.at("w3_rad_s") - body.h * w2;
+  const double rate = w2 / std::sin(theta);
+  const auto spin = [&](double tilt) {  // with which it rolls that way
+    return (body.h * rate * std::sin(tilt) - along_m_s) / body.R;
+  };
+  const auto unsteady = [&](double tilt) {
+    return model::steady_rolling_spin(body, tilt, rate) - spin(tilt);
+  };
+  std::vector<Start> starts;
+  for (double low = kFlattest; low < kSteepest; low += kStep) {
+    double flat = low, steep = low + kStep;
+    if (!(unsteady(flat) * unsteady(steep) <= 0.0)) continue;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = 0.5 * (flat + steep);
+      (unsteady(flat) * unsteady(middle) <= 0.0 ? steep : flat) = middle;
+    }
+    Start& other = starts.emplace_back(known);
+    other.values["theta_rad"] = flat;
+    other.values["phi_rad"] += data::kPi;
+    other.values["w1_rad_s"] *= -model::tilt(body, theta).z / model::tilt(body, flat).z;
+    other.values["w2_rad_s"] = rate * std::sin(flat);
+    other.values["w3_rad_s"] = spin(flat);
+  }
+  return starts;
+}
+
 }  // namespace trochoid::fitting

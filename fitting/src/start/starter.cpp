@@ -24,16 +24,18 @@ Starter top_starter(const model::Predictor& predictor, bool free_pivot) {
   };
 }
 
-Starter rim_starter(const data::Scene& scene) {
+bool is_rim(const std::string& model) {
+  return model == "rolling" || model == "sliding" || model == "smooth";
+}
+
+model::RimBody of_unit_mass(const data::Scene& scene) {
   const data::Body& body = *scene.body;
   const model::CentralInertia inertia = model::central_inertia(body);
-  const model::RimBody per_mass{.A = inertia.transverse_kg_m2 / inertia.mass_kg,
-                                .C = inertia.axial_kg_m2 / inertia.mass_kg,
-                                .R = body.radius_m,
-                                .h = body.half_thickness_m(),
-                                .g = scene.model.gravity_m_s2};
-  const bool slides = scene.model.name == "sliding";
-  return [=](const ArcData& window) { return rim_starts(window, per_mass, slides); };
+  return {.A = inertia.transverse_kg_m2 / inertia.mass_kg,
+          .C = inertia.axial_kg_m2 / inertia.mass_kg,
+          .R = body.radius_m,
+          .h = body.half_thickness_m(),
+          .g = scene.model.gravity_m_s2};
 }
 
 }  // namespace
@@ -41,8 +43,10 @@ Starter rim_starter(const data::Scene& scene) {
 Starter starter_for(const model::Predictor& predictor, const data::Scene& scene) {
   const std::string& model = predictor.model_name();
   if (model.starts_with("top")) return top_starter(predictor, scene.fit.free_pivot);
-  if ((model == "rolling" || model == "sliding" || model == "smooth") && scene.body)
-    return rim_starter(scene);
+  if (is_rim(model) && scene.body)
+    return [body = of_unit_mass(scene), slides = model == "sliding"](const ArcData& window) {
+      return rim_starts(window, body, slides);
+    };
   if (model == "puck") {
     const double gravity_m_s2 = scene.model.gravity_m_s2;
     return [=](const ArcData& window) { return puck_starts(window, gravity_m_s2); };
@@ -53,6 +57,12 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
     return [=](const ArcData& window) { return pivot_starts(window, unbalanced); };
   }
   return [](const ArcData&) { return std::vector<Start>{}; };
+}
+
+Lookalikes lookalikes_for(const model::Predictor& predictor, const data::Scene& scene) {
+  if (!is_rim(predictor.model_name()) || !scene.body) return {};
+  return
+      [body = of_unit_mass(scene)](const Start& known) { return leaning_otherwise(body, known); };
 }
 
 // A sharply regularised law makes stiff equations, and the gentle law's minimum lies far from its

@@ -11,6 +11,10 @@ namespace trochoid::fitting {
 /// Where a search without a guess starts, by the model.
 [[nodiscard]] Starter starter_for(const model::Predictor& predictor, const data::Scene& scene);
 
+/// What positions alone do not tell from a solution, by the model.
+[[nodiscard]] Lookalikes lookalikes_for(const model::Predictor& predictor,
+                                        const data::Scene& scene);
+
 /// A relative with the models it is made of.
 struct OwnedRelative {
   std::unique_ptr<model::Predictor> model;

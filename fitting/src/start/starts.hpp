@@ -48,6 +48,12 @@ struct Start {
 [[nodiscard]] std::vector<Start> rim_starts(const ArcData& window, const model::RimBody& body,
                                             bool slides);
 
+/// States of a rim whose centre goes nearly the same way as that of a known one, but which leans
+/// the other way: the axis half a turn round, the centre's velocity along the node line reversed,
+/// and the tilt at which it rolls steadily at the same precession rate, where there is one.
+/// @param known  state of a rim; what else it has is kept.
+[[nodiscard]] std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& known);
+
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
 [[nodiscard]] std::vector<Start> puck_starts(const ArcData& window, double gravity_m_s2);
 

@@ -10,6 +10,9 @@ namespace trochoid::fitting {
 /// Gives starts for a window of an arc, best first; may be empty.
 using Starter = std::function<std::vector<Start>(const ArcData& window)>;
 
+/// Gives states that leave nearly the same path as a known one; may be empty.
+using Lookalikes = std::function<std::vector<Start>(const Start& known)>;
+
 /// Where a search ended.
 struct Found {
   Solution solution;
