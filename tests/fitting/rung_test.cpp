@@ -1,4 +1,5 @@
 #include "choose/rung.hpp"
+#include "choose/held_back.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,6 +9,7 @@
 
 #include "common.hpp"
 #include "judge/adequacy.hpp"
+#include "judge/second_thoughts.hpp"
 #include "problem/prepare.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"

@@ -9,13 +9,14 @@
 
 #include "choose/climb.hpp"
 #include "choose/exchange.hpp"
+#include "choose/held_back.hpp"
 #include "choose/leave_out.hpp"
 #include "choose/rung_words.hpp"
 #include "choose/slide.hpp"
 #include "choose/softness.hpp"
 #include "choose/terms.hpp"
-#include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
+#include "judge/straying.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/error.hpp"
 

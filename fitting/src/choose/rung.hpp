@@ -96,9 +96,6 @@ void let_roll_at_first(std::span<const data::Track> tracks, const FitOptions& op
 void begin_as(std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
               Rung& rung);
 
-/// Predicts the last third of the tracks from a fit of the others.
-void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
-
 /// What a known rung's tangent plane says of a larger one.
 /// @param others  parameters of each of the known rung's terms that may be left out.
 /// @returns nothing where nothing can be told: the larger one has too many parameters for the
@@ -107,7 +104,7 @@ void predict_held_back(std::span<const data::Track> tracks, const FitOptions& op
     std::span<const data::Track> tracks, const Rung& known, const FitOptions& options,
     const Rung& larger, const std::map<int, std::set<std::string>>& others);
 
-/// Second thoughts about the fit of the rung that was chosen (adequacy.hpp).
+/// Second thoughts about the fit of the rung that was chosen (second_thoughts.hpp).
 void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
                       const FitOptions& options, data::Fit& fit);
 

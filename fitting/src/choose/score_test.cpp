@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
+#include "judge/second_thoughts.hpp"
 #include "judge/statistics.hpp"
 #include "observe/decompositions.hpp"
 #include "observe/observed.hpp"

@@ -50,7 +50,7 @@ struct ScoreTest {
 [[nodiscard]] double variance_inflation(std::span<const data::Track> tracks,
                                         const data::Scene& scene, const FitOptions& options);
 
-/// doubt_as_a_whole() (adequacy.hpp) for a fit whose values `options.start` holds.
+/// doubt_as_a_whole() (second_thoughts.hpp) for a fit whose values `options.start` holds.
 void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,
                       const FitOptions& options, data::Fit& fit);
 

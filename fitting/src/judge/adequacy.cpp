@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "judge/counting.hpp"
 #include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
@@ -17,24 +17,6 @@ namespace trochoid::fitting {
 using data::FitOutcome, data::FitVerdict;
 
 namespace {
-
-// Whitened by the track's own sigmas, none weighed down; empty where the model has no prediction.
-Eigen::VectorXd plain_residuals(const Problem& problem, int arc, const Eigen::VectorXd& u) {
-  const Problem plain = in_stated_sigmas(problem, Weights::dropped);
-  Eigen::VectorXd residuals;
-  return evaluate(plain, arc, u, residuals, nullptr) ? residuals : Eigen::VectorXd();
-}
-
-// Positions as predicted, given those.
-Eigen::MatrixX2d predicted_m(const ArcData& data, const Eigen::VectorXd& residuals) {
-  Eigen::MatrixX2d xy = data.positions_m();
-  for (const Reading& reading : data.readings)
-    if (reading.channel == Channel::position) {
-      const Eigen::Matrix2d wt = reading.whitener.transpose();
-      xy.row(reading.sample) += (wt.inverse() * residuals.segment<2>(reading.row)).transpose();
-    }
-  return xy;
-}
 
 // Where the prediction, which has no noise, scatters about a smooth curve as the samples do, frames
 // are too few to tell noise from motion: then it is at most so many times the stated.
@@ -103,12 +85,6 @@ double typical_sigma(const Problem& problem, Channel channel) {
   return median(std::move(sigmas));
 }
 
-// Stated sigmas without pixels are somebody's word for independent errors.
-bool is_tracked(const Problem& problem) {
-  return std::all_of(problem.arcs.begin(), problem.arcs.end(),
-                     [](const ArcData& a) { return a.filmed || a.sigma_unknown; });
-}
-
 // Of the worst channel. A path that is followed is doubtful at most: trackers know little of their
 // common errors. The noise is the larger one of the track's own sigmas and the scatter of
 // its samples about a smooth curve.
@@ -141,34 +117,6 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   }
   if (sum.ok && !path_followed && path > worst.times) worst = {path, Channel::position};
   return worst;
-}
-
-// By how much each of an arc's positions counts, in the order of their times. Of those that lie on
-// no path with the others, a tracker's glitches, nothing is said.
-struct Counting {
-  double t_s = 0.0, weight = 1.0;
-};
-
-std::vector<Counting> counting(const Problem& problem, int arc, const Eigen::VectorXd& u) {
-  // Of the path: less is what integrating leaves in a simulated track, which has no other noise.
-  constexpr double kNothing = 1e-5;
-  const ArcData& data = problem.arcs[arc];
-  if (data.observable_index(model::Observable::x_m) < 0) return {};
-  const Eigen::VectorXd residuals = plain_residuals(problem, arc, u);
-  if (residuals.size() == 0) return {};
-  const Eigen::MatrixX2d off = predicted_m(data, residuals) - data.positions_m();
-  const double nothing_m = kNothing * extent_m(data);
-  const std::vector<int> consistent = consistent_samples(data);
-  std::vector<Counting> all;
-  for (const Reading& reading : data.readings) {
-    if (reading.channel != Channel::position) continue;
-    const bool glitch = !std::binary_search(consistent.begin(), consistent.end(), reading.sample);
-    const bool means_something = off.row(reading.sample).norm() >= nothing_m;
-    if (!glitch)
-      all.push_back(
-          {data.t_s[reading.sample], means_something ? robust_weight(problem, arc, reading) : 1.0});
-  }
-  return all;
 }
 
 int positions_in(const Problem& problem) {
@@ -210,40 +158,6 @@ GivenUp given_up(const Problem& problem, const Solution& solution) {
     }
   all.of = positions_in(problem);
   return all;
-}
-
-// Positions at an end of an arc, at least half of which stand out, the last of them among those.
-struct MissedEnd {
-  int arc = 0;
-  bool beginning = true;
-  int standing_out = 0, of = 0;
-  double until_s = 0.0;  // where the explained part begins or ends
-};
-
-MissedEnd missed_end(const std::vector<Counting>& from_the_end, int arc, bool beginning) {
-  MissedEnd end{.arc = arc, .beginning = beginning};
-  int seen = 0, out = 0;
-  for (const Counting& position : from_the_end) {
-    ++seen;
-    if (!(position.weight < 1.0)) continue;
-    ++out;
-    if (2 * out >= seen) end.standing_out = out, end.of = seen, end.until_s = position.t_s;
-  }
-  return end;
-}
-
-// The end of which most stands out.
-MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u) {
-  MissedEnd worst;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
-    std::vector<Counting> positions = counting(problem, arc, u);
-    for (const bool beginning : {true, false}) {
-      const MissedEnd end = missed_end(positions, arc, beginning);
-      if (end.standing_out > worst.standing_out) worst = end;
-      std::reverse(positions.begin(), positions.end());
-    }
-  }
-  return worst;
 }
 
 // Chi-square of the positions about a polynomial in time, weighted as in the fit.
@@ -412,124 +326,9 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   accept(problem, solution, error, worst, lost, fit);
 }
 
-namespace {
-
-bool passed(const data::Fit& fit) {
-  return fit.verdict == FitVerdict::good || fit.verdict == FitVerdict::good_correlated ||
-         fit.verdict == FitVerdict::weak;
-}
-
-void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
-  constexpr double kByChance = 1e-6, kNotWhite = 0.01;
-  // Rendered recordings of rolling rings and discs came to 7.
-  constexpr double kOfATracker = 20.0;
-  const Drift& drift = error.drift;
-  if (!passed(fit) || error.whiteness.p_value > kNotWhite) return;
-  if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
-  if (is_tracked(problem) && drift.gain < kOfATracker) return;
-  fit.verdict = FitVerdict::doubtful;
-  fit.verdict_words = fmt::format(
-      "the model follows the track, but does not explain it: the second half asks for other "
-      "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
-      "model lacks something, and the error bars are too small",
-      drift.gain);
-}
-
-// What becomes of the state at the first sample where the model misses the samples there, and what
-// may have happened to the body.
-std::string what_an_end_may_be(const Problem& problem, const MissedEnd& end) {
-  const bool rolls = problem.predictor->model_name() == "rolling";
-  if (!end.beginning)
-    return rolls ? "the body may slip or touch something there" : "it may be another motion";
-  return fmt::format(
-      "{}, and the state given for {:.4g} s is the model's path followed back to then, not how the "
-      "body began",
-      rolls ? "the body may slip before it rolls" : "it may be another motion",
-      problem.arcs[end.arc].start_s);
-}
-
-// Which of several arcs: a puck's track is divided into stretches.
-std::string which_of_several(const Problem& problem, const ArcData& arc) {
-  const auto& arcs = problem.arcs;
-  const auto of_same_track = std::count_if(
-      arcs.begin(), arcs.end(), [&](const ArcData& other) { return other.track == arc.track; });
-  std::string words;
-  if (of_same_track > 1)
-    words +=
-        fmt::format(" of the stretch from {:.4g} to {:.4g} s", arc.t_s.front(), arc.t_s.back());
-  if (of_same_track < std::ssize(arcs)) words += fmt::format(" of track {}", arc.track + 1);
-  return words;
-}
-
-// Motion that the model lacks where a record begins or ends costs it little: what stands out is
-// given up, and the rest may be explained. A tracker that errs for a few frames does the same, so
-// of few it is told only.
-void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
-                               const Uncertainty& error, data::Fit& fit) {
-  constexpr int kWorthWords = 3, kNoTracker = 8;
-  constexpr double kIndependent = 3.0;  // one in 460 stands out by chance
-  if (!passed(fit)) return;
-  const MissedEnd end = worst_missed_end(problem, u);
-  if (end.standing_out < kWorthWords) return;
-  const ArcData& arc = problem.arcs[end.arc];
-  const double step_s =
-      arc.duration_s() / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
-  const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
-  const std::string where = fmt::format(
-      "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
-      end.standing_out, end.of, end.beginning ? "first" : "last", which_of_several(problem, arc),
-      end.beginning ? "up to" : "from", end.until_s);
-  const std::string what = what_an_end_may_be(problem, end);
-  if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
-    fit.warnings.push_back(fmt::format(
-        "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
-    return;
-  }
-  fit.verdict = FitVerdict::doubtful;
-  fit.verdict_words = fmt::format(
-      "the model follows the track, but does not explain {} {}: {}, more than a "
-      "tracker misses in a row, and count for less: {}",
-      problem.arcs.size() > 1 ? "one" : "its", end.beginning ? "beginning" : "end", where, what);
-}
-
-}  // namespace
-
-void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
-                      data::Fit& fit) {
-  // A body that slips at first makes the halves differ, too: that it slips says more.
-  doubt_if_an_end_is_missed(problem, u, error, fit);
-  doubt_if_drifting(problem, error, fit);
-}
-
 bool explains(const Problem& problem, const Solution& solution) {
   const Squares sum = squares(problem, solution);
   return explains_path(sum) && misfit(problem, sum).times <= kDoubtful;
-}
-
-double straying_m(std::span<const data::Track> tracks) {
-  double squares = 0.0, rows = 0.0;
-  for (const data::Track& track : tracks) {
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    double count = 0.0;
-    for (const data::TrackSample& sample : track.samples)
-      if (sample.has_metres()) mean += sample.centre_m, count += 1.0;
-    if (count == 0.0) continue;
-    mean /= count;
-    for (const data::TrackSample& sample : track.samples)
-      if (sample.has_metres()) squares += (sample.centre_m - mean).squaredNorm();
-    rows += 2.0 * count;
-  }
-  return rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
-}
-
-bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene) {
-  std::vector<double> sigmas_m;
-  for (const data::Track& track : tracks)
-    for (const data::TrackSample& sample : track.samples)
-      if (sample.has_covariance())
-        sigmas_m.push_back(std::sqrt(0.5 * sample.covariance_m2.trace()));
-  const double radius_m = scene.body ? scene.body->radius_m : 0.0;
-  return straying_m(tracks) > std::max(5.0 * median(std::move(sigmas_m)), 0.05 * radius_m);
 }
 
 }  // namespace trochoid::fitting

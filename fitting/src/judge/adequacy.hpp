@@ -1,11 +1,7 @@
 #pragma once
-#include <span>
-
 #include "judge/statistics.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/fit.hpp"
-#include "trochoid/data/scene.hpp"
-#include "trochoid/data/track.hpp"
 
 namespace trochoid::fitting {
 
@@ -39,30 +35,7 @@ struct Squares {
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
 
-/// Second thoughts about a fit that is what was asked for; models are compared without them, since
-/// further terms may take their reason away. Lowers a verdict of what is explained to doubtful
-/// where
-///   - the second half of the record asks for other parameters than the first, its noise allowed
-///     for: the model then lacks something that the parameters stand in for, and their error bars
-///     do not know of it. A tracker's errors go with the motion a little, too: of filmed positions
-///     more is asked;
-///   - at least half of the first or last positions of an arc stand out, eight of them or three
-///     times as many as hang together: the body moves there as the model does not let it, and the
-///     state at the first sample is the model's path followed back to it. Of three or more a
-///     tracker may have missed, and a warning tells.
-/// @param u  a minimum, by which the problem's weights are set.
-void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
-                      data::Fit& fit);
-
 /// Whether a path is neither unexplained nor doubtful for its residuals.
 [[nodiscard]] bool explains(const Problem& problem, const Solution& solution);
-
-/// How far the centre of a body held at a pivot strays from its mean place [m] (rms of a
-/// coordinate); 0 without positions in metres.
-[[nodiscard]] double straying_m(std::span<const data::Track> tracks);
-
-/// Whether it strays further than a disc that turns face-on about a pivot near its middle: 5 times
-/// the sigmas and a twentieth of the body's radius.
-[[nodiscard]] bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene);
 
 }  // namespace trochoid::fitting

@@ -7,6 +7,7 @@
 #include "edges/colour_edges.hpp"
 #include "edges/colour_window.hpp"
 #include "geometry/contour.hpp"
+#include "pose/edge_equation.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -97,160 +98,11 @@ bool look_at(const Scenery& scenery, const OutlineSample& sample, const Sweep* s
   return true;
 }
 
-// Blur moves what is seen of a curved edge towards the inside of the curve, as the light beside it
-// comes from more directions there: to first order by half the curvature times the variance.
-double rounded_by_blur_px(const Crossings& crossings, double blur_px) {
-  constexpr double kMostCurvature = 0.5;  // as far as first order goes
-  double sum = 0.0;
-  for (int i = 0; i < crossings.count; ++i)
-    sum += crossings.at[static_cast<size_t>(i)].curvature_per_px;
-  const double curvature = std::clamp(sum / crossings.count, -kMostCurvature, kMostCurvature);
-  return -0.5 * curvature * blur_px * blur_px;
-}
-
-// What stretches of the outline look like; single profiles are too noisy for this, and their errors
-// would go with those of their edges.
-struct EdgeSurroundings {
-  double steepness = 0.0;  // of the levels beside the edge, over its contrast [1/px]
-  double wider_px = 0.0;
-  bool darker = false;  // the body than what is beside it
-  double rise = 0.0;    // how fast the latter gets brighter farther out, over the contrast [1/px]
-};
-
-std::vector<EdgeSurroundings> edge_surroundings(const std::vector<StretchProfile>& looks) {
-  constexpr int kNeighbours = 4;
-  const int n = static_cast<int>(looks.size());
-  std::vector<EdgeSurroundings> out(looks.size());
-  for (int i = 0; i < n; ++i) {
-    double inner = 0.0, outer = 0.0, contrast = 1e-3;
-    double wider = 0.0, wider_variance = 0.0, count = 1e-3;
-    for (int j = std::max(0, i - kNeighbours); j <= std::min(n - 1, i + kNeighbours); ++j) {
-      const StretchProfile& look = looks[static_cast<size_t>(j)];
-      if (!look.found || look.curve != looks[static_cast<size_t>(i)].curve) continue;
-      const ProfileEdge& e = look.edge;
-      const double weight = 1.0 / (1e-3 + e.noise_variance_px2 + e.shading_variance_px2);
-      inner += weight * e.inner_slope;
-      outer += weight * e.outer_slope;
-      contrast += weight * e.contrast;
-      wider += e.wider_px, wider_variance += e.wider_variance_px2, count += 1.0;
-    }
-    const double wider2 = std::max(0.0, wider * wider - wider_variance);  // beyond the noise
-    out[static_cast<size_t>(i)] = {(std::abs(inner) + std::abs(outer)) / std::abs(contrast),
-                                   std::sqrt(wider2) / count, contrast > 0.0,
-                                   std::max(0.0, outer / contrast)};
-  }
-  return out;
-}
-
-// Contrast over mean level: how strong an edge is.
-double tone_of(const ProfileEdge& edge) {
-  constexpr double kLeast = 0.2, kMost = 2.0;  // black beside white
-  return std::clamp(std::abs(edge.contrast) / std::max(edge.mean_level, 1.0), kLeast, kMost);
-}
-
-// What is not known of the light right beside an edge, relative to usual surroundings: it goes with
-// what is seen of it a little farther off.
-double unknown_share(const ProfileEdge& edge) {
-  constexpr double kUsual = 0.1, kLeast = 0.15, kMost = 2.0;
-  return std::clamp(std::sqrt(edge.unevenness / kUsual), kLeast, kMost);
-}
-
-// What the model of an edge may be wrong by along a whole stretch of the outline [px]: how the
-// light goes on under the blur, a sliver of shadow, levels beyond the range of the picture.
-double model_sd_px(const ProfileEdge& edge, bool clipped, const EdgeSurroundings& around,
-                   bool silhouette) {
-  constexpr double kShapePx = 0.015, kOwnShapePx = 0.3, kClippedPx = 0.2, kMostPx = 2.0;
-  constexpr double kAlongShare = 0.2;   // of the error of unknown shading, the rest is independent
-  constexpr double kUnderBlurPx = 0.4;  // of a steep level's change goes unseen
-  const double shape_px = silhouette ? unknown_share(edge) * kShapePx / tone_of(edge) : kOwnShapePx;
-  const double steep_px = std::min(kMostPx, kUnderBlurPx * around.steepness);
-  const double clipped_px = clipped ? kClippedPx : 0.0;
-  // An edge wider than the picture's blur is not that of the body alone.
-  constexpr double kPerWiderPx = 1.0;
-  const double wide_px = std::min(kMostPx, kPerWiderPx * around.wider_px);
-  return std::sqrt(wide_px * wide_px + steep_px * steep_px + shape_px * shape_px +
-                   clipped_px * clipped_px + kAlongShare * kAlongShare * edge.shading_variance_px2);
-}
-
-// By how much an edge is seen too far out beside the shadow of a body darker than the floor [px].
-// Where the floor gets brighter farther out there is a penumbra, and between it and the rim what
-// the lamp does not reach at all, narrower than the blur and about as dark as the body; near the
-// contact the light of the room is missing too, unless the floor is as bright there as where it is
-// brightest. The higher above the floor, the farther from the rim all that is. Sizes: means over
-// recordings made by two ray tracers, edges about the true outline.
-double shadow_px(const EdgeSurroundings& around, const ProfileEdge& edge, double height_px) {
-  constexpr double kPerRisePx2 = 2.5, kMostPx = 0.6, kPenumbraHeightPx = 25.0;
-  constexpr double kContactPx = 0.04, kContactHeightPx = 12.0, kContactDims = 0.03;
-  if (!around.darker) return 0.0;
-  return std::min(kMostPx, kPerRisePx2 * around.rise) * std::exp(-height_px / kPenumbraHeightPx) +
-         kContactPx * std::min(1.0, edge.dimmed / kContactDims) *
-             std::exp(-height_px / kContactHeightPx);
-}
-
-// What the sliver of a slightly rounded rim, too narrow to be seen apart, moves an edge by [px]: it
-// mirrors the room and not what the face mirrors, on the side towards the light something else than
-// on the far one (a rim without gloss does next to nothing). Taken as a share of the body's light;
-// an edge of little contrast moves the most.
-double sliver_px(const ProfileEdge& e) {
-  constexpr double kSharePx = 0.04;  // a sliver of a third of a pixel, brighter by an eighth
-  constexpr double kMostPx = 0.5;
-  const double inner = e.mean_level - 0.5 * e.contrast;
-  return std::min(kMostPx, kSharePx * std::max(inner, 0.0) / std::max(std::abs(e.contrast), 1.0));
-}
-
-// What edges of a whole side of the body may be wrong by alike [px]: light beside them that is not
-// known by some share of it, and colours that luma mixes wrongly.
-double common_light_px(const Scenery& scenery, const ProfileEdge& e, double blur_px) {
-  constexpr double kUnknownPx = 0.03;    // beside an edge as strong as its mean level
-  const double step_px = 2.5 * blur_px;  // of a Gaussian edge: shift per share of its step
-  const double tone = tone_of(e);
-  constexpr double kMostMixing = 0.3, kMixingShare = 0.85;  // the rest shading takes up
-  const double mixing = scenery.tints
-                            ? mixing_error(*scenery.tints, e.mean_level - 0.5 * e.contrast,
-                                           e.mean_level + 0.5 * e.contrast)
-                            : 0.0;
-  return std::hypot(unknown_share(e) * kUnknownPx / (tone * std::sqrt(tone)),
-                    kMixingShare * step_px * std::min(kMostMixing, std::abs(mixing)));
-}
-
 // Direction in the picture in which the outline of a pose is the narrowest.
 double narrow_direction_rad(const data::Camera& camera, const data::Pose<>& pose) {
   const Eigen::Vector2d along =
       camera.jacobian_px_per_m(pose.centre_m) * axis_towards(camera, pose);
   return std::atan2(along.y(), along.x());
-}
-
-EdgeEquation equation_of(const OutlineSample& sample, const ProfileEdge& edge, bool colour) {
-  const bool bore = is_bore(sample.edge);
-  EdgeEquation e;
-  e.motion = sample.motion.transpose();
-  if (edge.strip_share != 0.0)
-    e.motion += edge.strip_share * (sample.near_motion - sample.motion).transpose();
-  e.swell = bore ? -1.0 : 1.0;
-  e.polarity = edge.contrast < 0.0 ? -1.0 : 1.0;
-  constexpr double kMostTone = 2.0;
-  e.tone = std::clamp(edge.contrast / std::max(edge.mean_level, 1.0), -kMostTone, kMostTone);
-  // Walls are lit like nothing else, and all along the rim alike.
-  constexpr double kLowerPx = 0.03;
-  if (sample.edge == Edge::lower_rim || sample.edge == Edge::lower_bore)
-    e.lower_px = std::hypot(unknown_share(edge) * kLowerPx, std::sqrt(edge.strip_variance_px2));
-  e.group = colour ? 3 : sample.silhouette ? (bore ? 1 : 0) : 2;
-  e.colour = colour;
-  e.direction_rad = std::atan2(sample.normal_px.y(), sample.normal_px.x());
-  e.normal = sample.normal_px;
-  e.offset_px = edge.offset_px;
-  e.variance_px2 = edge.noise_variance_px2 + edge.shading_variance_px2;
-  e.arc_px = sample.arc_px;
-  e.curve = colour ? 8 + (bore ? 1 : 0) : static_cast<int>(sample.edge);
-  return e;
-}
-
-// An edge that is expected to be seen so much too far out; by how much really, differs along it.
-void allow_for_shadow(double too_far_px, EdgeEquation& equation) {
-  constexpr double kUnsureShare = 0.4;
-  equation.offset_px -= too_far_px;
-  equation.shadow_px = too_far_px;
-  equation.model_px = std::hypot(equation.model_px, kUnsureShare * too_far_px);
 }
 
 // How much an edge off by this supports the pose, 0..1: an edge is certain at a gain of 3.
@@ -576,7 +428,7 @@ void find_uncertainty(const Scenery& scenery, Refined& refined) {
   const double narrow_rad = narrow_direction_rad(scenery.camera, refined.pose);
   for (size_t i = 0; i < refined.equations.size(); ++i) {
     EdgeEquation& e = refined.equations[i];
-    const double light_px = common_light_px(scenery, refined.edges[i], refined.blurs_px[i]);
+    const double light_px = common_light_px(scenery.tints, refined.edges[i], refined.blurs_px[i]);
     e.common_px = std::hypot(kSides * light_px, sliver_px(refined.edges[i]));
     if (!refined.samples[i].silhouette) continue;
     e.flank_px = kFlanks * light_px * std::cos(2.0 * (e.direction_rad - narrow_rad));

@@ -1,0 +1,11 @@
+#pragma once
+#include <span>
+
+#include "choose/rung.hpp"
+
+namespace trochoid::fitting {
+
+/// Predicts the last third of the tracks from a fit of the others.
+void predict_held_back(std::span<const data::Track> tracks, const FitOptions& options, Rung& rung);
+
+}  // namespace trochoid::fitting

@@ -1,0 +1,139 @@
+#include "judge/second_thoughts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "judge/counting.hpp"
+
+namespace trochoid::fitting {
+
+using data::FitVerdict;
+
+namespace {
+
+// Positions at an end of an arc, at least half of which stand out, the last of them among those.
+struct MissedEnd {
+  int arc = 0;
+  bool beginning = true;
+  int standing_out = 0, of = 0;
+  double until_s = 0.0;  // where the explained part begins or ends
+};
+
+MissedEnd missed_end(const std::vector<Counting>& from_the_end, int arc, bool beginning) {
+  MissedEnd end{.arc = arc, .beginning = beginning};
+  int seen = 0, out = 0;
+  for (const Counting& position : from_the_end) {
+    ++seen;
+    if (!(position.weight < 1.0)) continue;
+    ++out;
+    if (2 * out >= seen) end.standing_out = out, end.of = seen, end.until_s = position.t_s;
+  }
+  return end;
+}
+
+// The end of which most stands out.
+MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u) {
+  MissedEnd worst;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    std::vector<Counting> positions = counting(problem, arc, u);
+    for (const bool beginning : {true, false}) {
+      const MissedEnd end = missed_end(positions, arc, beginning);
+      if (end.standing_out > worst.standing_out) worst = end;
+      std::reverse(positions.begin(), positions.end());
+    }
+  }
+  return worst;
+}
+
+bool passed(const data::Fit& fit) {
+  return fit.verdict == FitVerdict::good || fit.verdict == FitVerdict::good_correlated ||
+         fit.verdict == FitVerdict::weak;
+}
+
+void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  constexpr double kByChance = 1e-6, kNotWhite = 0.01;
+  // Rendered recordings of rolling rings and discs came to 7.
+  constexpr double kOfATracker = 20.0;
+  const Drift& drift = error.drift;
+  if (!passed(fit) || error.whiteness.p_value > kNotWhite) return;
+  if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
+  if (is_tracked(problem) && drift.gain < kOfATracker) return;
+  fit.verdict = FitVerdict::doubtful;
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain it: the second half asks for other "
+      "parameters than the first (chi-square would fall by {:.2g} times its noise for each), the "
+      "model lacks something, and the error bars are too small",
+      drift.gain);
+}
+
+// What becomes of the state at the first sample where the model misses the samples there, and what
+// may have happened to the body.
+std::string what_an_end_may_be(const Problem& problem, const MissedEnd& end) {
+  const bool rolls = problem.predictor->model_name() == "rolling";
+  if (!end.beginning)
+    return rolls ? "the body may slip or touch something there" : "it may be another motion";
+  return fmt::format(
+      "{}, and the state given for {:.4g} s is the model's path followed back to then, not how the "
+      "body began",
+      rolls ? "the body may slip before it rolls" : "it may be another motion",
+      problem.arcs[end.arc].start_s);
+}
+
+// Which of several arcs: a puck's track is divided into stretches.
+std::string which_of_several(const Problem& problem, const ArcData& arc) {
+  const auto& arcs = problem.arcs;
+  const auto of_same_track = std::count_if(
+      arcs.begin(), arcs.end(), [&](const ArcData& other) { return other.track == arc.track; });
+  std::string words;
+  if (of_same_track > 1)
+    words +=
+        fmt::format(" of the stretch from {:.4g} to {:.4g} s", arc.t_s.front(), arc.t_s.back());
+  if (of_same_track < std::ssize(arcs)) words += fmt::format(" of track {}", arc.track + 1);
+  return words;
+}
+
+// Motion that the model lacks where a record begins or ends costs it little: what stands out is
+// given up, and the rest may be explained. A tracker that errs for a few frames does the same, so
+// of few it is told only.
+void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
+                               const Uncertainty& error, data::Fit& fit) {
+  constexpr int kWorthWords = 3, kNoTracker = 8;
+  constexpr double kIndependent = 3.0;  // one in 460 stands out by chance
+  if (!passed(fit)) return;
+  const MissedEnd end = worst_missed_end(problem, u);
+  if (end.standing_out < kWorthWords) return;
+  const ArcData& arc = problem.arcs[end.arc];
+  const double step_s =
+      arc.duration_s() / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
+  const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
+  const std::string where = fmt::format(
+      "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
+      end.standing_out, end.of, end.beginning ? "first" : "last", which_of_several(problem, arc),
+      end.beginning ? "up to" : "from", end.until_s);
+  const std::string what = what_an_end_may_be(problem, end);
+  if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
+    fit.warnings.push_back(fmt::format(
+        "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
+    return;
+  }
+  fit.verdict = FitVerdict::doubtful;
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain {} {}: {}, more than a "
+      "tracker misses in a row, and count for less: {}",
+      problem.arcs.size() > 1 ? "one" : "its", end.beginning ? "beginning" : "end", where, what);
+}
+
+}  // namespace
+
+void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
+                      data::Fit& fit) {
+  // A body that slips at first makes the halves differ, too: that it slips says more.
+  doubt_if_an_end_is_missed(problem, u, error, fit);
+  doubt_if_drifting(problem, error, fit);
+}
+
+}  // namespace trochoid::fitting
