@@ -1,5 +1,4 @@
 #include "choose/rung.hpp"
-#include "choose/held_back.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "choose/held_back.hpp"
 #include "common.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"

@@ -165,13 +165,28 @@ void by_all_that_usually_acts(const Contest& contest, const Rung& known, Rungs& 
       rungs);
 }
 
+// The plainest model. Where losses usually act it hardly ever explains a track, and a search of all
+// starts is idle before these have been tried.
+Rung& add_plainest(const Contest& contest, Rungs& rungs) {
+  Contest first = contest;
+  if (!usual_losses(contest.ladder).empty()) first.options.strategy = Strategy::brief;
+  return add_searched(first, {}, rungs);
+}
+
+void search_again(const Contest& contest, Rung& rung) {
+  Rung again = rung_with(contest.ladder, rung.terms);
+  fit_rung(contest.tracks, nullptr, nullptr, options_for(again, contest.options), again);
+  if (again.fitted && (!rung.fitted || again.bic < rung.bic)) rung = std::move(again);
+}
+
 }  // namespace
 
 Rungs climb(const Contest& contest) {
   Rungs rungs;
-  const Rung& plainest = add_searched(contest, {}, rungs);
+  Rung& plainest = add_plainest(contest, rungs);
   const bool loses = !explains(plainest) && !usual_losses(contest.ladder).empty();
   if (loses && climb_down(contest, rungs)) return rungs;
+  if (loses) search_again(contest, plainest);
   // Where a search with all usual losses led nowhere, one with fewer does not either.
   const Reach reach = loses ? Reach::from_below : Reach::search;
   const Rung& best = step_up_while_worth(contest, reach, plainest, rungs);

@@ -110,28 +110,30 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   return worth;
 }
 
-// Rungs that have all of a known one's terms and more, and yet explain less than it does: the search
-// for them ended elsewhere. Nothing is learned of their terms there.
+// Rungs that follow the same law with all of a known one's terms and more, and yet explain less
+// than it does: the search for them ended elsewhere. Nothing is learned of their terms there.
 std::vector<Rung*> stuck_above(const Rung& known, Rungs& rungs) {
   const double rows = known.fit.dof + known.parameters;
   std::vector<Rung*> stuck;
   for (Rung& rung : rungs) {
-    const double paid = (rung.parameters - known.parameters) * std::log(rows);
-    if (rung.terms != known.terms && rung.fitted && !rung.by_score_test &&
-        has_all_terms_of(rung, known) && rung.bic > known.bic + paid + kBareMention)
+    const double paid = std::max(0, rung.parameters - known.parameters) * std::log(rows);
+    if (rung.terms != known.terms && rung.fitted && !rung.by_score_test && !rung.fitted_anew &&
+        rung.fit.model == known.fit.model && has_all_terms_of(rung, known) &&
+        rung.bic > known.bic + paid + kBareMention)
       stuck.push_back(&rung);
   }
   return stuck;
 }
 
-// Fits what is stuck above a known rung anew, from there.
+// Fits what is stuck above a known rung anew, from there, once.
 void fit_stuck_anew(const Contest& contest, const Rung& known, Rungs& rungs) {
-  if (!explains(known)) return;
+  if (!explains(known) || known.fit.arcs.size() != 1) return;
   side_by_side(contest, stuck_above(known, rungs),
                [&](std::size_t, Rung& rung, const FitOptions& options) {
                  Rung again = rung_with(contest.ladder, rung.terms);
                  fit_neighbour(contest.tracks, known, options, again);
                  if (again.fitted && again.bic < rung.bic) rung = std::move(again);
+                 rung.fitted_anew = true;
                });
 }
 

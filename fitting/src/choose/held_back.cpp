@@ -3,13 +3,13 @@
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "observe/angles.hpp"
 #include "observe/arcs.hpp"
-#include "observe/observed.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 

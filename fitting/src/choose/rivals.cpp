@@ -36,14 +36,14 @@ bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual
 // where residuals hang together, as a further term may then only follow the tracker's errors; but
 // those do for which BIC speaks, though not strongly, all the same.
 std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms& usual,
-                             bool too_large) {
-  const bool white = chosen.fit.whiteness_p >= kWhite;
+                             double inflation, bool too_large) {
+  const bool independent = chosen.fit.whiteness_p >= kWhite || inflation < kNearlyIndependent;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
     const bool acts = adds_what_is_usual(rung, chosen, usual);
-    const bool trusted = white || rung.bic < chosen.bic;
+    const bool trusted = independent || rung.bic < chosen.bic;
     if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
@@ -182,10 +182,11 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
 
 }  // namespace
 
-void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit, const Terms& usual) {
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit, const Terms& usual,
+                      double inflation) {
   const std::vector<data::FitParameter> before = fit.parameters;
-  std::vector<Rival> rivals = rivals_of(rungs, chosen, usual, false);
-  const std::vector<Rival> too_large = rivals_of(rungs, chosen, usual, true);
+  std::vector<Rival> rivals = rivals_of(rungs, chosen, usual, inflation, false);
+  const std::vector<Rival> too_large = rivals_of(rungs, chosen, usual, inflation, true);
   rivals.insert(rivals.end(), too_large.begin(), too_large.end());
   Eigen::MatrixXd bounded = spread_of(rivals, true, chosen.fit, before);
   keep_within_bounds(before, bounded);

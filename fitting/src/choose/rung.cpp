@@ -1,17 +1,11 @@
 #include "choose/rung.hpp"
 
-#include <fmt/core.h>
-
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "choose/softness.hpp"
 #include "judge/first_guess.hpp"
-#include "observe/angles.hpp"
-#include "observe/arcs.hpp"
-#include "observe/observed.hpp"
 #include "observe/timing.hpp"
 #include "problem/prepare.hpp"
 #include "problem/problem.hpp"
@@ -249,7 +243,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
       if (extends)
         hand_over_spin_drag(below->fit, values_of(below->fit), own.start,
                             parameters_of(rung.scene));
-      own.strategy = Strategy::automatic;
+      own.strategy = options.strategy;
       // A search may find another law of friction than what it goes on from.
       Rung searched = rung;
       searched.scene = asked;
@@ -346,7 +340,10 @@ void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
   own.strategy = Strategy::single;
   own.rolls_at_first = rung.rolls_at_first = true;
   try_rung(rung, [&] {
-    fit_softly(tracks, own, rung);
+    if (softness_is_open(rung))
+      fit_softly(tracks, own, rung);
+    else
+      take(draft_one_of_several(tracks, rung.scene, own), rung);
     rung.fitted = usable(rung.fit);
   });
 }

@@ -22,6 +22,9 @@ namespace trochoid::fitting {
 inline constexpr double kBareMention = 2.0, kStrong = 6.0, kVeryStrong = 10.0;
 /// p-value above which residuals count as white.
 inline constexpr double kWhite = 0.01;
+/// Variance inflation below which residuals that are not white hang together so little that further
+/// terms have no tracker's errors to follow.
+inline constexpr double kNearlyIndependent = 2.25;
 
 /// A model of the ladder and what became of it.
 struct Rung {
@@ -33,6 +36,7 @@ struct Rung {
   Settled settled;
   bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
   bool fitted = false;
+  bool fitted_anew = false;    ///< from a smaller rung that explained more
   bool by_score_test = false;  ///< not fitted itself, take_from_score_test()
   std::string reason;          ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
@@ -72,8 +76,10 @@ void take(Draft draft, Rung& rung);
 /// for their size, widen bars up to a bound; what one of them would change beyond that is said.
 /// @param usual  terms that act on nearly every body: rungs that add nothing else count without
 /// that bound, and by AICc.
+/// @param inflation  variance_inflation() of the chosen one, where residuals are not white.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
-                      const Terms& usual = {});
+                      const Terms& usual = {},
+                      double inflation = std::numeric_limits<double>::infinity());
 
 /// Whether a rung's verdict is good, good_correlated or weak, and its residuals are white or within
 /// 1.3 of the stated noise (a tracker's errors may hang together).
@@ -119,8 +125,8 @@ void doubt_as_a_whole(std::span<const data::Track> tracks, const Rung& rung,
 void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& first_part,
                          const FitOptions& options, Rung& rung);
 
-/// Fits a sliding rung from a rolling one's solution: it rolls at first, and creeps from then on as
-/// friction that sets in gently lets it, or slips where Coulomb's law does as well.
+/// Fits a sliding rung from a rolling one's solution, of one arc: it rolls at first, and creeps
+/// from then on as friction that sets in gently lets it, or slips where Coulomb's law does as well.
 void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
                   const FitOptions& options, Rung& rung);
 

@@ -122,15 +122,25 @@ double misfit(const Rung& rung) {
 bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
   const bool rolls = chosen.fit.model == "rolling" && chosen.fit.whiteness_p < kWhite;
   const Rung* rolling = best_that_rolls(rungs);
-  if (rolling == nullptr || !(rolls || softness_is_open(chosen))) return false;
+  if (rolling == nullptr || rolling->fit.arcs.size() != 1 || !(rolls || softness_is_open(chosen)))
+    return false;
   const Terms terms = all_that_usually_acts(contest.ladder, rolling->terms);
-  if (terms.empty() || is_known(rungs, terms)) return false;
+  const auto before = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
+    return rung.terms == terms && !rung.by_score_test;
+  });
+  const bool known = before != rungs.end();
+  if (terms.empty() || (known && !softness_is_open(*before))) return false;
   Rung creeps = rung_with(contest.ladder, terms);
   fit_creeping(contest.tracks, *rolling, options_for(creeps, contest.options), creeps);
-  if (!creeps.fitted || !creeps.fit.converged || misfit(creeps) > misfit(chosen) - kStrong)
-    return false;
-  step_down(contest, rungs.emplace_back(std::move(creeps)), rungs);
-  return true;
+  const double inflation = variance_inflation(contest.tracks, chosen, contest.options);
+  const bool better = creeps.fitted && creeps.fit.converged && !softness_is_open(creeps) &&
+                      misfit(chosen) - misfit(creeps) > kVeryStrong * inflation;
+  if (!better && creeps.reason.empty())
+    creeps.reason = "it explains no more than what residuals that hang together may hide";
+  if (known && !better) return false;
+  Rung& added = known ? * before = std::move(creeps) : rungs.emplace_back(std::move(creeps));
+  if (better) step_down(contest, added, rungs);
+  return better;
 }
 
 }  // namespace trochoid::fitting

@@ -179,14 +179,15 @@ void start_decay_within_sight(Problem& problem) {
   }
 }
 
-// Values by name: for all arcs or, with "@i", for arc i.
+// Values by name of what is free: for all arcs or, with "@i", for arc i.
 void take_start(const std::map<std::string, double>& start, Problem& problem) {
   const auto& parameters = problem.predictor->parameters();
-  for (std::size_t arc = 0; arc < problem.base.size(); ++arc)
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      auto given = start.find(fmt::format("{}@{}", parameters[i].name, arc));
-      if (given == start.end()) given = start.find(parameters[i].name);
-      if (given != start.end()) problem.base[arc][static_cast<Eigen::Index>(i)] = given->second;
+  for (const FreeParameter& parameter : problem.free)
+    for (std::size_t arc = 0; arc < problem.base.size(); ++arc) {
+      const std::string& name = parameters[parameter.index].name;
+      auto given = start.find(fmt::format("{}@{}", name, arc));
+      if (given == start.end()) given = start.find(name);
+      if (given != start.end()) problem.base[arc][parameter.index] = given->second;
     }
 }
 

@@ -80,12 +80,26 @@ Start carried_over(const Problem& problem, const Relative& relative, Start start
 
 constexpr double kRoughly = 0.05;  // of the variance: somewhere near the right valley
 
-// The best of a solution and what its look-alikes lead to.
-Found unlike(const Problem& problem, const SearchRequest& asked, Found found) {
-  if (!asked.lookalikes) return found;
+// Whether nothing holds a body in its attitude or its turning.
+bool leans_as_it_likes(const Problem& problem) {
+  constexpr const char* kNames[] = {"theta_rad", "phi_rad", "w1_rad_s", "w2_rad_s", "w3_rad_s"};
+  return std::all_of(std::begin(kNames), std::end(kNames), [&](const char* name) {
+    const int index = problem.predictor->index_of(name);
+    return std::any_of(problem.free.begin(), problem.free.end(),
+                       [&](const FreeParameter& free) { return free.index == index; });
+  });
+}
+
+// The better of a solution and what its look-alikes lead to.
+Found better_of_lookalikes(const Problem& problem, const SearchRequest& asked, Found found) {
+  if (!asked.lookalikes || !leans_as_it_likes(problem)) return found;
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
-  const Start known = start_at(problem, found.solution.u, found.path);
-  for (const Start& start : asked.lookalikes(known)) {
+  Problem solved = problem;
+  solved.set_base(found.solution.u);
+  Eigen::VectorXd sign;
+  fold_tilt(*problem.predictor, solved.base[0], sign);
+  for (const Start& start : asked.lookalikes(start_from(solved, found.path))) {
+    if (exhausted(problem, found)) break;
     Found other = grow(problem, start, std::max(24, all / 8));
     if (better(other, found)) found = std::move(other);
   }
@@ -100,8 +114,7 @@ Found look_about(const Problem& problem, const SearchRequest& asked, Found found
   const bool slides = problem.predictor->model_name() == "sliding";
   const bool rim = problem.predictor->index_of("w1_rad_s") >= 0;
   if (!rim || (seen && !slides) || found.unexplained > kRoughly) return found;
-  if ((seen || !slides) && surely_explained(problem, found)) return found;
-  if (!seen) found = unlike(problem, asked, std::move(found));
+  if (!seen) found = better_of_lookalikes(problem, asked, std::move(found));
   if ((seen || !slides) && surely_explained(problem, found)) return found;
   return basin_hop(problem, std::move(found), kMisses);
 }
@@ -206,7 +219,9 @@ Found search_path(const Problem& problem, const SearchRequest& asked) {
     }
     *problem.work = work;
   }
-  if (!exhausted(problem, best)) take(search(problem, asked.starter));
+  const bool brief = asked.options->strategy == Strategy::brief;
+  if (!exhausted(problem, best))
+    take(search(problem, asked.starter, brief ? Effort::brief : Effort::full));
   return best;
 }
 
@@ -353,6 +368,7 @@ Found find_arc(Problem problem, const SearchRequest& asked) {
     case Strategy::multiple:
       return shoot_top(problem, given);
     case Strategy::automatic:
+    case Strategy::brief:
       break;
   }
   Found best = with_other_losses(problem, asked, search_path(problem, asked));

@@ -19,6 +19,7 @@ struct SearchRequest {
   /// Easier relatives of the model, tried first: a sliding body may nearly roll, and the equations
   /// of a softer friction law are less stiff. Their parameters are found by name.
   std::vector<Relative> relatives = {};
+  /// Of what a search finds by positions alone.
   Lookalikes lookalikes = {};
 };
 

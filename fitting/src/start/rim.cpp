@@ -299,10 +299,10 @@ std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& kn
   constexpr double kFlattest = 0.05, kSteepest = 1.55, kStep = 0.05;  // tilts looked at
   constexpr int kHalvings = 20;
   const double theta = known.values.at("theta_rad"), w2 = known.values.at("w2_rad_s");
-  const double along_m_s = body.R * known.values.at("w3_rad_s") - body.h * w2;
+  const double along_m_s = body.h * w2 - body.R * known.values.at("w3_rad_s");
   const double rate = w2 / std::sin(theta);
-  const auto spin = [&](double tilt) {  // with which it rolls that way
-    return (body.h * rate * std::sin(tilt) - along_m_s) / body.R;
+  const auto spin = [&](double tilt) {  // the node line half a turn round
+    return (body.h * rate * std::sin(tilt) + along_m_s) / body.R;
   };
   const auto unsteady = [&](double tilt) {
     return model::steady_rolling_spin(body, tilt, rate) - spin(tilt);

@@ -60,7 +60,9 @@ Starter starter_for(const model::Predictor& predictor, const data::Scene& scene)
 }
 
 Lookalikes lookalikes_for(const model::Predictor& predictor, const data::Scene& scene) {
-  if (!is_rim(predictor.model_name()) || !scene.body) return {};
+  const std::string& model = predictor.model_name();
+  const bool rolls = model == "rolling" || model == "sliding";
+  if (!rolls || !scene.body) return {};
   return
       [body = of_unit_mass(scene)](const Start& known) { return leaning_otherwise(body, known); };
 }

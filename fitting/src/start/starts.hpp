@@ -49,9 +49,9 @@ struct Start {
                                             bool slides);
 
 /// States of a rim whose centre goes nearly the same way as that of a known one, but which leans
-/// the other way: the axis half a turn round, the centre's velocity along the node line reversed,
-/// and the tilt at which it rolls steadily at the same precession rate, where there is one.
-/// @param known  state of a rim; what else it has is kept.
+/// the other way: the axis half a turn round, the same velocity of the centre and precession rate,
+/// and a tilt at which it rolls steadily so; there may be none or several.
+/// @param known  state of a rim, its tilt below pi/2; what else it has is kept.
 [[nodiscard]] std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& known);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.

@@ -22,6 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Beside a recording's name: the track of what was pointed at.
+constexpr const char* kPointed = ".pointed";
+
 struct TrackingStudyOptions {
   std::vector<fs::path> folders;
   fs::path out = "study-tracking";
@@ -67,6 +70,8 @@ Recording recording_in(const fs::path& folder) {
             fmt::format("{}: {} is missing beside truth.csv", folder.string(), needed));
     r.camera = folder / "camera.json";
     r.object = folder / "object.json";
+    static_cast<void>(data::read_camera(r.camera));
+    static_cast<void>(data::read_object(r.object));
     return r;
   }
   if (videos.size() != 1)
@@ -146,7 +151,7 @@ bool follows(const LabelScore& s) {
 void print_pointed(const Recording& r, const data::Table& labels,
                    const TrackingStudyOptions& options) {
   constexpr Eigen::Index kTries = 8;
-  const fs::path target = options.out / (r.name + ".pointed.track.csv");
+  const fs::path target = options.out / (r.name + kPointed + ".track.csv");
   const Eigen::VectorXd frame = labels.column("frame"), x = labels.column("x_px"),
                         y = labels.column("y_px");
   for (Eigen::Index k = 0; k < kTries; ++k) {
@@ -222,19 +227,26 @@ bool study(const Recording& r, const TrackingStudyOptions& options) {
 
 /// All of them before the first is tracked, which takes its time.
 std::vector<Recording> recordings_in(const std::vector<fs::path>& folders) {
-  std::map<std::string, fs::path> named;
+  std::map<std::string, fs::path> named;  // tracks that will be written, without their extension
   std::vector<Recording> recordings;
   for (const fs::path& folder : folders) {
     // What a shell's * brings along: a README beside the folders.
     if (fs::is_regular_file(folder)) continue;
     recordings.push_back(recording_in(folder));
     const std::string& name = recordings.back().name;
-    if (const auto [other, is_new] = named.emplace(name, folder); !is_new)
+    for (const std::string& track : {name, name + kPointed}) {
+      const auto [other, is_new] = named.emplace(track, folder);
+      if (is_new) continue;
+      if (fs::equivalent(other->second, folder))
+        throw InputError(fmt::format("{}: is given twice", folder.string()));
       throw InputError(fmt::format(
           "{} and {}: both tracks would be {}.track.csv; score the folders one after the other, "
           "each with its own --out",
-          other->second.string(), folder.string(), name));
+          other->second.string(), folder.string(), track));
+    }
   }
+  if (recordings.empty())
+    throw InputError("no folder among what is given; a folder holds one recording each");
   return recordings;
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "find/quantiles.hpp"
 #include "find/uncover.hpp"

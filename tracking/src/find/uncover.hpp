@@ -19,7 +19,7 @@ struct Changes {
   [[nodiscard]] Changes operator|(const Changes& other) const;
 };
 
-/// Pixels with at least this value, 0 or 255.
+/// Pixels above this value, 0 or 255.
 [[nodiscard]] cv::Mat above(const cv::Mat& image, double threshold);
 
 /// Whether enough of a picture never changed that something in it is known to be static.

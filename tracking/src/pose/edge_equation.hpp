@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "edges/colour_window.hpp"
+#include "edges/edge_fit.hpp"
 #include "edges/edge_stretch.hpp"
 #include "geometry/outline_samples.hpp"
 #include "pose/robust_step.hpp"

@@ -14,9 +14,10 @@
 namespace trochoid::fitting {
 
 /// Where a search starts and how it goes on from there. `automatic` is what a fit is for; the
-/// others are for comparisons, and all but `integral` go on from the given start alone.
+/// others are for comparisons, and all but `brief` and `integral` go on from the given start alone.
 enum class Strategy {
   automatic,    ///< data-driven starts, then the given one, then multiple shooting
+  brief,        ///< the likeliest of these starts alone
   integral,     ///< the data-driven start and nothing after it
   single,       ///< single shooting
   growing,      ///< on windows that grow
