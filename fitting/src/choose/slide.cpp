@@ -120,9 +120,10 @@ double misfit(const Rung& rung) {
 
 // With all that usually acts, among which rolling friction had to stand for the creep; then fewer.
 bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
-  const bool rolls = chosen.fit.model == "rolling" && chosen.fit.whiteness_p < kWhite;
+  const bool sharp = chosen.fit.model == "rolling" || softness_is_open(chosen);
   const Rung* rolling = best_that_rolls(rungs);
-  if (rolling == nullptr || rolling->fit.arcs.size() != 1 || !(rolls || softness_is_open(chosen)))
+  if (!sharp || chosen.fit.whiteness_p >= kWhite || rolling == nullptr ||
+      rolling->fit.arcs.size() != 1)
     return false;
   const Terms terms = all_that_usually_acts(contest.ladder, rolling->terms);
   const auto before = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {

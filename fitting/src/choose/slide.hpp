@@ -12,9 +12,9 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
 
 /// Friction that sets in gently lets a body creep, which takes energy as rolling friction does, or
 /// looks as if it rolled first and slid later under weak friction: tried, from the best rung that
-/// rolls and at least follows the track, beside a chosen one that rolls and leaves residuals which
-/// hang together, or that slides by Coulomb's law. Of one arc. Another law asks for the more evidence
-/// the more residuals hang together: a tracker's errors go with the motion as creep does.
+/// rolls and at least follows the track, beside a chosen one that rolls or slides by Coulomb's law
+/// and leaves residuals which hang together. Of one arc. Another law asks for the more evidence the
+/// more they do: a tracker's errors go with the motion as creep does.
 /// @returns whether rungs were added against which the chosen one has to stand.
 bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
 

@@ -23,8 +23,8 @@ struct Comparison {
 /// speed). Where that model explains nothing, all usual losses of a floor come first and fewer of
 /// them next; what explains a first part of the track alone is the start of rolling with one loss
 /// more, and of rolling first and sliding then. What is chosen of one record has to stand against
-/// creep, which friction that sets in gently lets happen, where it rolls and leaves residuals that
-/// hang together, or slides by Coulomb's law. A floor may also be smooth, with losses of its own;
+/// creep, which friction that sets in gently lets happen, where it rolls or slides by Coulomb's law
+/// and leaves residuals that hang together. A floor may also be smooth, with losses of its own;
 /// one that the scene names so is nothing else. Terms the scene names beforehand give starting
 /// values only, and every rung frees the terms it has, whatever [fit] free lists. Every rung is
 /// judged by AICc and BIC (both allow for residuals that hang together), whiteness of residuals and
