@@ -295,6 +295,24 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsAsFarAsItGoes) {
               1e-12);
 }
 
+// Of filmed bodies residuals are hardly ever white; two that slide had been 5 and 18 of their error
+// bars off.
+TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsWhereResidualsHangTogetherNextToNothing) {
+  std::vector<data::FitParameter> with{loss("pivoting_friction_m", 5.0, 2.4),
+                                       loss("air_N_m_s", 0.0, 6.0)};
+  Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, std::move(with), 104.0, 112.0)};
+  const auto bar_with = [&](double whiteness_p, double inflation) {
+    rungs[0].fit.whiteness_p = whiteness_p;
+    data::Fit fit = rungs[0].fit;
+    allow_for_rivals(rungs, rungs[0], fit, {1, 2}, inflation);
+    return fit.parameters[0].sigma;
+  };
+  EXPECT_GT(bar_with(0.5, 1.0), 0.5);
+  EXPECT_EQ(bar_with(1e-6, 1.5), bar_with(0.5, 1.0));
+  EXPECT_EQ(bar_with(1e-6, 5.0), 0.1);
+}
+
 // By its odds after BIC it had counted for less than one against which the evidence is strong.
 TEST(Rivals, WithATermThatUsuallyActsWidenBarsTheMoreTheLessSpeaksAgainstThem) {
   const auto bar_beside = [](double aicc, double bic) {
