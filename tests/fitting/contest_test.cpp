@@ -67,7 +67,8 @@ TEST_F(Contested, ALargerRungThatExplainsLessThanOneItContainsIsFittedAnewFromTh
   EXPECT_EQ(chosen, &rungs[0]);
   EXPECT_NE(larger.fit.find("rolling_friction_m"), nullptr);
   const double paid = std::log(chosen->fit.dof + chosen->parameters);
-  EXPECT_LT(larger.bic, chosen->bic + paid + 0.1);
+  constexpr double kAtItsMinimum = 0.1;  // of chi-square
+  EXPECT_LT(larger.bic, chosen->bic + paid + kAtItsMinimum);
 }
 
 // A later test, beside another rung, had taken the place of a better one.

@@ -196,7 +196,7 @@ TEST(Independent, APathFollowedToAPerCentMayLieInAnotherValley) {
 // Seen by its path alone. Leaning the other way a ring goes nearly the same way, and chi-square is
 // no more than a standard deviation above what it should be, or, where sigmas are too large, below:
 // it was followed well, 348 error bars off.
-TEST(Independent, ABodyThatLeansTheOtherWayIsTold) {
+TEST(Independent, ABodyIsToldFromOneThatLeansTheOtherWay) {
   for (const double too_large : {1.0, 1.3}) {
     data::Track track = track_of("leans_otherwise");
     for (data::TrackSample& sample : track.samples) sample.covariance_m2 *= too_large * too_large;
@@ -276,9 +276,10 @@ TEST(Independent, WhatTheSceneHoldsOfFrictionStaysAsItIs) {
        {std::pair{held, held.fit.fixed},
         std::pair{stated, std::map<std::string, double>{{"slip_regularisation_m_s", 1e-4}}}}) {
     const Comparison found = compare(std::span(&track, 1), scene);
+    EXPECT_EQ(found.fit.model, "sliding") << found.fit.recommendation;
     for (const auto& [name, value] : known) {
       const data::FitParameter* parameter = found.fit.find(name);
-      if (parameter == nullptr) continue;  // of a model without it
+      if (parameter == nullptr) continue;  // a loss that is not needed
       EXPECT_EQ(parameter->value, value) << name << ": " << found.fit.recommendation;
     }
   }

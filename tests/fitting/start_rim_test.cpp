@@ -159,7 +159,7 @@ TEST(RimStarts, ALookAlikeRollsSteadilyTheSameWayLeaningTheOtherWay) {
   const std::vector<Start> others = leaning_otherwise(body, known);
   ASSERT_FALSE(others.empty());
   constexpr double kRounding = 1e-9, kBisected = 1e-4;  // the tilt to 5e-8 rad
-  constexpr double kAnother_rad = 0.05;
+  constexpr double kAnother_rad = 0.05;  // the grid's step: not the known one found again
   for (const Start& other : others) {
     const std::map<std::string, double>& state = other.values;
     EXPECT_GT(std::abs(state.at("theta_rad") - kTilt_rad), kAnother_rad);

@@ -167,12 +167,13 @@ void by_all_that_usually_acts(const Contest& contest, const Rung& known, Rungs& 
 
 // The plainest model. Where losses usually act it hardly ever explains a track, and a search of all
 // starts is idle before these have been tried.
-Rung& add_plainest(const Contest& contest, Rungs& rungs) {
+Rung& add_plainest(const Contest& contest, bool may_lose, Rungs& rungs) {
   Contest first = contest;
-  if (!usual_losses(contest.ladder).empty()) first.options.strategy = Strategy::brief;
+  if (may_lose) first.options.strategy = Strategy::brief;
   return add_searched(first, {}, rungs);
 }
 
+// Of all starts.
 void search_again(const Contest& contest, Rung& rung) {
   Rung again = rung_with(contest.ladder, rung.terms);
   fit_rung(contest.tracks, nullptr, nullptr, options_for(again, contest.options), again);
@@ -183,8 +184,9 @@ void search_again(const Contest& contest, Rung& rung) {
 
 Rungs climb(const Contest& contest) {
   Rungs rungs;
-  Rung& plainest = add_plainest(contest, rungs);
-  const bool loses = !explains(plainest) && !usual_losses(contest.ladder).empty();
+  const bool may_lose = !usual_losses(contest.ladder).empty();
+  Rung& plainest = add_plainest(contest, may_lose, rungs);
+  const bool loses = may_lose && !explains(plainest);
   if (loses && climb_down(contest, rungs)) return rungs;
   if (loses) search_again(contest, plainest);
   // Where a search with all usual losses led nowhere, one with fewer does not either.

@@ -149,8 +149,9 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     }
   }
   if (result.fit.converged) {
+    const bool white = chosen->fit.whiteness_p >= kWhite;
     allow_for_rivals(rungs, *chosen, result.fit, usual_losses(ladder),
-                     variance_inflation(tracks, *chosen, contest.options));
+                     white ? 1.0 : variance_inflation(tracks, *chosen, contest.options));
     doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
   }
   result.fit.comparison = table_of(rungs, chosen);

@@ -13,10 +13,10 @@ namespace trochoid::fitting {
 
 namespace {
 
-// Null where no rung with these terms is only score-tested.
-Rung* score_tested_before(Rungs& rungs, const Terms& terms) {
+// The rung with these terms that is only score-tested, or that is not; null where there is none.
+Rung* rung_of(Rungs& rungs, const Terms& terms, bool by_score_test) {
   const auto found = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
-    return rung.terms == terms && rung.by_score_test;
+    return rung.terms == terms && rung.by_score_test == by_score_test;
   });
   return found != rungs.end() ? &*found : nullptr;
 }
@@ -24,7 +24,7 @@ Rung* score_tested_before(Rungs& rungs, const Terms& terms) {
 // A rung with these terms, not fitted yet: a new one, or in the place of one that was only
 // score-tested.
 Rung& blank_rung(const Ladder& ladder, const Terms& terms, Rungs& rungs) {
-  Rung* const before = score_tested_before(rungs, terms);
+  Rung* const before = rung_of(rungs, terms, true);
   Rung& rung = before != nullptr ? *before : rungs.emplace_back();
   return rung = rung_with(ladder, terms);
 }
@@ -72,6 +72,10 @@ std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const 
   return {added.begin(), added.end()};
 }
 
+Rung* known_rung(Rungs& rungs, const Terms& terms) {
+  return rung_of(rungs, terms, false);
+}
+
 bool is_known(const Rungs& rungs, const Terms& terms) {
   return std::any_of(rungs.begin(), rungs.end(),
                      [&](const Rung& rung) { return rung.terms == terms && !rung.by_score_test; });
@@ -79,7 +83,7 @@ bool is_known(const Rungs& rungs, const Terms& terms) {
 
 void add_score_tested(Rung tested, Rungs& rungs) {
   if (is_known(rungs, tested.terms)) return;
-  Rung* const before = score_tested_before(rungs, tested.terms);
+  Rung* const before = rung_of(rungs, tested.terms, true);
   if (before == nullptr)
     rungs.push_back(std::move(tested));
   else if (tested.bic < before->bic)

@@ -43,7 +43,8 @@ struct Neighbour {
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs);
 
-/// Whether there is a rung with these terms that is not only score-tested.
+/// The rung with these terms that is not only score-tested; null where there is none.
+[[nodiscard]] Rung* known_rung(Rungs& rungs, const Terms& terms);
 [[nodiscard]] bool is_known(const Rungs& rungs, const Terms& terms);
 
 /// Adds a rung that is only score-tested (take_from_score_test), unless one with its terms is known

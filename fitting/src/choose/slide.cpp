@@ -116,6 +116,12 @@ double misfit(const Rung& rung) {
   return rung.bic - rung.parameters * std::log(rung.fit.dof + rung.parameters);
 }
 
+bool speaks_for_creep(const Contest& contest, const Rung& creeps, const Rung& chosen) {
+  return creeps.fitted && creeps.fit.converged && !softness_is_open(creeps) &&
+         misfit(chosen) - misfit(creeps) >
+             kVeryStrong * variance_inflation(contest.tracks, chosen, contest.options);
+}
+
 }  // namespace
 
 // With all that usually acts, among which rolling friction had to stand for the creep; then fewer.
@@ -126,21 +132,18 @@ bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
       rolling->fit.arcs.size() != 1)
     return false;
   const Terms terms = all_that_usually_acts(contest.ladder, rolling->terms);
-  const auto before = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
-    return rung.terms == terms && !rung.by_score_test;
-  });
-  const bool known = before != rungs.end();
-  if (terms.empty() || (known && !softness_is_open(*before))) return false;
+  Rung* const before = known_rung(rungs, terms);
+  if (terms.empty() || (before != nullptr && !softness_is_open(*before))) return false;
   Rung creeps = rung_with(contest.ladder, terms);
   fit_creeping(contest.tracks, *rolling, options_for(creeps, contest.options), creeps);
-  const double inflation = variance_inflation(contest.tracks, chosen, contest.options);
-  const bool better = creeps.fitted && creeps.fit.converged && !softness_is_open(creeps) &&
-                      misfit(chosen) - misfit(creeps) > kVeryStrong * inflation;
+  const bool better = speaks_for_creep(contest, creeps, chosen);
   if (!better && creeps.reason.empty())
     creeps.reason = "it explains no more than what residuals that hang together may hide";
-  if (known && !better) return false;
-  Rung& added = known ? * before = std::move(creeps) : rungs.emplace_back(std::move(creeps));
-  if (better) step_down(contest, added, rungs);
+  if (before == nullptr)
+    rungs.push_back(std::move(creeps));
+  else if (better)
+    *before = std::move(creeps);
+  if (better) step_down(contest, *known_rung(rungs, terms), rungs);
   return better;
 }
 

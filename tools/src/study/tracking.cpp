@@ -70,6 +70,7 @@ Recording recording_in(const fs::path& folder) {
             fmt::format("{}: {} is missing beside truth.csv", folder.string(), needed));
     r.camera = folder / "camera.json";
     r.object = folder / "object.json";
+    // What is wrong with these is told before anything is tracked.
     static_cast<void>(data::read_camera(r.camera));
     static_cast<void>(data::read_object(r.object));
     return r;

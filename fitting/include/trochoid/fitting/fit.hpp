@@ -17,7 +17,7 @@ namespace trochoid::fitting {
 /// others are for comparisons, and all but `brief` and `integral` go on from the given start alone.
 enum class Strategy {
   automatic,    ///< data-driven starts, then the given one, then multiple shooting
-  brief,        ///< the likeliest of these starts alone
+  brief,        ///< the same with the likeliest of these starts alone
   integral,     ///< the data-driven start and nothing after it
   single,       ///< single shooting
   growing,      ///< on windows that grow
