@@ -105,6 +105,12 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
   }
 }
 
+RivalGrounds rival_grounds(const Contest& contest, const Rung& chosen) {
+  const bool white = chosen.fit.whiteness_p >= kWhite;
+  return {usual_losses(contest.ladder), parameters_of_losses(contest.ladder, chosen.terms),
+          white ? 1.0 : variance_inflation(contest.tracks, chosen, contest.options)};
+}
+
 }  // namespace
 
 Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
@@ -149,9 +155,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     }
   }
   if (result.fit.converged) {
-    const bool white = chosen->fit.whiteness_p >= kWhite;
-    allow_for_rivals(rungs, *chosen, result.fit, usual_losses(ladder),
-                     white ? 1.0 : variance_inflation(tracks, *chosen, contest.options));
+    allow_for_rivals(rungs, *chosen, result.fit, rival_grounds(contest, *chosen));
     doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
   }
   result.fit.comparison = table_of(rungs, chosen);

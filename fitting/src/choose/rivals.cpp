@@ -31,19 +31,35 @@ bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual
                      [&](int term) { return usual.contains(term) || chosen.terms.contains(term); });
 }
 
+// Whether a loss that the chosen rung shows to act is not shown to by a rung with further terms: to
+// which of them it belongs is open then, and the chosen rung's bar would be of one loss in the
+// place of several.
+bool leaves_open(const Rung& rung, const Rung& chosen, const std::set<std::string>& losses) {
+  constexpr double kShown = 5.0;  // error bars
+  const auto shown = [](const data::FitParameter* loss) {
+    return loss != nullptr && std::abs(loss->value) >= kShown * loss->sigma;
+  };
+  return std::any_of(losses.begin(), losses.end(), [&](const std::string& name) {
+    return shown(chosen.fit.find(name)) && !shown(rung.fit.find(name));
+  });
+}
+
 // Those that may be right as well, or those against which there is strong evidence, but only for
 // being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
 // where residuals hang together, as a further term may then only follow the tracker's errors; but
-// those do for which BIC speaks, though not strongly, all the same.
-std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Terms& usual,
-                             double inflation, bool too_large) {
-  const bool independent = chosen.fit.whiteness_p >= kWhite || inflation < kNearlyIndependent;
+// those do for which BIC speaks, though not strongly, all the same, and usual ones beside which
+// nothing tells the chosen losses from them.
+std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const RivalGrounds& grounds,
+                             bool too_large) {
+  const bool independent =
+      chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
-    const bool acts = adds_what_is_usual(rung, chosen, usual);
-    const bool trusted = independent || rung.bic < chosen.bic;
+    const bool acts = adds_what_is_usual(rung, chosen, grounds.usual);
+    const bool trusted =
+        independent || rung.bic < chosen.bic || (acts && leaves_open(rung, chosen, grounds.losses));
     if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
@@ -182,11 +198,11 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
 
 }  // namespace
 
-void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit, const Terms& usual,
-                      double inflation) {
+void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
+                      const RivalGrounds& grounds) {
   const std::vector<data::FitParameter> before = fit.parameters;
-  std::vector<Rival> rivals = rivals_of(rungs, chosen, usual, inflation, false);
-  const std::vector<Rival> too_large = rivals_of(rungs, chosen, usual, inflation, true);
+  std::vector<Rival> rivals = rivals_of(rungs, chosen, grounds, false);
+  const std::vector<Rival> too_large = rivals_of(rungs, chosen, grounds, true);
   rivals.insert(rivals.end(), too_large.begin(), too_large.end());
   Eigen::MatrixXd bounded = spread_of(rivals, true, chosen.fit, before);
   keep_within_bounds(before, bounded);

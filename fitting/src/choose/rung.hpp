@@ -66,20 +66,26 @@ void take(Draft draft, Rung& rung);
 /// Free and fixed values by name; empty where there are several arcs.
 [[nodiscard]] std::map<std::string, double> values_of(const data::Fit& fit);
 
+/// What allow_for_rivals() goes by beside the rungs.
+struct RivalGrounds {
+  Terms usual{};                   ///< terms that act on nearly every body
+  std::set<std::string> losses{};  ///< parameters of the chosen rung's terms
+  /// variance_inflation() of the chosen rung, where its residuals are not white.
+  double inflation = std::numeric_limits<double>::infinity();
+};
+
 /// Widens the error bars of `chosen` by what its parameters change by in other rungs, each weighed
 /// by how well AICc speaks for it (Burnham and Anderson, Sociol. Methods Res. 33, 261, 2004, eq.
 /// 4): those that follow the same law, lack one of its terms, and that BIC does not rule out; and
 /// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
-/// whose own error bars count too (where residuals hang together only those for which BIC speaks:
-/// other terms may follow the tracker's errors). A loss that a rung lacks is zero there. Warns
-/// where a bar grows noticeably. Rungs with further terms against which BIC's evidence is strong,
-/// for their size, widen bars up to a bound; what one of them would change beyond that is said.
-/// @param usual  terms that act on nearly every body: rungs that add nothing else count without
-/// that bound, and by AICc.
-/// @param inflation  variance_inflation() of the chosen one, where residuals are not white.
+/// whose own error bars count too. Where residuals hang together other terms may follow the
+/// tracker's errors: of those with further terms only such count there for which BIC speaks, or
+/// whose usual terms leave open whether a loss of the chosen one acts at all. A loss that a rung
+/// lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms against which
+/// BIC's evidence is strong, for their size, widen bars up to a bound, but for those that add
+/// nothing but usual terms, which count by AICc; what one of them would change beyond that is said.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
-                      const Terms& usual = {},
-                      double inflation = std::numeric_limits<double>::infinity());
+                      const RivalGrounds& grounds = {});
 
 /// Whether a rung's verdict is good, good_correlated or weak, and its residuals are white or within
 /// 1.3 of the stated noise (a tracker's errors may hang together).

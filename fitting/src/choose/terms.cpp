@@ -73,6 +73,12 @@ std::set<std::string> parameters_without(const Ladder& ladder, const Terms& term
   return own;
 }
 
+std::set<std::string> parameters_of_losses(const Ladder& ladder, const Terms& terms) {
+  Terms law = terms;
+  std::erase_if(law, [&](int index) { return !term_of(ladder, index).last_resort; });
+  return parameters_without(ladder, terms, law);
+}
+
 std::optional<int> smooth_term(const Ladder& ladder) {
   for (int index = 0; index < count_of(ladder); ++index)
     if (term_of(ladder, index).smooth) return index;

@@ -21,6 +21,9 @@ namespace trochoid::fitting {
 [[nodiscard]] std::set<std::string> parameters_without(const Ladder& ladder, const Terms& terms,
                                                        const Terms& fewer);
 
+/// Parameters of the losses among these terms, not of the law that they come with.
+[[nodiscard]] std::set<std::string> parameters_of_losses(const Ladder& ladder, const Terms& terms);
+
 /// Whether [fit] may call one of these parameters so; a group's name covers its components.
 [[nodiscard]] bool names_one_of(const std::set<std::string>& parameters, const std::string& name);
 
