@@ -134,6 +134,15 @@ void keep_better(Rung searched, Rung& rung) {
     rung = std::move(searched);
 }
 
+// Whether a rung's gap layer is as viscous as a film of water or oil, of which the scene says
+// nothing.
+bool has_a_wet_floor(const Rung& rung) {
+  const data::FitParameter* gap = rung.fit.find("gap_viscosity_Pa_s");
+  const double told_Pa_s = rung.scene.model.gap_viscosity_Pa_s.value_or(0.0);
+  return gap != nullptr && gap->status == data::ParameterStatus::free &&
+         gap->value > kThickestAir_Pa_s && told_Pa_s < kThickestAir_Pa_s;
+}
+
 // Scores and reason, once the fit is made.
 void conclude(Rung& rung) {
   if (rung.fitted) rung.reason = rung.fit.converged ? "" : rung.fit.reason;
@@ -142,6 +151,11 @@ void conclude(Rung& rung) {
   if (!rung.fitted) return;
   rung.aicc = rung.fit.aicc;
   rung.bic = rung.fit.bic;
+  // Other losses of filmed bodies had looked like a gap layer 28 to 2600 times as viscous as air.
+  constexpr double kOneInAThousand = 13.8;  // 2 log(1000)
+  if (!has_a_wet_floor(rung)) return;
+  rung.aicc += kOneInAThousand;
+  rung.bic += kOneInAThousand;
 }
 
 // Runs an attempt at a rung and scores it. What has no answer, or more parameters than the track

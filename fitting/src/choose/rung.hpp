@@ -44,6 +44,8 @@ struct Rung {
   /// What explains the longest first part of the track that a search for it, or for the model that
   /// only rolls, came across.
   FirstPart first_part;
+  /// The fit's, less what is known before it: a gap layer far more viscous than air has the odds of
+  /// one in a thousand where the scene does not tell of a wet floor.
   double aicc = std::numeric_limits<double>::infinity();
   double bic = std::numeric_limits<double>::infinity();
 };

@@ -112,17 +112,15 @@ void warn_short_rim(const Problem& problem, data::Fit& fit) {
       turns));
 }
 
-// A law for small tilts may miss air's viscosity by a few times, not by orders of magnitude.
 void warn_thick_air(data::Fit& fit) {
-  constexpr double kMost = 10.0;
   const data::FitParameter* gap = fit.find("gap_viscosity_Pa_s");
-  if (gap == nullptr || gap->status != data::ParameterStatus::free) return;
-  const double times = gap->value / kAirViscosity_Pa_s;
-  if (times < kMost) return;
+  if (gap == nullptr || gap->status != data::ParameterStatus::free ||
+      gap->value < kThickestAir_Pa_s)
+    return;
   fit.warnings.push_back(fmt::format(
       "gap_viscosity_Pa_s is {:.0f} times that of air: on a dry floor some other loss, which the "
       "model lacks, looks like a gap layer",
-      times));
+      gap->value / kAirViscosity_Pa_s));
 }
 
 void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,

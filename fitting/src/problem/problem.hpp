@@ -21,6 +21,8 @@ inline constexpr const char* kSlipScale = "slip_regularisation_m_s";
 inline constexpr double kSharpest_m_s = 5e-5;
 
 inline constexpr double kAirViscosity_Pa_s = 1.8e-5;
+/// The gap layer's law for small tilts may miss air's viscosity by a few times, not by more.
+inline constexpr double kThickestAir_Pa_s = 10.0 * kAirViscosity_Pa_s;
 
 /// How a free parameter is handed to the minimiser, so that it stays in its range.
 ///   identity  value = u

@@ -83,9 +83,11 @@ struct NullVector {
 
 /// A rung of the ladder that was tried. Figures of a model that has no fit are NaN.
 struct ModelScore {
-  std::string model;                 ///< in words: the law, then its losses
-  double chi2 = 0.0;                 ///< of the residuals over the track's own sigmas, >= 0
-  double aicc = 0.0, bic = 0.0;      ///< information criteria, comparable within one comparison
+  std::string model;  ///< in words: the law, then its losses
+  double chi2 = 0.0;  ///< of the residuals over the track's own sigmas, >= 0
+  /// Information criteria, comparable within one comparison; with the odds of what is unlikely
+  /// beforehand, such as a wet floor.
+  double aicc = 0.0, bic = 0.0;
   double whiteness_p = 0.0;          ///< p-value of the residuals being white, 0..1
   double held_back_rms_sigma = 0.0;  ///< error in predicting the last third [sigma], >= 0
   int parameters = 0;                ///< number of free ones
