@@ -71,6 +71,29 @@ TEST_F(Contested, ALargerRungThatExplainsLessThanOneItContainsIsFittedAnewFromTh
   EXPECT_LT(larger.bic, chosen->bic + paid + kAtItsMinimum);
 }
 
+// Residuals that hang together are no ground to fit them, and yet which loss acts may be open.
+TEST_F(Contested, UsualLossesBesideTheChosenOnesAreTestedWhereResidualsHangTogether) {
+  const int air = term("air force"), pivoting = term("pivoting friction");
+  Rungs rungs{fitted({air, pivoting})};
+  add_usual_losses(contest_, rungs[0], rungs);
+  EXPECT_EQ(rungs.size(), 1u);
+  rungs[0].fit.whiteness_p = 1e-6;
+  add_usual_losses(contest_, rungs[0], rungs);
+  EXPECT_EQ(rungs.size(), 4u);  // with the air's couple, rolling friction, both
+  const auto with_rolling = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
+    return rung.terms == Terms{air, pivoting, term("rolling friction")};
+  });
+  ASSERT_NE(with_rolling, rungs.end());
+  EXPECT_TRUE(with_rolling->by_score_test);
+  Rung fit = rung_with(ladder_, with_rolling->terms);
+  fit_neighbour(tracks_, rungs[0], {}, fit);
+  constexpr double kOfABar = 0.1;
+  for (const char* name : {"air_force_N_s_m", "pivoting_friction_m", "rolling_friction_m"})
+    EXPECT_NEAR(with_rolling->fit.find(name)->sigma, fit.fit.find(name)->sigma,
+                kOfABar * fit.fit.find(name)->sigma)
+        << name;
+}
+
 // A later test, beside another rung, had taken the place of a better one.
 TEST_F(Contested, OfTwoScoreTestsForTheSameTermsTheBetterOneStays) {
   Rung tested = rung_with(ladder_, {term("air force")});

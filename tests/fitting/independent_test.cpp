@@ -88,10 +88,10 @@ TEST(Independent, ABodyThatSlidesLaterHasTheLossesItRolledWith) {
   ASSERT_FALSE(sliding.empty());
   EXPECT_THAT(sliding.front(), testing::HasSubstr("contour friction + sliding"));
   EXPECT_THAT(sliding, testing::Each(testing::Not(testing::HasSubstr("sets in gently"))));
-  // Losses that would gain nothing are told of, and not fitted.
+  // Losses that would gain too little are told of, and not fitted.
   int promised = 0;
   for (const data::ModelScore& row : found.fit.comparison) {
-    if (row.reason.find("would gain nothing") == row.reason.npos) continue;
+    if (row.reason.find("would gain too little") == row.reason.npos) continue;
     ++promised;
     EXPECT_EQ(row.parameters, found.fit.covariance_names.size() + 1) << row.model;
     EXPECT_GT(row.bic, found.fit.bic) << row.model;

@@ -140,6 +140,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     return none;
   }
   let_chosen_roll_at_first(contest, rungs, *chosen);
+  add_usual_losses(contest, *chosen, rungs);
   predict_held_back_by_near_ones(contest, rungs, *chosen);
   Comparison result{with_full_bars(*chosen), chosen->scene};
   if (options.profile || options.bootstrap > 0) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "choose/terms.hpp"
@@ -65,6 +66,23 @@ bool gains_nothing(const Rung& known, double gained, int parameters, const Diffe
          gained < kByChance * parameters;
 }
 
+// What a known rung's tangent plane says of these sets of terms; the last one holds all the others.
+std::optional<ScoreTest> test_of(const Contest& contest, const Rung& known,
+                                 const std::map<int, Terms>& sets) {
+  const Terms& all = sets.rbegin()->second;
+  std::map<int, std::set<std::string>> absent;
+  for (const auto& [key, terms] : sets)
+    absent[key] = parameters_without(contest.ladder, all, terms);
+  return score_test(contest.tracks, known, contest.options, rung_with(contest.ladder, all), absent);
+}
+
+Rung score_tested(const Contest& contest, const Rung& known, const Terms& terms,
+                  const ScoreTest& test, const ScoreTest::Change& change, double inflation) {
+  Rung rung = rung_with(contest.ladder, terms);
+  take_from_score_test(known, test, change, inflation, rung);
+  return rung;
+}
+
 // Sets of terms beside a known rung's that may do as well, the likeliest first: one term more,
 // one in the place of another, and, of those that differ by more, a few. Those that gain nothing
 // by the score test are added to the rungs as it has them.
@@ -72,11 +90,7 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   constexpr std::size_t kMostFar = 4;
   const Ladder& ladder = contest.ladder;
   const std::map<int, Terms> sets = all_sets(ladder, known.terms);
-  const Terms& all = sets.rbegin()->second;
-  std::map<int, std::set<std::string>> absent;
-  for (const auto& [key, terms] : sets) absent[key] = parameters_without(ladder, all, terms);
-  const auto test =
-      score_test(contest.tracks, known, contest.options, rung_with(ladder, all), absent);
+  const auto test = test_of(contest, known, sets);
   std::vector<Neighbour> worth;
   if (!test) {
     for (Terms& terms : with_one_more(ladder, known.terms)) worth.push_back({std::move(terms)});
@@ -99,9 +113,7 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
     const double gained = gain(*test, change(key)) / inflation;
     if (gains_nothing(known, gained, change(key).parameters, by)) {
-      Rung rung = rung_with(ladder, terms);
-      take_from_score_test(known, *test, change(key), inflation, rung);
-      add_score_tested(std::move(rung), rungs);
+      add_score_tested(score_tested(contest, known, terms, *test, change(key), inflation), rungs);
       continue;
     }
     far += near ? 0 : 1;
@@ -182,6 +194,18 @@ const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs) {
     chosen = exchange_terms(contest, *from, rungs);
   }
   return chosen;
+}
+
+void add_usual_losses(const Contest& contest, const Rung& chosen, Rungs& rungs) {
+  const std::map<int, Terms> sets = with_usual_losses(contest.ladder, chosen.terms);
+  if (sets.empty() || !chosen.fit.converged || chosen.fit.whiteness_p >= kWhite) return;
+  const auto test = test_of(contest, chosen, sets);
+  if (!test) return;
+  const double inflation = variance_inflation(contest.tracks, chosen, contest.options);
+  for (const auto& [key, terms] : sets)
+    if (!is_known(rungs, terms))
+      add_score_tested(
+          score_tested(contest, chosen, terms, *test, test->instead.at(key), inflation), rungs);
 }
 
 }  // namespace trochoid::fitting

@@ -10,4 +10,9 @@ namespace trochoid::fitting {
 /// @returns the rung that is chosen in the end; null where none could be fitted.
 [[nodiscard]] const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs);
 
+/// Adds what usual losses beside those of the chosen rung would make of its parameters, by the
+/// score test, where they have not been fitted: residuals that hang together are no ground for a
+/// fit, and yet which loss acts may be open.
+void add_usual_losses(const Contest& contest, const Rung& chosen, Rungs& rungs);
+
 }  // namespace trochoid::fitting

@@ -388,7 +388,7 @@ void take_from_score_test(const Rung& known, const ScoreTest& test, const ScoreT
   rung.rolls_at_first = known.rolls_at_first;
   rung.fitted = rung.by_score_test = true;
   rung.reason =
-      "it would gain nothing by the derivatives beside the model without it, and was not fitted";
+      "it would gain too little by the derivatives beside the model without it, and was not fitted";
   rung.parameters = known.parameters + change.parameters;
   rung.aicc = known.aicc + 2.0 * change.parameters - gained;
   rung.bic = known.bic + change.parameters * std::log(test.rows) - gained;

@@ -130,22 +130,42 @@ std::vector<Terms> with_one_more(const Ladder& ladder, const Terms& terms) {
   return sets;
 }
 
+namespace {
+
+// The terms with and without each of the open ones; a key has a bit for each of these.
+std::map<int, Terms> sets_of(const Terms& terms, const std::vector<int>& open) {
+  std::map<int, Terms> sets;
+  for (int key = 0; key < 1 << open.size(); ++key) {
+    Terms& set = sets[key] = terms;
+    for (std::size_t bit = 0; bit < open.size(); ++bit)
+      if ((key >> bit & 1) != 0)
+        set.insert(open[bit]);
+      else
+        set.erase(open[bit]);
+  }
+  return sets;
+}
+
+}  // namespace
+
 std::map<int, Terms> all_sets(const Ladder& ladder, const Terms& known) {
   std::vector<int> open;
   for (int index = 0; index < count_of(ladder); ++index)
     if (!term_of(ladder, index).last_resort) open.push_back(index);
-  std::map<int, Terms> sets;
-  for (int key = 0; key < 1 << open.size(); ++key) {
-    Terms terms = known;
-    for (std::size_t bit = 0; bit < open.size(); ++bit)
-      if ((key >> bit & 1) != 0)
-        terms.insert(open[bit]);
-      else
-        terms.erase(open[bit]);
-    if (std::all_of(terms.begin(), terms.end(),
-                    [&](int term) { return means_something(ladder, terms, term); }))
-      sets[key] = std::move(terms);
-  }
+  std::map<int, Terms> sets = sets_of(known, open);
+  std::erase_if(sets, [&](const auto& item) {
+    return !std::all_of(item.second.begin(), item.second.end(),
+                        [&](int term) { return means_something(ladder, item.second, term); });
+  });
+  return sets;
+}
+
+std::map<int, Terms> with_usual_losses(const Ladder& ladder, const Terms& terms) {
+  std::vector<int> open;
+  for (const int index : usual_losses(ladder))
+    if (!terms.contains(index)) open.push_back(index);
+  std::map<int, Terms> sets = sets_of(terms, open);
+  sets.erase(0);
   return sets;
 }
 

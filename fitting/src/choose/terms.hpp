@@ -40,6 +40,10 @@ namespace trochoid::fitting {
 /// The losses that act on nearly every body of this kind.
 [[nodiscard]] Terms usual_losses(const Ladder& ladder);
 
+/// All sets of these terms and usual losses that are not among them, at least one; a key as in
+/// all_sets(). Empty where there are none.
+[[nodiscard]] std::map<int, Terms> with_usual_losses(const Ladder& ladder, const Terms& terms);
+
 /// The terms and the last resort; empty where there is none.
 [[nodiscard]] Terms with_last_resort(const Ladder& ladder, Terms terms);
 
