@@ -44,6 +44,12 @@ bool leaves_open(const Rung& rung, const Rung& chosen, const std::set<std::strin
   });
 }
 
+// By how much -2 ln likelihood speaks for a rung. That usual losses act is no assumption that it
+// would have to pay for: it is asked only which of them does what.
+double likelihood_lead(const Rung& rung, const Rung& chosen) {
+  return chosen.aicc - rung.aicc + 2.0 * (rung.parameters - chosen.parameters);
+}
+
 // Those that may be right as well, or those against which there is strong evidence, but only for
 // being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
 // where residuals hang together, as a further term may then only follow the tracker's errors; but
@@ -58,14 +64,16 @@ std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Rival
   for (const Rung& rung : rungs) {
     const bool larger = has_all_terms_of(rung, chosen);
     const bool acts = adds_what_is_usual(rung, chosen, grounds.usual);
-    const bool trusted =
-        independent || rung.bic < chosen.bic || (acts && leaves_open(rung, chosen, grounds.losses));
+    const bool open = acts && leaves_open(rung, chosen, grounds.losses);
+    const bool trusted = independent || open || rung.bic < chosen.bic;
     if (!in_question(rung, chosen) || (larger && !trusted) ||
         (larger && rung.bic > chosen.bic + kStrong) != too_large)
       continue;
     // By BIC, what usually acts would weigh less than where the evidence against it is stronger.
     const bool by_bic = larger && !too_large && !acts;
-    const double lead = by_bic ? chosen.bic - rung.bic : chosen.aicc - rung.aicc;
+    const double lead = open     ? likelihood_lead(rung, chosen)
+                        : by_bic ? chosen.bic - rung.bic
+                                 : chosen.aicc - rung.aicc;
     rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});
     all += rivals.back().weight;
   }
