@@ -318,19 +318,25 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsWhereResidualsHangTogether
 TEST(Rivals, WithTermsThatUsuallyActWidenTheErrorBarsWhereNothingTellsLossesFromThem) {
   const auto widened = [](double sigma_there) {
     std::vector<data::FitParameter> with{loss("air_N_m_s", 3.0, sigma_there),
-                                         loss("rolling_friction_m", 1.0, 3.0)};
-    Rungs rungs{rung_of({1}, {loss("air_N_m_s", 3.4, 0.05)}, 100.0, 100.0),
-                rung_of({1, 2}, std::move(with), 102.0, 106.5)};
+                                         loss("rolling_friction_m", 1.0, 3.0),
+                                         loss("w3_rad_s", 7.0, 90.0)};
+    Rungs rungs{
+        rung_of({1}, {loss("air_N_m_s", 3.4, 0.05), loss("w3_rad_s", 7.0, 1.0)}, 100.0, 100.0),
+        rung_of({1, 2}, std::move(with), 102.0, 106.5)};
     rungs[0].fit.whiteness_p = 1e-6;
     rungs[1].parameters = rungs[0].parameters + 1;
     data::Fit fit = rungs[0].fit;
     allow_for_rivals(rungs, rungs[0], fit,
                      {.usual = {1, 2}, .losses = {"air_N_m_s"}, .inflation = 5.0});
-    return fit.parameters[0].sigma;
+    return fit;
   };
-  EXPECT_EQ(widened(0.1), 0.05);  // it acts in either
+  const data::Fit acts_in_either = widened(0.1), open = widened(2.0);
+  EXPECT_EQ(acts_in_either.parameters[0].sigma, 0.05);
+  EXPECT_EQ(acts_in_either.parameters[1].sigma, 1.0);
   // Both fit as well: that rolling friction acts is not asked.
-  EXPECT_NEAR(widened(2.0), std::sqrt(0.5 * 0.05 * 0.05 + 0.5 * (2.0 * 2.0 + 0.4 * 0.4)), 1e-12);
+  EXPECT_NEAR(open.parameters[0].sigma,
+              std::sqrt(0.5 * 0.05 * 0.05 + 0.5 * (2.0 * 2.0 + 0.4 * 0.4)), 1e-12);
+  EXPECT_NEAR(open.parameters[1].sigma, 2.5, 1e-12);
 }
 
 // By its odds after BIC it had counted for less than one against which the evidence is strong.

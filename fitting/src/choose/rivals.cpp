@@ -5,15 +5,19 @@
 
 #include "choose/rung.hpp"
 #include "observe/angles.hpp"
+#include "problem/problem.hpp"
 
 namespace trochoid::fitting {
 namespace {
 
+// Which error bars a rival widens as far as it goes; the others within_bounds().
+enum class Freely { all, coefficients, none };
+
 struct Rival {
   const Rung* rung = nullptr;
-  double weight = 0.0;   // of all that are not ruled out and of the chosen rung together 1
-  bool larger = false;   // has further terms beside all of the chosen rung's
-  bool bounded = false;  // keep_within_bounds()
+  double weight = 0.0;  // of all that are not ruled out and of the chosen rung together 1
+  bool larger = false;  // has further terms beside all of the chosen rung's
+  Freely freely = Freely::all;
 };
 
 // Of the same law, and not ruled out. One with further terms is left out for being larger, not for
@@ -44,38 +48,61 @@ bool leaves_open(const Rung& rung, const Rung& chosen, const std::set<std::strin
   });
 }
 
-// By how much -2 ln likelihood speaks for a rung. That usual losses act is no assumption that it
-// would have to pay for: it is asked only which of them does what.
-double likelihood_lead(const Rung& rung, const Rung& chosen) {
-  return chosen.aicc - rung.aicc + 2.0 * (rung.parameters - chosen.parameters);
+// How a rung stands to the chosen one.
+struct Standing {
+  Standing(const Rung& rung, const Rung& chosen, const RivalGrounds& grounds)
+      : larger(has_all_terms_of(rung, chosen)),
+        too_large(larger && rung.bic > chosen.bic + kStrong),
+        acts(adds_what_is_usual(rung, chosen, grounds.usual)),
+        open(larger && acts && leaves_open(rung, chosen, grounds.losses)),
+        independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent) {}
+  bool larger;       // has further terms beside all of the chosen rung's
+  bool too_large;    // there is strong evidence against it, for that
+  bool acts;         // its further terms are usual ones
+  bool open;         // and nothing beside them tells the chosen losses from them
+  bool independent;  // what the chosen rung leaves hangs together next to nothing
+};
+
+// Where residuals hang together a further term may only follow the tracker's errors; but a rung
+// with one counts where BIC speaks for it, though not strongly, all the same, or where the term is
+// usual and which loss acts is open.
+bool counts(const Rung& rung, const Rung& chosen, const Standing& standing) {
+  return in_question(rung, chosen) &&
+         (!standing.larger || standing.independent || standing.open || rung.bic < chosen.bic);
+}
+
+// By how much a rung is the likelier one, as a difference of -2 ln likelihood. By BIC, what usually
+// acts would weigh less than where the evidence against it is stronger. Where it is asked only
+// which of them does what, that usual losses act is no assumption that would have to be paid for.
+double lead_of(const Rung& rung, const Rung& chosen, const Standing& standing) {
+  const double by_aicc = chosen.aicc - rung.aicc;
+  if (standing.open) return by_aicc + 2.0 * (rung.parameters - chosen.parameters);
+  const bool by_bic = standing.larger && !standing.too_large && !standing.acts;
+  return by_bic ? chosen.bic - rung.bic : by_aicc;
+}
+
+// Rivals with a loss of their own may widen an error bar up to a bound; beyond it the bar would
+// speak of the assumed losses rather than of the track, and a note tells the rest. Losses that act
+// on nearly every body widen without bound: that they are there is no assumption. Where residuals
+// hang together they do so for coefficients alone: how the body moves is seen whichever of them
+// acts.
+Freely freely(const Standing& standing) {
+  if (standing.too_large && !standing.acts) return Freely::none;
+  return standing.open && !standing.independent ? Freely::coefficients : Freely::all;
 }
 
 // Those that may be right as well, or those against which there is strong evidence, but only for
-// being larger. The chosen rung's own weight is not listed. Ones with further terms do not count
-// where residuals hang together, as a further term may then only follow the tracker's errors; but
-// those do for which BIC speaks, though not strongly, all the same, and usual ones beside which
-// nothing tells the chosen losses from them.
+// being larger. The chosen rung's own weight is not listed.
 std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const RivalGrounds& grounds,
                              bool too_large) {
-  const bool independent =
-      chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent;
   std::vector<Rival> rivals;
   double all = 1.0;
   for (const Rung& rung : rungs) {
-    const bool larger = has_all_terms_of(rung, chosen);
-    const bool acts = adds_what_is_usual(rung, chosen, grounds.usual);
-    const bool open = acts && leaves_open(rung, chosen, grounds.losses);
-    const bool trusted = independent || open || rung.bic < chosen.bic;
-    if (!in_question(rung, chosen) || (larger && !trusted) ||
-        (larger && rung.bic > chosen.bic + kStrong) != too_large)
-      continue;
-    // By BIC, what usually acts would weigh less than where the evidence against it is stronger.
-    const bool by_bic = larger && !too_large && !acts;
-    const double lead = open     ? likelihood_lead(rung, chosen)
-                        : by_bic ? chosen.bic - rung.bic
-                                 : chosen.aicc - rung.aicc;
-    rivals.push_back({&rung, std::exp(0.5 * lead), larger, too_large && !acts});
-    all += rivals.back().weight;
+    const Standing standing(rung, chosen, grounds);
+    if (standing.too_large != too_large || !counts(rung, chosen, standing)) continue;
+    const double odds = std::exp(0.5 * lead_of(rung, chosen, standing));
+    rivals.push_back({&rung, odds, standing.larger, freely(standing)});
+    all += odds;
   }
   for (Rival& rival : rivals) rival.weight /= all;
   return rivals;
@@ -100,13 +127,13 @@ double further_variance(const Rival& rival, const data::Fit& chosen, const std::
   return std::max(0.0, there->sigma * there->sigma - here->sigma * here->sigma);
 }
 
-// What rivals add to the covariance of all parameters, those that are bounded or the others.
-Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool bounded, const data::Fit& chosen,
+// What such rivals add to the covariance of all parameters.
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, Freely freely, const data::Fit& chosen,
                           const std::vector<data::FitParameter>& parameters) {
   const auto count = static_cast<Eigen::Index>(parameters.size());
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
   for (const Rival& rival : rivals) {
-    if (rival.bounded != bounded) continue;
+    if (rival.freely != freely) continue;
     Eigen::VectorXd shift = Eigen::VectorXd::Zero(count), further = shift;
     for (Eigen::Index i = 0; i < count; ++i) {
       const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
@@ -120,19 +147,19 @@ Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, bool bounded, const 
   return spread;
 }
 
-// Rivals with a loss of their own may widen an error bar up to a bound; beyond it the bar would
-// speak of the assumed losses rather than of the track, and a note tells the rest. Losses that act
-// on nearly every body widen without bound: that they are there is no assumption.
-void keep_within_bounds(const std::vector<data::FitParameter>& parameters,
-                        Eigen::MatrixXd& spread) {
+// The same with error bars no wider than a bound.
+// @param but  parameters without one.
+Eigen::MatrixXd within_bounds(const std::vector<data::FitParameter>& parameters,
+                              const std::set<std::string>& but, const Eigen::MatrixXd& spread) {
   constexpr double kWidest = 2.5;
   Eigen::VectorXd share(spread.rows());
   for (Eigen::Index i = 0; i < share.size(); ++i) {
-    const double most =
-        parameters[static_cast<std::size_t>(i)].sigma * std::sqrt(kWidest * kWidest - 1.0);
-    share[i] = spread(i, i) > most * most ? most / std::sqrt(spread(i, i)) : 1.0;
+    const data::FitParameter& parameter = parameters[static_cast<std::size_t>(i)];
+    const double most = parameter.sigma * std::sqrt(kWidest * kWidest - 1.0);
+    const bool beyond = spread(i, i) > most * most && !but.contains(parameter.name);
+    share[i] = beyond ? most / std::sqrt(spread(i, i)) : 1.0;
   }
-  spread = share.asDiagonal() * spread * share.asDiagonal();
+  return share.asDiagonal() * spread * share.asDiagonal();
 }
 
 void widen(const Eigen::MatrixXd& spread, data::Fit& fit) {
@@ -212,9 +239,12 @@ void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
   std::vector<Rival> rivals = rivals_of(rungs, chosen, grounds, false);
   const std::vector<Rival> too_large = rivals_of(rungs, chosen, grounds, true);
   rivals.insert(rivals.end(), too_large.begin(), too_large.end());
-  Eigen::MatrixXd bounded = spread_of(rivals, true, chosen.fit, before);
-  keep_within_bounds(before, bounded);
-  widen(spread_of(rivals, false, chosen.fit, before) + bounded, fit);
+  std::set<std::string> coefficients = grounds.losses;
+  coefficients.merge(std::set<std::string>{"friction", kSlipScale});
+  const auto spread = [&](Freely freely) { return spread_of(rivals, freely, chosen.fit, before); };
+  widen(spread(Freely::all) + within_bounds(before, coefficients, spread(Freely::coefficients)) +
+            within_bounds(before, {}, spread(Freely::none)),
+        fit);
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);
 }

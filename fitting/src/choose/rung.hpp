@@ -83,10 +83,11 @@ struct RivalGrounds {
 /// whose own error bars count too. Where residuals hang together other terms may follow the
 /// tracker's errors: of those with further terms only such count there for which BIC speaks, or
 /// whose usual terms leave open whether a loss of the chosen one acts at all; these count by
-/// likelihood alone. A loss that a rung lacks is zero there. Warns where a bar grows noticeably.
-/// Rungs with further terms against which BIC's evidence is strong, for their size, widen bars up
-/// to a bound, but for those that add nothing but usual terms, which count by AICc; what one of
-/// them would change beyond that is said.
+/// likelihood alone, and bars other than those of coefficients grow up to a bound. A loss that a
+/// rung lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms against
+/// which BIC's evidence is strong, for their size, widen all bars up to that bound, but for those
+/// that add nothing but usual terms, which count by AICc; what one of them would change beyond that
+/// is said.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const RivalGrounds& grounds = {});
 
