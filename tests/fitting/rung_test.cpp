@@ -1,5 +1,7 @@
 #include "choose/rung.hpp"
 
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "choose/held_back.hpp"
+#include "choose/rung_words.hpp"
 #include "common.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/reference_case.hpp"
@@ -155,7 +158,26 @@ Rung rung_of(std::set<int> terms, std::vector<data::FitParameter> parameters, do
     rung.fit.covariance(i, i) = parameter.sigma * parameter.sigma;
   }
   rung.aicc = aicc, rung.bic = bic;
+  rung.parameters = static_cast<int>(count);
+  rung.fit.dof = 1'000'000;  // no rung here ended above one that it contains
   return rung;
+}
+
+// A search that ended elsewhere was told of as neither needed nor ruled out, at BIC +11507.
+TEST(Sentence, NamesTheLikeliestFewAndNothingThatEndedElsewhere) {
+  Rungs rungs{rung_of({1}, {loss("air_N_m_s", 1.0, 0.1)}, 100.0, 100.0)};
+  for (const double bic : {109.0, 106.0, 108.0, 107.0, 11507.0}) {
+    const int term = 2 + static_cast<int>(rungs.size());
+    Rung& larger = rungs.emplace_back(
+        rung_of({1, term}, {loss("air_N_m_s", 1.0, 0.1), loss("other_m", 1.0, 0.1)}, bic, bic));
+    larger.name = fmt::format("with {:g}", bic);
+  }
+  for (Rung& rung : rungs) rung.fit.model = "puck";  // of a rim's mean path more is said
+  const std::string words = sentence(rungs, rungs[0], {});
+  EXPECT_THAT(words,
+              testing::HasSubstr("neither needed nor ruled out: with 106 (BIC +6.0), with 107 "
+                                 "(BIC +7.0), with 108 (BIC +8.0) and 1 more."));
+  EXPECT_THAT(words, testing::Not(testing::HasSubstr("11507")));
 }
 
 TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
@@ -324,7 +346,6 @@ TEST(Rivals, WithTermsThatUsuallyActWidenTheErrorBarsWhereNothingTellsLossesFrom
         rung_of({1}, {loss("air_N_m_s", 3.4, 0.05), loss("w3_rad_s", 7.0, 1.0)}, 100.0, 100.0),
         rung_of({1, 2}, std::move(with), 102.0, 106.5)};
     rungs[0].fit.whiteness_p = 1e-6;
-    rungs[1].parameters = rungs[0].parameters + 1;
     data::Fit fit = rungs[0].fit;
     allow_for_rivals(rungs, rungs[0], fit,
                      {.usual = {1, 2}, .losses = {"air_N_m_s"}, .inflation = 5.0});

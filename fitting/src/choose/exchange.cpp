@@ -122,18 +122,15 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   return worth;
 }
 
-// Rungs that follow the same law with all of a known one's terms and more, and yet explain less
-// than it does: the search for them ended elsewhere. Nothing is learned of their terms there.
+// Rungs that follow the same law as a known one and ended above it: nothing is learned of their
+// terms there.
 std::vector<Rung*> stuck_above(const Rung& known, Rungs& rungs) {
-  const double rows = known.fit.dof + known.parameters;
   std::vector<Rung*> stuck;
-  for (Rung& rung : rungs) {
-    const double paid = std::max(0, rung.parameters - known.parameters) * std::log(rows);
+  for (Rung& rung : rungs)
     if (rung.terms != known.terms && rung.fitted && !rung.by_score_test && !rung.fitted_anew &&
         rung.fit.model == known.fit.model && has_all_terms_of(rung, known) &&
-        rung.bic > known.bic + paid + kBareMention)
+        ended_above(rung, known))
       stuck.push_back(&rung);
-  }
   return stuck;
 }
 

@@ -23,9 +23,11 @@ struct Rival {
 // Of the same law, and not ruled out. One with further terms is left out for being larger, not for
 // being wrong: what it fits beyond is all that its terms promise where they do nothing.
 bool in_question(const Rung& rung, const Rung& chosen) {
-  return &rung != &chosen && rung.fitted && rung.fit.converged &&
-         rung.fit.model == chosen.fit.model && rung.fit.arcs.size() == chosen.fit.arcs.size() &&
-         (has_all_terms_of(rung, chosen) || rung.bic <= chosen.bic + kVeryStrong);
+  if (&rung == &chosen || !rung.fitted || !rung.fit.converged ||
+      rung.fit.model != chosen.fit.model || rung.fit.arcs.size() != chosen.fit.arcs.size())
+    return false;
+  const bool larger = rung.terms != chosen.terms && has_all_terms_of(rung, chosen);
+  return larger ? !ended_above(rung, chosen) : rung.bic <= chosen.bic + kVeryStrong;
 }
 
 // Whether a rung has terms beyond the chosen one's, all of them usual ones.

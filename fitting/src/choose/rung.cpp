@@ -20,6 +20,12 @@ bool has_all_terms_of(const Rung& rung, const Rung& other) {
                        other.terms.end());
 }
 
+bool ended_above(const Rung& larger, const Rung& known) {
+  const double rows = known.fit.dof + known.parameters;
+  const double paid = std::max(0, larger.parameters - known.parameters) * std::log(rows);
+  return larger.bic > known.bic + paid + kBareMention;
+}
+
 bool usable(const data::Fit& fit) {
   return !fit.parameters.empty() && std::isfinite(fit.chi2);
 }

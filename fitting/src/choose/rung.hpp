@@ -56,6 +56,10 @@ using Rungs = std::deque<Rung>;
 /// Whether a rung has all terms of another; also where they are the same.
 [[nodiscard]] bool has_all_terms_of(const Rung& rung, const Rung& other);
 
+/// Whether a rung with all terms of a known one and more explains less than that, which it cannot
+/// but where its search ended elsewhere.
+[[nodiscard]] bool ended_above(const Rung& larger, const Rung& known);
+
 /// Whether a fit came to an end, good or bad.
 [[nodiscard]] bool usable(const data::Fit& fit);
 

@@ -4,17 +4,27 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 
 #include "choose/retrograde.hpp"
 
 namespace trochoid::fitting {
 namespace {
 
-std::string listed(const std::vector<const Rung*>& rungs, double bic) {
+bool likelier(const Rung* one, const Rung* other) {
+  return one->bic < other->bic;
+}
+
+// The likeliest ones; the table of all models has the others.
+std::string listed(std::vector<const Rung*> rungs, double bic) {
+  constexpr std::size_t kMost = 3;
+  std::sort(rungs.begin(), rungs.end(), likelier);
+  const std::size_t shown = std::min(kMost, rungs.size());
   std::string words;
-  for (const Rung* rung : rungs)
+  for (const Rung* rung : std::span(rungs).first(shown))
     words +=
         fmt::format("{}{} (BIC {:+.1f})", words.empty() ? "" : ", ", rung->name, rung->bic - bic);
+  if (shown < rungs.size()) words += fmt::format(" and {} more", rungs.size() - shown);
   return words;
 }
 
@@ -58,19 +68,19 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
   for (const Rung& rung : rungs) {
     // Of another minimum of the same model nothing is said.
     if (!rung.fitted || rung.terms == chosen.terms) continue;
+    const bool larger = has_all_terms_of(rung, chosen);
+    if (larger && (!rung.fit.converged || ended_above(rung, chosen))) continue;
     const bool near = rung.bic - chosen.bic < kVeryStrong;
-    (has_all_terms_of(rung, chosen) ? more : near ? alike : worse).push_back(&rung);
+    (larger ? more : near ? alike : worse).push_back(&rung);
   }
-  const auto by_bic = [](const Rung* a, const Rung* b) { return a->bic < b->bic; };
-  std::sort(alike.begin(), alike.end(), by_bic);
-  std::sort(worse.begin(), worse.end(), by_bic);
-  std::sort(more.begin(), more.end(), by_bic);
   if (!more.empty())
     words += fmt::format("; neither needed nor ruled out: {}", listed(more, chosen.bic));
   if (!alike.empty())
     words += fmt::format("; the data do not rule out {}", listed(alike, chosen.bic));
   else if (!worse.empty())
-    words += fmt::format("; the next best, {}, is ruled out", listed({worse.front()}, chosen.bic));
+    words +=
+        fmt::format("; the next best, {}, is ruled out",
+                    listed({*std::min_element(worse.begin(), worse.end(), likelier)}, chosen.bic));
   for (const std::string& term : ladder.left_out) words += fmt::format("; not tried: {}", term);
   return words + "." + retrograde_sentence(rungs, chosen, ladder);
 }
