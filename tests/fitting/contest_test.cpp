@@ -62,7 +62,7 @@ TEST_F(Contested, ALargerRungThatExplainsLessThanOneItContainsIsFittedAnewFromTh
   larger.fit = rungs[0].fit;
   larger.fitted = true;
   larger.parameters = rungs[0].parameters + 1;
-  larger.bic = rungs[0].bic + 1e3;
+  larger.bic = larger.fit.bic = rungs[0].bic + 1e3;
   const Rung* chosen = exchange_while_worth(contest_, rungs);
   EXPECT_EQ(chosen, &rungs[0]);
   EXPECT_NE(larger.fit.find("rolling_friction_m"), nullptr);
@@ -92,6 +92,23 @@ TEST_F(Contested, UsualLossesBesideTheChosenOnesAreTestedWhereResidualsHangToget
     EXPECT_NEAR(with_rolling->fit.find(name)->sigma, fit.fit.find(name)->sigma,
                 kOfABar * fit.fit.find(name)->sigma)
         << name;
+}
+
+// A prior on a loss that the chosen one lacks had been taken for what a model with it gains.
+TEST_F(Contested, UsualLossesOfWhichTheSceneSaysMoreAreNotTested) {
+  const int air = term("air force"), pivoting = term("pivoting friction");
+  for (const int said : {0, 1, 2}) {
+    if (said == 0) ladder_.plain.fit.prior["rolling_friction_m"] = {1e-4, 1e-6};
+    if (said == 1) ladder_.plain.fit.fixed["rolling_friction_m"] = 1e-4;
+    if (said == 2) ladder_.plain.fit.bounds["rolling_friction_m"] = {1e-4, 1e-3};
+    Rungs rungs{fitted({air, pivoting})};
+    rungs[0].fit.whiteness_p = 1e-6;
+    add_usual_losses(contest_, rungs[0], rungs);
+    ASSERT_EQ(rungs.size(), 2u);
+    EXPECT_EQ(rungs[1].terms, (Terms{air, pivoting, term("air couple")}));
+    EXPECT_GT(rungs[1].bic, rungs[0].bic);
+    ladder_.plain.fit = scene_.fit;
+  }
 }
 
 // A later test, beside another rung, had taken the place of a better one.

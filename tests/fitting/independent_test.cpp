@@ -36,11 +36,15 @@ Comparison comparison_of(const std::string& name) {
 constexpr double kSigmas = 4.0;
 constexpr double kTelling = 0.25;  // of a value, with all that other losses may change
 
+// No wider than that nothing is left of a loss, or twice of it acts.
 void expect_within_bars(const data::Fit& fit, const std::map<std::string, double>& truth) {
+  constexpr double kWidest = 2.0;  // times the value
   for (const auto& [name, value] : truth) {
     const data::FitParameter* parameter = fit.find(name);
     ASSERT_NE(parameter, nullptr) << name;
     EXPECT_NEAR(parameter->value, value, kSigmas * parameter->sigma) << name;
+    EXPECT_LT(parameter->sigma, kWidest * std::max(std::abs(value), std::abs(parameter->value)))
+        << name;
   }
 }
 
@@ -289,9 +293,14 @@ TEST(Independent, AFilmFarMoreViscousThanAirIsNoLossOfADryFloor) {
                                {"pivoting_friction_m", 7.241820256244139e-06}});
   data::Scene wet = scene_of("like_a_gap_layer");
   wet.model.gap_viscosity_Pa_s = 1e-3;  // water
+  data::Scene measured = scene_of("like_a_gap_layer");
+  measured.fit.prior["gap_viscosity_Pa_s"] = {1.6e-3, 2e-4};
   const data::Track track = track_of("like_a_gap_layer");
-  const Comparison told = compare(std::span(&track, 1), wet);
-  EXPECT_NE(told.fit.find("gap_viscosity_Pa_s"), nullptr) << told.fit.recommendation;
+  for (const data::Scene& scene : {wet, measured}) {
+    const Comparison told = compare(std::span(&track, 1), scene);
+    EXPECT_NE(told.fit.find("gap_viscosity_Pa_s"), nullptr) << told.fit.recommendation;
+    EXPECT_THAT(told.fit.warnings, testing::Each(testing::Not(testing::HasSubstr("dry floor"))));
+  }
 }
 
 // Models that are tried from the solutions of others had written over what the scene holds.

@@ -157,7 +157,7 @@ Rung rung_of(std::set<int> terms, std::vector<data::FitParameter> parameters, do
     rung.fit.covariance_names.push_back(parameter.name);
     rung.fit.covariance(i, i) = parameter.sigma * parameter.sigma;
   }
-  rung.aicc = aicc, rung.bic = bic;
+  rung.aicc = aicc, rung.bic = rung.fit.bic = bic;
   rung.parameters = static_cast<int>(count);
   rung.fit.dof = 1'000'000;  // no rung here ended above one that it contains
   return rung;
@@ -351,13 +351,16 @@ TEST(Rivals, WithTermsThatUsuallyActWidenTheErrorBarsWhereNothingTellsLossesFrom
                      {.usual = {1, 2}, .losses = {"air_N_m_s"}, .inflation = 5.0});
     return fit;
   };
-  const data::Fit acts_in_either = widened(0.1), open = widened(2.0);
+  const data::Fit acts_in_either = widened(0.1), open = widened(2.0), anything = widened(50.0);
   EXPECT_EQ(acts_in_either.parameters[0].sigma, 0.05);
   EXPECT_EQ(acts_in_either.parameters[1].sigma, 1.0);
   // Both fit as well: that rolling friction acts is not asked.
   EXPECT_NEAR(open.parameters[0].sigma,
               std::sqrt(0.5 * 0.05 * 0.05 + 0.5 * (2.0 * 2.0 + 0.4 * 0.4)), 1e-12);
   EXPECT_NEAR(open.parameters[1].sigma, 2.5, 1e-12);
+  // It can give way to the others until nothing is left of it.
+  EXPECT_NEAR(anything.parameters[0].sigma, std::sqrt(0.05 * 0.05 + 0.5 * (3.4 * 3.4 + 0.4 * 0.4)),
+              1e-12);
 }
 
 // By its odds after BIC it had counted for less than one against which the evidence is strong.

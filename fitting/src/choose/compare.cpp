@@ -52,9 +52,10 @@ void check_names(const data::FitSettings& fit, const std::set<std::string>& know
 data::ModelScore table_row(const Rung& rung, bool recommended) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (!rung.fitted) return {rung.name, kNone, kNone, kNone, kNone, kNone, 0, false, rung.reason};
-  return {rung.name,       rung.fit.chi2,        rung.aicc,
-          rung.bic,        rung.fit.whiteness_p, rung.held_back_rms_sigma,
-          rung.parameters, recommended,          rung.reason};
+  return {
+      rung.name,       rung.fit.chi2,        rung.aicc,
+      rung.bic,        rung.fit.whiteness_p, rung.held_back_rms_sigma,
+      rung.parameters, recommended,          recommended && rung.fit.converged ? "" : rung.reason};
 }
 
 std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {

@@ -84,7 +84,7 @@ Rung score_tested(const Contest& contest, const Rung& known, const Terms& terms,
 }
 
 // Sets of terms beside a known rung's that may do as well, the likeliest first: one term more,
-// one in the place of another, and, of those that differ by more, a few. Those that gain nothing
+// one in the place of another, and, of those that differ by more, a few. Those that gain too little
 // by the score test are added to the rungs as it has them.
 std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& known, Rungs& rungs) {
   constexpr std::size_t kMostFar = 4;
@@ -194,8 +194,18 @@ const Rung* exchange_while_worth(const Contest& contest, Rungs& rungs) {
 }
 
 void add_usual_losses(const Contest& contest, const Rung& chosen, Rungs& rungs) {
-  const std::map<int, Terms> sets = with_usual_losses(contest.ladder, chosen.terms);
-  if (sets.empty() || !chosen.fit.converged || chosen.fit.whiteness_p >= kWhite) return;
+  const Ladder& ladder = contest.ladder;
+  if (!chosen.fit.converged || chosen.fit.whiteness_p >= kWhite ||
+      parameters_of_losses(ladder, chosen.terms).empty())
+    return;
+  std::map<int, Terms> sets = with_usual_losses(ladder, chosen.terms);
+  // Where [fit] says what one of them is, the chosen rung without it is at no minimum of a model
+  // with it. Of the sets that are left one still holds all the others.
+  std::erase_if(sets, [&](const auto& item) {
+    return says_something_of(ladder.plain.fit,
+                             parameters_without(ladder, item.second, chosen.terms));
+  });
+  if (sets.empty()) return;
   const auto test = test_of(contest, chosen, sets);
   if (!test) return;
   const double inflation = variance_inflation(contest.tracks, chosen, contest.options);

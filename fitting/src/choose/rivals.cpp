@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "choose/rung.hpp"
 #include "observe/angles.hpp"
@@ -11,13 +15,15 @@ namespace trochoid::fitting {
 namespace {
 
 // Which error bars a rival widens as far as it goes; the others within_bounds().
-enum class Freely { all, coefficients, none };
+enum class Unbounded { all, coefficients, none };
 
 struct Rival {
   const Rung* rung = nullptr;
   double weight = 0.0;  // of all that are not ruled out and of the chosen rung together 1
-  bool larger = false;  // has further terms beside all of the chosen rung's
-  Freely freely = Freely::all;
+  Unbounded unbounded = Unbounded::all;
+  // Of the chosen rung's parameters: how far off they are in this one, and by how much larger their
+  // variances are.
+  Eigen::VectorXd shift{}, further{};
 };
 
 // Of the same law, and not ruled out. One with further terms is left out for being larger, not for
@@ -37,16 +43,16 @@ bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual
                      [&](int term) { return usual.contains(term) || chosen.terms.contains(term); });
 }
 
-// Whether a loss that the chosen rung shows to act is not shown to by a rung with further terms: to
+// Whether a loss that acts by the chosen rung is not shown to by a rung with further terms: to
 // which of them it belongs is open then, and the chosen rung's bar would be of one loss in the
 // place of several.
 bool leaves_open(const Rung& rung, const Rung& chosen, const std::set<std::string>& losses) {
-  constexpr double kShown = 5.0;  // error bars
-  const auto shown = [](const data::FitParameter* loss) {
-    return loss != nullptr && std::abs(loss->value) >= kShown * loss->sigma;
+  constexpr double kActs = 2.0, kShown = 5.0;  // error bars
+  const auto beyond = [](const data::FitParameter* loss, double bars) {
+    return loss != nullptr && std::abs(loss->value) >= bars * loss->sigma;
   };
   return std::any_of(losses.begin(), losses.end(), [&](const std::string& name) {
-    return shown(chosen.fit.find(name)) && !shown(rung.fit.find(name));
+    return beyond(chosen.fit.find(name), kActs) && !beyond(rung.fit.find(name), kShown);
   });
 }
 
@@ -88,26 +94,9 @@ double lead_of(const Rung& rung, const Rung& chosen, const Standing& standing) {
 // on nearly every body widen without bound: that they are there is no assumption. Where residuals
 // hang together they do so for coefficients alone: how the body moves is seen whichever of them
 // acts.
-Freely freely(const Standing& standing) {
-  if (standing.too_large && !standing.acts) return Freely::none;
-  return standing.open && !standing.independent ? Freely::coefficients : Freely::all;
-}
-
-// Those that may be right as well, or those against which there is strong evidence, but only for
-// being larger. The chosen rung's own weight is not listed.
-std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const RivalGrounds& grounds,
-                             bool too_large) {
-  std::vector<Rival> rivals;
-  double all = 1.0;
-  for (const Rung& rung : rungs) {
-    const Standing standing(rung, chosen, grounds);
-    if (standing.too_large != too_large || !counts(rung, chosen, standing)) continue;
-    const double odds = std::exp(0.5 * lead_of(rung, chosen, standing));
-    rivals.push_back({&rung, odds, standing.larger, freely(standing)});
-    all += odds;
-  }
-  for (Rival& rival : rivals) rival.weight /= all;
-  return rivals;
+Unbounded unbounded(const Standing& standing) {
+  if (standing.too_large && !standing.acts) return Unbounded::none;
+  return standing.open && !standing.independent ? Unbounded::coefficients : Unbounded::all;
 }
 
 // What a parameter is in another rung, less what it is here. A loss that is not there is none; of
@@ -121,44 +110,70 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
 }
 
 // Variance of a parameter in a rung with further terms beyond that in the chosen one, which does
-// not allow for those terms; of both by curvature.
-double further_variance(const Rival& rival, const data::Fit& chosen, const std::string& name) {
-  const data::FitParameter* here = chosen.find(name);
-  const data::FitParameter* there = rival.larger ? rival.rung->fit.find(name) : nullptr;
+// not allow for those terms; of both by curvature, which does not know that no loss is negative:
+// one can only give way to the others until nothing is left of it.
+double further_variance(const data::Fit& larger, const data::Fit& chosen, const std::string& name,
+                        const std::set<std::string>& losses) {
+  const data::FitParameter *here = chosen.find(name), *there = larger.find(name);
   if (here == nullptr || there == nullptr || !std::isfinite(there->sigma)) return 0.0;
-  return std::max(0.0, there->sigma * there->sigma - here->sigma * here->sigma);
+  const double further = there->sigma * there->sigma - here->sigma * here->sigma;
+  const double all = std::max(std::abs(here->value), std::abs(there->value));
+  return std::max(0.0, losses.contains(name) ? std::min(further, all * all) : further);
 }
 
-// What such rivals add to the covariance of all parameters.
-Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, Freely freely, const data::Fit& chosen,
-                          const std::vector<data::FitParameter>& parameters) {
+// Those that may be right as well, and those against which there is strong evidence, but only for
+// being larger. The chosen rung's own weight is not listed.
+// @param parameters  of the chosen rung, whose error bars are to allow for them.
+std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const RivalGrounds& grounds,
+                             const std::vector<data::FitParameter>& parameters) {
   const auto count = static_cast<Eigen::Index>(parameters.size());
-  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count, count);
-  for (const Rival& rival : rivals) {
-    if (rival.freely != freely) continue;
-    Eigen::VectorXd shift = Eigen::VectorXd::Zero(count), further = shift;
+  std::vector<Rival> rivals;
+  double all = 1.0;
+  for (const Rung& rung : rungs) {
+    const Standing standing(rung, chosen, grounds);
+    if (!counts(rung, chosen, standing)) continue;
+    Rival& rival = rivals.emplace_back();
+    rival.rung = &rung;
+    rival.weight = std::exp(0.5 * lead_of(rung, chosen, standing));
+    rival.unbounded = unbounded(standing);
+    rival.shift = rival.further = Eigen::VectorXd::Zero(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
       if (here.status == data::ParameterStatus::fixed) continue;
-      shift[i] = shift_of(here, rival.rung->fit);
-      further[i] = further_variance(rival, chosen, here.name);
+      rival.shift[i] = shift_of(here, rung.fit);
+      if (standing.larger)
+        rival.further[i] = further_variance(rung.fit, chosen.fit, here.name, grounds.losses);
     }
-    spread += rival.weight * shift * shift.transpose();
-    spread.diagonal() += rival.weight * further;
+    all += rival.weight;
+  }
+  for (Rival& rival : rivals) rival.weight /= all;
+  return rivals;
+}
+
+// What rivals that leave the same without a bound add to the covariance of all parameters.
+Eigen::MatrixXd spread_of(const std::vector<Rival>& rivals, Unbounded unbounded,
+                          std::size_t count) {
+  const auto size = static_cast<Eigen::Index>(count);
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(size, size);
+  for (const Rival& rival : rivals) {
+    if (rival.unbounded != unbounded) continue;
+    spread += rival.weight * rival.shift * rival.shift.transpose();
+    spread.diagonal() += rival.weight * rival.further;
   }
   return spread;
 }
 
 // The same with error bars no wider than a bound.
-// @param but  parameters without one.
+// @param unbounded  parameters without one.
 Eigen::MatrixXd within_bounds(const std::vector<data::FitParameter>& parameters,
-                              const std::set<std::string>& but, const Eigen::MatrixXd& spread) {
+                              const std::set<std::string>& unbounded,
+                              const Eigen::MatrixXd& spread) {
   constexpr double kWidest = 2.5;
   Eigen::VectorXd share(spread.rows());
   for (Eigen::Index i = 0; i < share.size(); ++i) {
     const data::FitParameter& parameter = parameters[static_cast<std::size_t>(i)];
     const double most = parameter.sigma * std::sqrt(kWidest * kWidest - 1.0);
-    const bool beyond = spread(i, i) > most * most && !but.contains(parameter.name);
+    const bool beyond = spread(i, i) > most * most && !unbounded.contains(parameter.name);
     share[i] = beyond ? most / std::sqrt(spread(i, i)) : 1.0;
   }
   return share.asDiagonal() * spread * share.asDiagonal();
@@ -180,16 +195,16 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
                     data::Fit& fit) {
   constexpr double kWorthWords = 1.3;
   double most = kWorthWords;
-  std::string name;
+  std::optional<std::size_t> widened;
   for (std::size_t i = 0; i < before.size(); ++i)
     if (before[i].sigma > 0.0 && fit.parameters[i].sigma > most * before[i].sigma) {
       most = fit.parameters[i].sigma / before[i].sigma;
-      name = before[i].name;
+      widened = i;
     }
-  if (name.empty()) return;
+  if (!widened) return;
   // Of that parameter; a likelier rival may leave it where it is.
-  const auto share = [&](const Rival& rival) {
-    return rival.weight * std::pow(shift_of(*fit.find(name), rival.rung->fit), 2);
+  const auto share = [at = static_cast<Eigen::Index>(*widened)](const Rival& rival) {
+    return rival.weight * (rival.shift[at] * rival.shift[at] + rival.further[at]);
   };
   const auto strongest =
       std::max_element(rivals.begin(), rivals.end(),
@@ -197,7 +212,7 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
   fit.warnings.push_back(
       fmt::format("error bars allow for other models that explain the track as well, above all {}: "
                   "that of {} is {:.2g} times as wide",
-                  strongest->rung->name, name, most));
+                  strongest->rung->name, before[*widened].name, most));
 }
 
 // A loss too small to be needed may still move the others, or where none of it fits best leave them
@@ -238,14 +253,13 @@ void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit)
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const RivalGrounds& grounds) {
   const std::vector<data::FitParameter> before = fit.parameters;
-  std::vector<Rival> rivals = rivals_of(rungs, chosen, grounds, false);
-  const std::vector<Rival> too_large = rivals_of(rungs, chosen, grounds, true);
-  rivals.insert(rivals.end(), too_large.begin(), too_large.end());
+  const std::vector<Rival> rivals = rivals_of(rungs, chosen, grounds, before);
+  const auto spread = [&](Unbounded what) { return spread_of(rivals, what, before.size()); };
   std::set<std::string> coefficients = grounds.losses;
   coefficients.merge(std::set<std::string>{"friction", kSlipScale});
-  const auto spread = [&](Freely freely) { return spread_of(rivals, freely, chosen.fit, before); };
-  widen(spread(Freely::all) + within_bounds(before, coefficients, spread(Freely::coefficients)) +
-            within_bounds(before, {}, spread(Freely::none)),
+  const Eigen::MatrixXd bounded = within_bounds(before, {}, spread(Unbounded::none));
+  widen(spread(Unbounded::all) +
+            within_bounds(before, coefficients, spread(Unbounded::coefficients) + bounded),
         fit);
   warn_of_rivals(rivals, before, fit);
   warn_of_larger_ones(rungs, chosen, fit);

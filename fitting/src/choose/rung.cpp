@@ -1,5 +1,7 @@
 #include "choose/rung.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -23,7 +25,7 @@ bool has_all_terms_of(const Rung& rung, const Rung& other) {
 bool ended_above(const Rung& larger, const Rung& known) {
   const double rows = known.fit.dof + known.parameters;
   const double paid = std::max(0, larger.parameters - known.parameters) * std::log(rows);
-  return larger.bic > known.bic + paid + kBareMention;
+  return larger.fit.bic > known.fit.bic + paid + kBareMention;
 }
 
 bool usable(const data::Fit& fit) {
@@ -144,9 +146,8 @@ void keep_better(Rung searched, Rung& rung) {
 // nothing.
 bool has_a_wet_floor(const Rung& rung) {
   const data::FitParameter* gap = rung.fit.find("gap_viscosity_Pa_s");
-  const double told_Pa_s = rung.scene.model.gap_viscosity_Pa_s.value_or(0.0);
   return gap != nullptr && gap->status == data::ParameterStatus::free &&
-         gap->value > kThickestAir_Pa_s && told_Pa_s < kThickestAir_Pa_s;
+         gap->value > kThickestAir_Pa_s && !tells_of_a_film(rung.scene);
 }
 
 // Scores and reason, once the fit is made.
@@ -162,6 +163,9 @@ void conclude(Rung& rung) {
   if (!has_a_wet_floor(rung)) return;
   rung.aicc += kOneInAThousand;
   rung.bic += kOneInAThousand;
+  if (rung.reason.empty())
+    rung.reason = fmt::format(
+        "AICc and BIC hold {} for a wet floor, of which the scene says nothing", kOneInAThousand);
 }
 
 // Runs an attempt at a rung and scores it. What has no answer, or more parameters than the track

@@ -56,8 +56,8 @@ using Rungs = std::deque<Rung>;
 /// Whether a rung has all terms of another; also where they are the same.
 [[nodiscard]] bool has_all_terms_of(const Rung& rung, const Rung& other);
 
-/// Whether a rung with all terms of a known one and more explains less than that, which it cannot
-/// but where its search ended elsewhere.
+/// Whether a rung with all terms of a known one and more fits the track worse than that, which it
+/// cannot but where its search ended elsewhere.
 [[nodiscard]] bool ended_above(const Rung& larger, const Rung& known);
 
 /// Whether a fit came to an end, good or bad.
@@ -75,7 +75,7 @@ void take(Draft draft, Rung& rung);
 /// What allow_for_rivals() goes by beside the rungs.
 struct RivalGrounds {
   Terms usual{};                   ///< terms that act on nearly every body
-  std::set<std::string> losses{};  ///< parameters of the chosen rung's terms
+  std::set<std::string> losses{};  ///< parameters of the chosen rung's terms, but for its law's
   /// variance_inflation() of the chosen rung, where its residuals are not white.
   double inflation = std::numeric_limits<double>::infinity();
 };
@@ -86,12 +86,13 @@ struct RivalGrounds {
 /// those with further terms against which BIC's evidence is not strong, by their odds after BIC,
 /// whose own error bars count too. Where residuals hang together other terms may follow the
 /// tracker's errors: of those with further terms only such count there for which BIC speaks, or
-/// whose usual terms leave open whether a loss of the chosen one acts at all; these count by
-/// likelihood alone, and bars other than those of coefficients grow up to a bound. A loss that a
-/// rung lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms against
-/// which BIC's evidence is strong, for their size, widen all bars up to that bound, but for those
-/// that add nothing but usual terms, which count by AICc; what one of them would change beyond that
-/// is said.
+/// whose usual terms leave open whether a loss of the chosen one acts at all, and of these bars
+/// other than those of coefficients grow up to a bound. What leaves that open counts without AICc's
+/// charge for its terms. A loss that the chosen rung has grows no further than to nothing. A loss
+/// that a rung lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms
+/// against which BIC's evidence is strong, for their size, widen all bars up to that bound, but for
+/// those that add nothing but usual terms, which count by AICc; what one of them would change
+/// beyond that is said.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const RivalGrounds& grounds = {});
 
@@ -155,8 +156,8 @@ struct Nearby {
   double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
 };
 
-/// Makes a rung with a further loss that gains nothing by the score test what that says, without a
-/// fit, which would creep along beside the known rung's: it is told of, and error bars allow for
+/// Makes a rung with further losses that gain too little by the score test what that says, without
+/// a fit, which would creep along beside the known rung's: it is told of, and error bars allow for
 /// it.
 /// @param inflation  gains in chi-square tell so many times less (variance_inflation()).
 void take_from_score_test(const Rung& known, const ScoreTest& test, const ScoreTest::Change& change,

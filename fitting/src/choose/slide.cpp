@@ -113,7 +113,7 @@ const Rung* best_that_rolls(const Rungs& rungs) {
 
 // -2 ln of a rung's likelihood, but for a constant.
 double misfit(const Rung& rung) {
-  return rung.bic - rung.parameters * std::log(rung.fit.dof + rung.parameters);
+  return rung.fit.bic - rung.parameters * std::log(rung.fit.dof + rung.parameters);
 }
 
 bool speaks_for_creep(const Contest& contest, const Rung& creeps, const Rung& chosen) {

@@ -46,6 +46,14 @@ bool names_one_of(const std::set<std::string>& parameters, const std::string& na
                      [&](const std::string& parameter) { return means(name, parameter); });
 }
 
+bool says_something_of(const data::FitSettings& fit, const std::set<std::string>& parameters) {
+  const auto one_of = [&](const auto& said) {
+    return std::any_of(said.begin(), said.end(),
+                       [&](const auto& item) { return names_one_of(parameters, item.first); });
+  };
+  return one_of(fit.fixed) || one_of(fit.prior) || one_of(fit.bounds);
+}
+
 Rung rung_with(const Ladder& ladder, const Terms& terms) {
   Rung rung;
   rung.terms = terms;

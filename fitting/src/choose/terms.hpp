@@ -27,6 +27,10 @@ namespace trochoid::fitting {
 /// Whether [fit] may call one of these parameters so; a group's name covers its components.
 [[nodiscard]] bool names_one_of(const std::set<std::string>& parameters, const std::string& name);
 
+/// Whether [fit] fixes or bounds one of these parameters or has a prior on it.
+[[nodiscard]] bool says_something_of(const data::FitSettings& fit,
+                                     const std::set<std::string>& parameters);
+
 /// Index of the term that is a floor without friction, if the ladder has it.
 [[nodiscard]] std::optional<int> smooth_term(const Ladder& ladder);
 

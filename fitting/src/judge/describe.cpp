@@ -112,10 +112,10 @@ void warn_short_rim(const Problem& problem, data::Fit& fit) {
       turns));
 }
 
-void warn_thick_air(data::Fit& fit) {
+void warn_thick_air(const data::Scene& scene, data::Fit& fit) {
   const data::FitParameter* gap = fit.find("gap_viscosity_Pa_s");
   if (gap == nullptr || gap->status != data::ParameterStatus::free ||
-      gap->value < kThickestAir_Pa_s)
+      gap->value < kThickestAir_Pa_s || tells_of_a_film(scene))
     return;
   fit.warnings.push_back(fmt::format(
       "gap_viscosity_Pa_s is {:.0f} times that of air: on a dry floor some other loss, which the "
@@ -156,7 +156,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   warn(problem, error, fit);
   tell_whether_one_friction(problem, fit);
   warn_short_rim(problem, fit);
-  warn_thick_air(fit);
+  warn_thick_air(scene, fit);
   add_derived_velocity(problem, solution.u, error.covariance, fit);
   if (!fit.model.starts_with("top")) return;
   add_derived_top(problem, solution.u, error.covariance, scene, fit);

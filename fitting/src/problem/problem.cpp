@@ -300,6 +300,12 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
 
 }  // namespace
 
+bool tells_of_a_film(const data::Scene& scene) {
+  const auto told = [](const auto& said) { return said.contains("gap_viscosity_Pa_s"); };
+  return scene.model.gap_viscosity_Pa_s.value_or(0.0) >= kThickestAir_Pa_s ||
+         told(scene.fit.fixed) || told(scene.fit.prior) || told(scene.fit.bounds);
+}
+
 bool means(const std::string& entry, const std::string& parameter) {
   return parameter == entry || (parameter.starts_with(entry) && parameter[entry.size()] == '[');
 }

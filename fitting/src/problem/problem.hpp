@@ -23,6 +23,8 @@ inline constexpr double kSharpest_m_s = 5e-5;
 inline constexpr double kAirViscosity_Pa_s = 1.8e-5;
 /// The gap layer's law for small tilts may miss air's viscosity by a few times, not by more.
 inline constexpr double kThickestAir_Pa_s = 10.0 * kAirViscosity_Pa_s;
+/// Whether a scene speaks of a gap layer of its own: as viscous as water, or by what [fit] says.
+[[nodiscard]] bool tells_of_a_film(const data::Scene& scene);
 
 /// How a free parameter is handed to the minimiser, so that it stays in its range.
 ///   identity  value = u
