@@ -276,7 +276,7 @@ TEST(Independent, ABodyThatCreepsIsNotTakenToRollAgainstFriction) {
 }
 
 // Air, rolling and pivoting friction slow it at once: an air couple alone explains so short a
-// record as well, and was given 20 times as large as it is, to 3 %.
+// record as well, and was given 20 times as large as it is, to 17 %.
 TEST(Independent, AnErrorBarAllowsForUsualLossesThatTheTrackDoesNotTellFromIt) {
   const Comparison found = comparison_of("like_an_air_couple");
   EXPECT_EQ(found.fit.verdict, data::FitVerdict::good_correlated) << found.fit.recommendation;

@@ -64,7 +64,7 @@ struct Standing {
         acts(adds_what_is_usual(rung, chosen, grounds.usual)),
         open(larger && acts && leaves_open(rung, chosen, grounds.losses)),
         independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent) {}
-  bool larger;       // has further terms beside all of the chosen rung's
+  bool larger;       // has all of the chosen rung's terms, and further ones or another minimum
   bool too_large;    // there is strong evidence against it, for that
   bool acts;         // its further terms are usual ones
   bool open;         // and nothing beside them tells the chosen losses from them
