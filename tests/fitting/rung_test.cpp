@@ -335,6 +335,30 @@ TEST(Rivals, WithATermThatUsuallyActsWidenTheErrorBarsWhereResidualsHangTogether
   EXPECT_EQ(bar_with(1e-6, 5.0), 0.1);
 }
 
+// A disc in air of which a fifth of the couple grew with the square of the speed: the linear one
+// alone had been 14 of its error bars too large.
+TEST(Rivals, WithTheOtherLawOfAUsualLossWidenTheErrorBarsAsFarAsItGoes) {
+  std::vector<data::FitParameter> with{loss("air_linear_N_m_s", 5.0, 2.4),
+                                       loss("air_quadratic_N_m_s2", 0.0, 6.0)};
+  Rungs rungs{rung_of({1}, {loss("air_linear_N_m_s", 5.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, std::move(with), 102.0, 112.0)};
+  const auto bar_with = [&](double whiteness_p, const RivalGrounds& grounds) {
+    rungs[0].fit.whiteness_p = whiteness_p;
+    data::Fit fit = rungs[0].fit;
+    allow_for_rivals(rungs, rungs[0], fit, grounds);
+    return fit.parameters[0].sigma;
+  };
+  const RivalGrounds another_loss{.usual = {1}, .losses = {"air_linear_N_m_s"}};
+  RivalGrounds another_law = another_loss;
+  another_law.other_laws = {2};
+  const double weight = std::exp(-1.0) / (1.0 + std::exp(-1.0));  // by AICc
+  EXPECT_NEAR(bar_with(0.5, another_loss), 0.25, 1e-12);
+  EXPECT_NEAR(bar_with(0.5, another_law),
+              std::sqrt((1.0 - weight) * 0.1 * 0.1 + weight * 2.4 * 2.4), 1e-12);
+  // The tracker's errors, which hang together, may look like it.
+  EXPECT_EQ(bar_with(1e-6, another_law), 0.1);
+}
+
 // Filmed bodies that slow by air and both frictions at once, of which an air couple alone explained
 // short records as well: it had been 6, 24 and 29 of its error bars too large.
 TEST(Rivals, WithTermsThatUsuallyActWidenTheErrorBarsWhereNothingTellsLossesFromThem) {

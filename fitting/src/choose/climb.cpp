@@ -49,16 +49,18 @@ const Rung& step_up_while_worth(const Contest& contest, Reach reach, const Rung&
 }
 
 // A rung that explains the track where `known` does not, with another law for one of its losses.
+// Where there is a last resort that is the likelier one.
 std::optional<Rung> by_another_law(const Contest& contest, const Rung& known) {
   const Ladder& ladder = contest.ladder;
+  if (!with_last_resort(ladder, {}).empty()) return std::nullopt;
   Rungs tried;
   std::vector<Rung*> others;
   std::vector<const Term*> laws;
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
     const Term& term = ladder.terms[static_cast<std::size_t>(index)];
-    if (!term.instead_of || !known.terms.contains(*term.instead_of)) continue;
+    if (!term.other_law_of || !known.terms.contains(*term.other_law_of)) continue;
     Terms terms = known.terms;
-    terms.erase(*term.instead_of);
+    terms.erase(*term.other_law_of);
     terms.insert(index);
     others.push_back(&tried.emplace_back(rung_with(ladder, terms)));
     laws.push_back(&term);

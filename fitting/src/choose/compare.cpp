@@ -108,7 +108,8 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
 
 RivalGrounds rival_grounds(const Contest& contest, const Rung& chosen) {
   const bool white = chosen.fit.whiteness_p >= kWhite;
-  return {usual_losses(contest.ladder), parameters_of_losses(contest.ladder, chosen.terms),
+  return {usual_losses(contest.ladder), other_laws(contest.ladder, chosen.terms),
+          parameters_of_losses(contest.ladder, chosen.terms),
           white ? 1.0 : variance_inflation(contest.tracks, chosen, contest.options)};
 }
 

@@ -51,6 +51,7 @@ void add_floor_losses(const Scene& scene, Ladder& ladder) {
     ladder.terms.back().usual = true;
     ladder.terms.push_back(air_couple("quadratic air couple", &ModelSettings::air_quadratic_N_m_s2,
                                       scene, kTypical * unit_N_m_s / rate_rad_s));
+    ladder.terms.back().other_law_of = 0;
     ladder.terms.push_back(single("air force", &ModelSettings::air_force_N_s_m, scene,
                                   kTypical * inertia.mass_kg * rate_rad_s));
     ladder.terms.push_back(
@@ -137,7 +138,7 @@ void add_top_drags(Ladder& ladder) {
       {"dry spin drag", drag(&ModelSettings::drag_spin_dry_N_m), {}},
       {"quadratic spin drag", drag(&ModelSettings::drag_spin_quadratic_N_m_s2), {}}};
   ladder.terms[0].usual = ladder.terms[1].usual = true;
-  ladder.terms[2].instead_of = ladder.terms[3].instead_of = 1;
+  ladder.terms[2].other_law_of = ladder.terms[3].other_law_of = 1;
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ struct Term {
   /// A floor without any friction instead of the law: no rolling at all. A last resort of its own.
   bool smooth = false;
   std::optional<int> of = {};  ///< index of the term it is a property of: only beside that one
-  /// Index of the usual term that is the same loss by another law: tried in its place.
-  std::optional<int> instead_of = {};
+  /// Index of the usual term that is the same loss by another law.
+  std::optional<int> other_law_of = {};
 };
 
 /// A scene's possible models: the plainest one and the terms it may take on.

@@ -36,11 +36,18 @@ bool in_question(const Rung& rung, const Rung& chosen) {
   return larger ? !ended_above(rung, chosen) : rung.bic <= chosen.bic + kVeryStrong;
 }
 
-// Whether a rung has terms beyond the chosen one's, all of them usual ones.
-bool adds_what_is_usual(const Rung& rung, const Rung& chosen, const Terms& usual) {
+// Whether a rung has terms beyond the chosen one's, all of them among these.
+bool adds_only(const Terms& these, const Rung& rung, const Rung& chosen) {
   return rung.terms != chosen.terms &&
          std::all_of(rung.terms.begin(), rung.terms.end(),
-                     [&](int term) { return usual.contains(term) || chosen.terms.contains(term); });
+                     [&](int term) { return these.contains(term) || chosen.terms.contains(term); });
+}
+
+// The usual terms, and the other laws by which those of the chosen rung may go as well.
+Terms likely(const RivalGrounds& grounds) {
+  Terms terms = grounds.usual;
+  terms.insert(grounds.other_laws.begin(), grounds.other_laws.end());
+  return terms;
 }
 
 // Whether a loss that acts by the chosen rung is not shown to by a rung with further terms: to
@@ -61,13 +68,14 @@ struct Standing {
   Standing(const Rung& rung, const Rung& chosen, const RivalGrounds& grounds)
       : larger(has_all_terms_of(rung, chosen)),
         too_large(larger && rung.bic > chosen.bic + kStrong),
-        acts(adds_what_is_usual(rung, chosen, grounds.usual)),
-        open(larger && acts && leaves_open(rung, chosen, grounds.losses)),
+        acts(adds_only(likely(grounds), rung, chosen)),
+        open(larger && adds_only(grounds.usual, rung, chosen) &&
+             leaves_open(rung, chosen, grounds.losses)),
         independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent) {}
   bool larger;       // has all of the chosen rung's terms, and further ones or another minimum
   bool too_large;    // there is strong evidence against it, for that
-  bool acts;         // its further terms are usual ones
-  bool open;         // and nothing beside them tells the chosen losses from them
+  bool acts;         // its further terms are usual ones, or other laws of such
+  bool open;         // usual ones, and nothing beside them tells the chosen losses from them
   bool independent;  // what the chosen rung leaves hangs together next to nothing
 };
 

@@ -75,6 +75,7 @@ void take(Draft draft, Rung& rung);
 /// What allow_for_rivals() goes by beside the rungs.
 struct RivalGrounds {
   Terms usual{};                   ///< terms that act on nearly every body
+  Terms other_laws{};              ///< by which one of these goes as well that is chosen
   std::set<std::string> losses{};  ///< parameters of the chosen rung's terms, but for its law's
   /// variance_inflation() of the chosen rung, where its residuals are not white.
   double inflation = std::numeric_limits<double>::infinity();
@@ -91,8 +92,8 @@ struct RivalGrounds {
 /// charge for its terms. A loss that the chosen rung has grows no further than to nothing. A loss
 /// that a rung lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms
 /// against which BIC's evidence is strong, for their size, widen all bars up to that bound, but for
-/// those that add nothing but usual terms, which count by AICc; what one of them would change
-/// beyond that is said.
+/// those that add nothing but usual terms, or the other law of one, which count by AICc; what one of
+/// them would change beyond that is said.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const RivalGrounds& grounds = {});
 

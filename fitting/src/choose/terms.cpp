@@ -111,6 +111,14 @@ Terms usual_losses(const Ladder& ladder) {
   return terms;
 }
 
+Terms other_laws(const Ladder& ladder, const Terms& terms) {
+  Terms others;
+  for (int index = 0; index < count_of(ladder); ++index)
+    if (const auto of = term_of(ladder, index).other_law_of; of && terms.contains(*of))
+      others.insert(index);
+  return others;
+}
+
 Terms with_last_resort(const Ladder& ladder, Terms terms) {
   bool resort = false;
   for (int index = 0; index < count_of(ladder); ++index) {

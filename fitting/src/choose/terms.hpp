@@ -44,6 +44,10 @@ namespace trochoid::fitting {
 /// The losses that act on nearly every body of this kind.
 [[nodiscard]] Terms usual_losses(const Ladder& ladder);
 
+/// The laws by which usual losses of a set may go as well: air's couple grows with the speed or
+/// its square, and what it is lies between them.
+[[nodiscard]] Terms other_laws(const Ladder& ladder, const Terms& terms);
+
 /// All sets of these terms and usual losses that are not among them, at least one; a key as in
 /// all_sets(). Empty where there are none.
 [[nodiscard]] std::map<int, Terms> with_usual_losses(const Ladder& ladder, const Terms& terms);
