@@ -28,6 +28,13 @@ TEST(ChildProcess, AProgramThatCannotBeStartedHasAReason) {
   EXPECT_THAT(run.error_output, HasSubstr("cannot be started: Too many open files"));
 }
 
+TEST(ChildProcess, AProgramThatASignalEndsHasThatForAReason) {
+  const ChildRun run = run_child({"sh", "-c", "echo 'half way' >&2; kill -SEGV $$"});
+  EXPECT_LT(run.exit_status, 0);
+  EXPECT_EQ(run.error_output,
+            "half way\nthe process was ended by signal 11 (Segmentation fault)\n");
+}
+
 TEST(ChildProcess, TheLastLineIsTheLastThatSaysAnything) {
   EXPECT_EQ(last_line("first\nsecond \n\n"), "second");
   EXPECT_EQ(last_line("10 %\rbroken"), "broken");

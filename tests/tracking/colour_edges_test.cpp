@@ -165,6 +165,18 @@ ByColour seen_by_colour(const ThinDisc& disc, const Photograph& picture,
   return seen;
 }
 
+// A top's axis that points at the camera, all but, left its distance from the pivot open: the disc
+// was looked for behind the camera, where nothing of it is seen.
+TEST(ColourEdges, AnOutlineOfWhichNothingIsSeenHasNone) {
+  const ThinDisc disc;
+  const cv::Mat luma(140, 160, CV_8U, cv::Scalar(90)), chroma(70, 80, CV_8UC2, cv::Scalar(90, 90));
+  const ColourWindow colour = colour_window(luma, chroma, {0, 0, 160, 140}, disc.body, disc.camera,
+                                            disc.at({80.3, 70.2}, 0.3));
+  const std::vector<OutlineSample> nothing;
+  EXPECT_TRUE(
+      find_colour_edges(colour, {nothing, Moments(), PoseMotion::Step()}, 0.6, 3.0).empty());
+}
+
 // The centre of a disc predicted 0.4 px beside its place.
 Eigen::Vector2d centre_by_colour(const ThinDisc& disc, const Photograph& picture,
                                  const Eigen::Vector2d& centre, double theta_rad) {

@@ -181,7 +181,6 @@ CampaignRecord run_item(const Campaign& campaign, const CampaignItem& item) {
   if (record.done) read_answer(answer.path(), record);
   if (record.exit_status != 0 && record.message.empty())
     record.message = last_line(run.error_output);
-  if (record.exit_status < 0 && record.message.empty()) record.message = "the process was killed";
   data::write_text(json_of(record).dump(1) + "\n", record_path(campaign, item));
   return record;
 }

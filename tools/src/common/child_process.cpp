@@ -1,6 +1,7 @@
 #include "common/child_process.hpp"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -28,6 +29,12 @@ ChildRun not_started(int error) {
   ChildRun run;
   run.error_output = kNotStarted + std::string(std::strerror(error));
   return run;
+}
+
+std::string ended_by(int signal) {
+  const char* what = sigdescr_np(signal);
+  return fmt::format("the process was ended by signal {} ({})", signal,
+                     what != nullptr ? what : "unknown");
 }
 
 }  // namespace
@@ -69,6 +76,10 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
     run.seconds = elapsed.count();
     run.exit_status = waited == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     run.started = run.exit_status != 127;
+    if (waited == child && WIFSIGNALED(status)) {
+      if (!run.error_output.empty() && run.error_output.back() != '\n') run.error_output += '\n';
+      run.error_output += ended_by(WTERMSIG(status)) + "\n";
+    }
     run.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
   }
   close(pipe_ends[0]);

@@ -11,7 +11,7 @@ struct ChildRun {
   int exit_status = -1;
   double seconds = 0.0;      ///< wall time, start of the process included
   double peak_mb = 0.0;      ///< resident memory
-  std::string error_output;  ///< what it wrote to stderr, or why it did not start
+  std::string error_output;  ///< what it wrote to stderr, why it did not start, what ended it
 };
 
 /// Runs a program (found on PATH) to its end with nothing on stdin and stdout going to a file

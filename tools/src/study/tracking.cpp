@@ -210,8 +210,8 @@ bool study(const Recording& r, const TrackingStudyOptions& options) {
   const ChildRun ffmpeg =
       run_child({"ffmpeg", "-v", "error", "-nostdin", "-i", r.video.string(), "-f", "null", "-"});
   if (ours.exit_status != 0 && ours.exit_status != 3) {
-    fmt::print("  refused: {}",
-               ours.error_output.empty() ? "no reason given\n" : ours.error_output);
+    const std::string why = last_line(ours.error_output);
+    fmt::print("  refused: {}\n", why.empty() ? "no reason given" : why);
     return false;
   }
   const data::TrackFile file = data::read_track(target);

@@ -496,6 +496,7 @@ std::vector<ColourEdge> ColourFit::edges(double reach_px) {
 
 std::vector<ColourEdge> find_colour_edges(const ColourWindow& colour, const ExposedOutline& outline,
                                           double blur_px, double reach_px, int every) {
+  if (outline.middle.empty()) return {};
   return ColourFit(colour, outline, blur_px, every).edges(reach_px);
 }
 

@@ -34,7 +34,7 @@ struct ExposedOutline {
 /// @param reach_px largest offset believed.
 /// @param every one row of so many is looked at.
 /// @returns stretches with an edge, one after the other along the rim, then along the bore; none if
-///          too little is seen to tell two colours.
+///          too little is seen to tell two colours, or the outline is empty.
 [[nodiscard]] std::vector<ColourEdge> find_colour_edges(const ColourWindow& colour,
                                                         const ExposedOutline& outline,
                                                         double blur_px, double reach_px,
