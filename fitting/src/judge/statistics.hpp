@@ -20,7 +20,8 @@ struct Uncertainty {
   std::vector<data::NullVector> null_vectors;
   Whiteness whiteness;  ///< of the worst channel
   Drift drift;          ///< likewise
-  /// Times the error bars are wider than those of independent residuals, typically.
+  /// Times the error bars are wider than those of independent residuals, typically, for what these
+  /// have in common; offsets of a whole record, which no residuals show, not counted.
   double widened = 1.0;
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
   /// their correlation allowed for, without its constant.
@@ -37,10 +38,10 @@ struct Uncertainty {
 /// Singular values of the Jacobian scaled by each parameter's natural size decide the rank. The
 /// covariance is the sandwich of least squares in noise that hangs together: each parameter is
 /// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the
-/// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few. A
-/// constant offset of half a sample's sigma is allowed for in every filmed channel whose residuals
-/// hang together. Where the valley of chi-square bends within a standard deviation, the second
-/// moment of the bend is added.
+/// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few.
+/// Every filmed channel may be off altogether by half of what its readings scatter by or a quarter
+/// of their own sigmas, positions also to the side the body leans to. Where the valley of
+/// chi-square bends within a standard deviation, the second moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer; where

@@ -71,7 +71,7 @@ int window_start(int at, int half_width, int count, int n) {
 
 double robust_sigma(std::vector<double> residuals) {
   for (double& residual : residuals) residual = std::abs(residual);
-  return 1.4826 * median(std::move(residuals));
+  return data::kSdOverMedianDistance * median(std::move(residuals));
 }
 
 // Variance of the centre residual of a w-sample cubic is sigma^2 (1 - leverage).

@@ -146,8 +146,9 @@ std::vector<double> likeliest_frictions(const Problem& part) {
   std::vector<double> frictions;
   for (const auto& [chi2, friction] : scored)
     if (frictions.size() < kTried &&
-        std::none_of(frictions.begin(), frictions.end(),
-                     [&](double other) { return std::abs(friction - other) < kApart * other; }))
+        std::none_of(frictions.begin(), frictions.end(), [friction = friction](double other) {
+          return std::abs(friction - other) < kApart * other;
+        }))
       frictions.push_back(friction);
   return frictions;
 }

@@ -384,7 +384,8 @@ bool ColourFit::find_noise(EdgeSide side) {
       if (pixels_[i].is_clear() && pixels_[i].side() == side)
         off.push_back(std::abs(off_level(stretch, pixels_[i])));
   if (off.size() < kFewest) return false;
-  noise_[side] = std::max(kLeastNoise, 1.4826 * data::upper_median(std::move(off)));
+  noise_[side] =
+      std::max(kLeastNoise, data::kSdOverMedianDistance * data::upper_median(std::move(off)));
   return std::isfinite(noise_[side]);
 }
 

@@ -210,7 +210,7 @@ class EllipseFit {
     }
     // A wide scale at first: the start may be pixels off, and rejecting then keeps the wrong side.
     const double floor = iteration < 2 ? 0.5 * search_.reach_px / kTukey : 0.08;
-    scale_ = std::max(1.4826 * data::median(sizes), floor);
+    scale_ = std::max(data::kSdOverMedianDistance * data::median(sizes), floor);
     normal_.setZero();
     gradient_.setZero();
     int used = 0;

@@ -261,7 +261,7 @@ double weigh(std::vector<EdgeEquation>& equations, const std::vector<EquationRow
     sizes[i] = std::abs(e.residual_px) * per_sd[i];
   }
   // Never below what the edges claim.
-  const double scale = std::max(1.4826 * data::upper_median(sizes), 1.0);
+  const double scale = std::max(data::kSdOverMedianDistance * data::upper_median(sizes), 1.0);
   for (size_t i = 0; i < equations.size(); ++i) {
     auto& e = equations[i];
     const double bound = kTukey * std::max(scale, least_scale_px * per_sd[i]);

@@ -11,6 +11,10 @@ namespace trochoid::data {
 /// The one in the middle; of an even number the mean of the two there. NaN without values.
 [[nodiscard]] double median(std::vector<double> values);
 
+/// Standard deviation of normally distributed values over the median of their distances from the
+/// middle, 1 / quantile of 3/4.
+inline constexpr double kSdOverMedianDistance = 1.4826;
+
 /// Median of the times from each moment to the next [s]; 0 for fewer than two.
 [[nodiscard]] double usual_step_s(const std::vector<double>& t_s);
 
