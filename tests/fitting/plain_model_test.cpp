@@ -89,6 +89,19 @@ TEST(Identifiable, IsATermOnceTheOtherIsKnownBeforehand) {
   EXPECT_GT(std::sqrt(error.covariance(1, 1)), 0.99 * kKnown_m);
 }
 
+// They show in no residual.
+TEST(Widened, DoesNotSayWhatOffsetsOfAWholeRecordDo) {
+  const Eigen::Vector3d at(0.4, 0.6, 0.5);
+  const Sum sum;
+  Problem problem = problem_of(sum);
+  const Uncertainty apart = uncertainty(problem, at);
+  problem.arcs[0].filmed = true;
+  const Uncertainty common = uncertainty(problem, at);
+  EXPECT_GT(common.covariance(2, 2), 3.0 * apart.covariance(2, 2));  // 1 + 3 n / 16 of a line
+  EXPECT_LT(common.covariance(2, 2), 6.0 * apart.covariance(2, 2));
+  EXPECT_DOUBLE_EQ(common.widened, apart.widened);
+}
+
 // A sample far off pulls the line towards itself until the others miss it as well.
 TEST(Windows, LeaveASampleOutThatAloneIsFarOff) {
   constexpr int kWrong = 9, kMany = 60;

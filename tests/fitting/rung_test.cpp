@@ -556,6 +556,24 @@ TEST_F(ScoreTested, GainIsNothingOfALossThatDoesNotAct) {
   }
 }
 
+TEST_F(ScoreTested, ErrorBarsAreAboutThoseOfAFitWithTheAddedLoss) {
+  const std::set<std::string> losses{"air", "pivoting", "rolling"};
+  const Rung known = fitted({"air", "pivoting"}), with = fitted(losses);
+  const auto test = score_test(tracks_, known, {}, rung_with(losses), {{kAll, {}}});
+  ASSERT_TRUE(test);
+  Rung tested = rung_with(losses);
+  take_from_score_test(known, *test, test->instead.at(kAll), 1.0, tested);
+  double widest = 1.0;
+  for (const data::FitParameter& parameter : with.fit.parameters) {
+    const data::FitParameter* there = tested.fit.find(parameter.name);
+    ASSERT_NE(there, nullptr) << parameter.name;
+    EXPECT_NEAR(there->sigma, parameter.sigma, 0.3 * parameter.sigma) << parameter.name;
+    if (const data::FitParameter* before = known.fit.find(parameter.name))
+      widest = std::max(widest, there->sigma / before->sigma);
+  }
+  EXPECT_GT(widest, 1.5);  // of a loss that has to share
+}
+
 TEST_F(ScoreTested, GainIsToldOfLossesThatTogetherTakeThePlaceOfOthers) {
   const Rung known = fitted({"rolling"});
   const auto test = score_test(tracks_, known, {}, rung_with({"air", "pivoting", "rolling"}),

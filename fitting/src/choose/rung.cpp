@@ -385,9 +385,10 @@ void take_from_score_test(const Rung& known, const ScoreTest& test, const ScoreT
   rung.fit.chi2 -= gained;
   for (data::FitParameter& parameter : rung.fit.parameters) {
     const auto value = change.values.find(parameter.name);
-    const auto wider = change.wider.find(parameter.name);
+    const auto further = change.further.find(parameter.name);
     if (value != change.values.end()) parameter.value = value->second;
-    if (wider != change.wider.end()) parameter.sigma *= wider->second;
+    if (further != change.further.end())
+      parameter.sigma = std::sqrt(parameter.sigma * parameter.sigma + inflation * further->second);
   }
   const auto predictor = model::make_predictor(rung.scene);
   for (const model::ParameterInfo& info : predictor->parameters())

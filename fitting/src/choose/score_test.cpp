@@ -150,8 +150,8 @@ Eigen::VectorXd variances(const Tangent& at, const std::set<int>& zero, const st
 // What losses that are added do to the error bars of the other parameters: ScoreTest::Change.
 struct Moved {
   double moves = 0.0;
-  Eigen::VectorXd wider;  // at least 1
-  Eigen::VectorXd sigma;  // afterwards, of all parameters
+  Eigen::VectorXd further;  // what variances grow by
+  Eigen::VectorXd sigma;    // afterwards, of all parameters
 };
 
 // From where `before` are zero to where only `after` are.
@@ -159,15 +159,14 @@ Moved moved(const Tangent& at, const std::set<int>& before, const std::set<int>&
             const std::set<int>& held, Known& known) {
   const Least without = least(at, before, held, known), with = least(at, after, held, known);
   const Eigen::VectorXd narrow = variances(at, before, held), wide = variances(at, after, held);
-  Moved all{0.0, Eigen::VectorXd::Ones(narrow.size()), wide.cwiseSqrt()};
+  Moved all{0.0, Eigen::VectorXd::Zero(narrow.size()), wide.cwiseSqrt()};
   constexpr double kOpen = std::numeric_limits<double>::infinity();
   if (wide.isZero(0.0)) all.sigma.setConstant(kOpen);
   for (int i = 0; i < narrow.size(); ++i) {
     if (!(narrow[i] > 0.0)) continue;
     const double shift = with.step[i] - without.step[i];
-    const double further = std::max(0.0, wide[i] - narrow[i]);
-    all.moves = std::max(all.moves, (shift * shift + further) / narrow[i]);
-    all.wider[i] = std::sqrt(1.0 + further / narrow[i]);
+    all.further[i] = std::max(0.0, wide[i] - narrow[i]);
+    all.moves = std::max(all.moves, (shift * shift + all.further[i]) / narrow[i]);
   }
   all.moves = std::sqrt(all.moves);
   return all;
@@ -233,12 +232,13 @@ ScoreTest score_test(std::span<const data::Track> tracks, const data::Scene& sce
     if (!larger) return to_there;
     const Moved by = moved(at, added, removed, held, known);
     to_there.moves = by.moves;
-    for (int i = 0; i < by.wider.size(); ++i)
+    for (int i = 0; i < by.further.size(); ++i) {
+      const double slope = std::abs(problem.free[i].transform.slope(minimum.u[i]));
       if (added.contains(i))
-        to_there.sigmas[problem.name(i)] =
-            std::abs(problem.free[i].transform.slope(minimum.u[i])) * by.sigma[i];
+        to_there.sigmas[problem.name(i)] = slope * by.sigma[i];
       else
-        to_there.wider[problem.name(i)] = by.wider[i];
+        to_there.further[problem.name(i)] = slope * slope * by.further[i];
+    }
     return to_there;
   };
   for (const auto& [key, names] : others) test.instead[key] = change(named(problem, names));

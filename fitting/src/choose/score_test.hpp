@@ -23,9 +23,9 @@ struct ScoreTest {
     /// move most is off, the shift and what its variance grows by together. Else 0, as where the
     /// data do not tell the parameters apart.
     double moves = 0.0;
-    /// How many times as wide their error bars are then, by name.
-    std::map<std::string, double> wider = {};
-    /// Error bars of what is added, by name, in independent noise.
+    /// What their variances grow by, by name, in independent noise.
+    std::map<std::string, double> further = {};
+    /// Error bars of what is added, by name, likewise.
     std::map<std::string, double> sigmas = {};
   };
   double before = 0.0;            ///< chi-square without the further losses
@@ -44,7 +44,8 @@ struct ScoreTest {
                                    const std::map<int, std::set<std::string>>& others);
 
 /// How many times less than its change a chi-square tells, where what is left at a minimum hangs
-/// together; at least 1.
+/// together; at least 1. The square of Uncertainty::widened, which offsets of a whole record are
+/// not in: nothing that is left tells of them.
 /// @param options  its start holds the values at the minimum.
 /// @throws NumericalError where the model has no prediction.
 [[nodiscard]] double variance_inflation(std::span<const data::Track> tracks,

@@ -44,8 +44,8 @@ namespace trochoid::fitting {
 /// The losses that act on nearly every body of this kind.
 [[nodiscard]] Terms usual_losses(const Ladder& ladder);
 
-/// The laws by which usual losses of a set may go as well: air's couple grows with the speed or
-/// its square, and what it is lies between them.
+/// The other laws by which losses of a set may go as well: air's couple grows with the speed or its
+/// square, a top's drag is air's or its pivot's, and mostly it is some of each.
 [[nodiscard]] Terms other_laws(const Ladder& ladder, const Terms& terms);
 
 /// All sets of these terms and usual losses that are not among them, at least one; a key as in

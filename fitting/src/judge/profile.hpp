@@ -10,7 +10,7 @@ namespace trochoid::fitting {
 
 /// Profile likelihood of every free parameter but the initial angles and places: it is held at
 /// values ever further from the solution and everything else fitted again, until chi-square has
-/// risen by the 95 % quantile times its inflation (residuals that hang together let it rise too
+/// risen by the 95 % quantile times its inflation (what readings have in common lets it rise too
 /// fast), or the parameter has moved by four decades (a hundred standard deviations where it is not
 /// logarithmic).
 [[nodiscard]] std::vector<data::Profile> profiles(const Problem& problem, const Solution& solution,

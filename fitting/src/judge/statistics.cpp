@@ -12,6 +12,7 @@
 #include "observe/smoothing.hpp"
 #include "problem/linearise.hpp"
 #include "problem/valley.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 
@@ -46,34 +47,44 @@ Ways along(int axis) {
   };
 }
 
-// To the side the body leans to, where its light differs; nowhere where that is not seen.
+// To the side the face seen from above looks to, where its light differs; nowhere where that is not
+// seen.
 std::vector<Eigen::Vector2d> leaning(const ArcData& arc) {
   std::vector<Eigen::Vector2d> ways(arc.t_s.size(), Eigen::Vector2d::Zero());
-  for (const Reading& reading : arc.readings)
+  double seen = 1.0;  // of a sample's faces, the one that axis 3 sticks out of, or -1
+  int sample = -1;
+  for (const Reading& reading : arc.readings) {
+    if (reading.sample != sample) seen = 1.0;
+    sample = reading.sample;
+    const double angle = reading.value[0];
+    if (reading.channel == Channel::theta && angle > 0.5 * data::kPi) seen = -1.0;
     if (reading.channel == Channel::phi)
-      ways[static_cast<std::size_t>(reading.sample)] = {std::sin(reading.value[0]),
-                                                        -std::cos(reading.value[0])};
+      ways[static_cast<std::size_t>(sample)] =
+          seen * Eigen::Vector2d(std::sin(angle), -std::cos(angle));
+  }
   return ways;
 }
 
-// What an offset that all readings of a channel have in common does to the residuals of all arcs: a
-// tracker may be off altogether (light, shadow, camera), and no number of samples averages that
-// away. As a rule by half of what readings scatter by, and where they scatter by much less than the
-// tracker expects, by a quarter of that (of 140 filmed bodies of tests/independent/clips).
+// What an offset that all readings of a channel have in common, in all recordings alike, does to
+// the residuals: a tracker may be off altogether (light, shadow, camera), and no number of samples
+// averages that away. As a rule by half of what readings scatter by, and where they scatter by much
+// less than the tracker expects, by a quarter of that (of the filmed bodies of docs/trust.md).
 Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Channel channel,
                               const Ways& ways) {
   constexpr double kOfScatter = 0.5, kOfStated = 0.25;
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(all.jacobian.rows());
   std::vector<double> sizes;
   int first = 0;
-  for (const ArcData& arc : problem.arcs) {
+  for (int a = 0; a < static_cast<int>(problem.arcs.size()); ++a) {
+    const ArcData& arc = problem.arcs[static_cast<std::size_t>(a)];
     const std::vector<Eigen::Vector2d> way = ways(arc);
+    const int width = rows_of(channel);
     for (const Reading& reading : arc.readings) {
       if (reading.channel != channel || !arc.filmed) continue;
       const Eigen::Vector2d row =
           reading.whitener.transpose() * way[static_cast<std::size_t>(reading.sample)];
-      const int width = rows_of(channel);
-      rows.segment(first + reading.row, width) = row.head(width);
+      rows.segment(first + reading.row, width) =
+          robust_weight(problem, a, reading) * row.head(width);
       if (!row.isZero()) sizes.push_back(row.head(width).norm());
     }
     first += arc.rows;

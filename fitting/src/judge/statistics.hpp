@@ -11,8 +11,8 @@ namespace trochoid::fitting {
 /// What the data say about the free parameters at a solution.
 struct Uncertainty {
   Eigen::MatrixXd covariance;  ///< of the values (not of u), order of Problem::free
-  /// How many times too fast chi-square, which takes residuals for independent, rises along each
-  /// parameter; at least 1.
+  /// How many times too fast chi-square, which takes residuals for independent and free of common
+  /// offsets, rises along each parameter; at least 1.
   Eigen::VectorXd chi2_inflation;
   std::vector<bool> identifiable;
   int rank = 0;  ///< directions known to better than 100 % (1 rad for angles)
@@ -39,9 +39,10 @@ struct Uncertainty {
 /// covariance is the sandwich of least squares in noise that hangs together: each parameter is
 /// widened by the noise at the frequencies it acts at, averaged over the kinds of noise that the
 /// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few.
-/// Every filmed channel may be off altogether by half of what its readings scatter by or a quarter
-/// of their own sigmas, positions also to the side the body leans to. Where the valley of
-/// chi-square bends within a standard deviation, the second moment of the bend is added.
+/// Every filmed channel may be off altogether, in all recordings alike, by half of what its
+/// readings scatter by or a quarter of their own sigmas, positions also to the side the face that
+/// is seen looks to. Where the valley of chi-square bends within a standard deviation, the second
+/// moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer; where

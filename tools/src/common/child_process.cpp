@@ -17,6 +17,8 @@ namespace trochoid::tools {
 namespace {
 
 constexpr const char* kNotStarted = "cannot be started: ";
+// Where signals of ended processes are ignored, the system does not keep their status.
+const std::string kUnknownEnd = "how the process ended is not known: SIGCHLD is ignored";
 
 /// In the child, between fork() and exec(), where nothing may be called that takes a lock.
 [[noreturn]] void end_unstarted(int error) {
@@ -76,9 +78,9 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
     run.seconds = elapsed.count();
     run.exit_status = waited == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     run.started = run.exit_status != 127;
-    if (waited == child && WIFSIGNALED(status)) {
+    if (waited != child || WIFSIGNALED(status)) {
       if (!run.error_output.empty() && run.error_output.back() != '\n') run.error_output += '\n';
-      run.error_output += ended_by(WTERMSIG(status)) + "\n";
+      run.error_output += (waited == child ? ended_by(WTERMSIG(status)) : kUnknownEnd) + "\n";
     }
     run.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
   }

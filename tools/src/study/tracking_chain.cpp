@@ -125,7 +125,7 @@ ChainRecording make_view(const fs::path& folder, const ReducedView& view, const 
          "-c:v", "libx264", "-qp", "8", "-preset", "veryfast", made.video.string()});
     if (!run.started || run.exit_status != 0)
       throw InputError("study chain needs the ffmpeg program to make smaller pictures: " +
-                       run.error_output);
+                       last_line(run.error_output));
   }
   const fs::path camera_file = work / "view.json";
   data::write_camera(made.camera, camera_file);

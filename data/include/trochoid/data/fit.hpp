@@ -103,7 +103,7 @@ struct Profile {
   /// -+infinity) on a side without a bound.
   double lower_95 = 0.0, upper_95 = 0.0;
   std::vector<double> values;      ///< ascending [the parameter's unit]
-  std::vector<double> delta_chi2;  ///< rise of chi-square there, correlated residuals allowed for
+  std::vector<double> delta_chi2;  ///< rise of chi-square there, common errors allowed for
 };
 
 /// Spread of one parameter over fits to resampled residuals.
