@@ -28,6 +28,11 @@ Eigen::Matrix3d attitude(const data::Pose<>& pose) {
       .toRotationMatrix();
 }
 
+// Lower end of the axle along the body's axis.
+double axle_foot(const data::Body& body) {
+  return body.l_m ? -*body.l_m : -body.half_thickness_m();
+}
+
 void meet_plane(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double z, double inner,
                 double outer, RayHit& hit) {
   if (along.z() == 0.0) return;
@@ -66,11 +71,43 @@ RayHit meet_body(const data::Body& body, const Eigen::Vector3d& from,
   if (body.inner_radius_m > 0.0) meet_wall(from, along, body.inner_radius_m, -h, h, -1.0, hit);
   if (body.axle_radius_m > 0.0) {
     const double top = h + body.axle_above_m;
-    const double foot = body.l_m ? -*body.l_m : -h;
-    meet_wall(from, along, body.axle_radius_m, foot, top, 1.0, hit);
+    meet_wall(from, along, body.axle_radius_m, axle_foot(body), top, 1.0, hit);
     meet_plane(from, along, top, 0.0, body.axle_radius_m, hit);
   }
   return hit;
+}
+
+// Whether a ray that is not level meets what lies between two heights and two radii.
+bool meets_tube(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double lowest,
+                double highest, double inner, double outer) {
+  const double one = (lowest - from.z()) / along.z(), other = (highest - from.z()) / along.z();
+  const double enters = std::max(0.0, std::min(one, other)), leaves = std::max(one, other);
+  if (leaves <= enters) return false;
+  const Eigen::Vector2d way = along.head<2>(), start = from.head<2>();
+  const double nearest =
+      std::clamp(-start.dot(way) / std::max(way.squaredNorm(), 1e-300), enters, leaves);
+  return (start + nearest * way).squaredNorm() < outer * outer &&
+         std::max((start + enters * way).squaredNorm(), (start + leaves * way).squaredNorm()) >
+             inner * inner;
+}
+
+// Whether a ray from outside meets the body anywhere.
+bool hides(const data::Body& body, const Eigen::Vector3d& from, const Eigen::Vector3d& along) {
+  if (along.z() == 0.0) return meet_body(body, from, along).distance < kNone;
+  const double h = body.half_thickness_m();
+  return meets_tube(from, along, -h, h, body.inner_radius_m, body.radius_m) ||
+         (body.axle_radius_m > 0.0 &&
+          meets_tube(from, along, axle_foot(body), h + body.axle_above_m, 0.0, body.axle_radius_m));
+}
+
+// How far the body reaches from its centre of mass.
+double reach_of(const data::Body& body) {
+  const double h = body.half_thickness_m();
+  double reach = std::hypot(body.radius_m, h);
+  if (body.axle_radius_m > 0.0)
+    reach = std::max({reach, std::hypot(body.axle_radius_m, h + body.axle_above_m),
+                      std::hypot(body.axle_radius_m, body.l_m.value_or(h))});
+  return reach;
 }
 
 float to_srgb(float light) {
@@ -101,6 +138,7 @@ cv::Mat make_texture(double grain_px, std::uint64_t seed) {
 struct PictureRenderer::Posed {
   Eigen::Matrix3d body_from_table;
   Eigen::Vector3d centre_m;
+  std::vector<Eigen::Vector3d> lamp;  ///< in body axes
 };
 
 /// What a ray meets.
@@ -112,7 +150,11 @@ struct PictureRenderer::Seen {
 };
 
 PictureRenderer::PictureRenderer(data::Body body, data::Camera camera, RenderStyle style)
-    : body_(std::move(body)), camera_(std::move(camera)), style_(style) {
+    : body_(std::move(body)),
+      camera_(std::move(camera)),
+      style_(style),
+      reach_m_(reach_of(body_)),
+      camera_m_(camera_.position_m()) {
   if (!(body_.radius_m > 0.0))
     throw InputError("render: body.radius_m must be positive; a body without a shape has no look");
   if (camera_.width_px < 16 || camera_.height_px < 16)
@@ -149,7 +191,7 @@ Eigen::Vector3d PictureRenderer::direction(double x_px, double y_px) const {
 /// Where the line of sight begins: at the camera, or where that has no centre above all there is.
 Eigen::Vector3d PictureRenderer::eye(double x_px, double y_px) const {
   constexpr double kAbove_m = 100.0;
-  if (camera_.projection == data::Camera::Projection::perspective) return camera_.position_m();
+  if (camera_.projection == data::Camera::Projection::perspective) return camera_m_;
   const data::Ray ray = camera_.ray_from_image({x_px, y_px});
   return ray.origin_m - kAbove_m * ray.direction;
 }
@@ -159,7 +201,9 @@ PictureRenderer::Seen PictureRenderer::trace(double x_px, double y_px, const Pos
   const Eigen::Vector3d origin = eye(x_px, y_px);
   Seen seen;
   seen.along = body.body_from_table * along;
-  seen.hit = meet_body(body_, body.body_from_table * (origin - body.centre_m), seen.along);
+  const Eigen::Vector3d from = origin - body.centre_m;
+  if (from.cross(along).squaredNorm() <= reach_m_ * reach_m_ * along.squaredNorm())
+    seen.hit = meet_body(body_, body.body_from_table * from, seen.along);
   const double to_floor = along.z() < 0.0 ? -origin.z() / along.z() : kNone;
   seen.floor_m = origin + std::min(to_floor, 1e3) * along;
   seen.body = seen.hit.distance < to_floor;
@@ -185,11 +229,20 @@ Eigen::Vector3f PictureRenderer::shade_body(const Seen& seen, const Posed& body)
   return lit * colour + Eigen::Vector3f::Constant(static_cast<float>(shine));
 }
 
+// Whether the body hides any of the lamp from a point of the floor: a sphere around it would.
+bool PictureRenderer::may_hide_lamp(const Eigen::Vector3d& to_body_m) const {
+  const double far_m = to_body_m.norm();
+  if (far_m <= reach_m_) return true;
+  const double aside_rad =
+      std::acos(std::clamp(to_body_m.dot(style_.light.normalized()) / far_m, -1.0, 1.0));
+  return aside_rad <= style_.lamp_radius_rad + std::asin(reach_m_ / far_m);
+}
+
 float PictureRenderer::floor_light(const Eigen::Vector3d& at_m, const Posed& body) const {
+  if (!may_hide_lamp(body.centre_m - at_m)) return 1.0F;
   const Eigen::Vector3d from = body.body_from_table * (at_m - body.centre_m);
   int lit = 0;
-  for (const Eigen::Vector3d& to : lamp_)
-    lit += meet_body(body_, from, body.body_from_table * to).distance == kNone ? 1 : 0;
+  for (const Eigen::Vector3d& to : body.lamp) lit += hides(body_, from, to) ? 0 : 1;
   return static_cast<float>(style_.ambient + (1.0 - style_.ambient) * lit / kLampPoints);
 }
 
@@ -256,58 +309,68 @@ cv::Rect PictureRenderer::window(const data::Pose<>& pose) const {
          cv::Rect(0, 0, camera_.width_px, camera_.height_px);
 }
 
+/// The surface a pixel's corner shows: 0 the floor, else faces, walls, axle (told apart by their
+/// normals) and marks (by the shade).
+int PictureRenderer::surface_at(double x_px, double y_px, const Posed& body) const {
+  const Seen seen = trace(x_px, y_px, body);
+  if (!seen.body) return 0;
+  if (std::abs(seen.hit.normal.z()) > 0.5) {
+    const bool marked =
+        !body_.marks.empty() && shade_body(seen, body).sum() > 1.5F * style_.body.sum();
+    return marked ? 2 : 1;
+  }
+  const bool axle =
+      seen.hit.at.head<2>().norm() < 0.5 * body_.radius_m && body_.inner_radius_m <= 0.0;
+  return axle ? 4 : 3;
+}
+
+/// Mean light of a pixel, from so many rays across it.
+cv::Vec3f PictureRenderer::light_of_pixel(const cv::Point& pixel, int across,
+                                          const Posed& body) const {
+  Eigen::Vector3f colour = Eigen::Vector3f::Zero();
+  int uncovered = 0;
+  for (int k = 0; k < across * across; ++k) {
+    const Seen seen = trace(pixel.x + (k % across + 0.5) / across - 0.5,
+                            pixel.y + (k / across + 0.5) / across - 0.5, body);
+    if (seen.body)
+      colour += shade_body(seen, body);
+    else
+      ++uncovered;
+  }
+  const auto rays = static_cast<float>(across * across);
+  colour /= rays;
+  cv::Vec3f value(colour.z(), colour.y(), colour.x());
+  if (uncovered == 0) return value;
+  const Eigen::Vector3d along = direction(pixel.x, pixel.y);
+  const Eigen::Vector3d origin = eye(pixel.x, pixel.y);
+  const float lit =
+      style_.shadow ? floor_light(origin - origin.z() / along.z() * along, body) : 1.0F;
+  return value + floor_.at<cv::Vec3f>(pixel) * (lit * static_cast<float>(uncovered) / rays);
+}
+
 void PictureRenderer::draw_body(const data::Pose<>& pose, float share, cv::Mat& sum) const {
   const cv::Rect box = window(pose);
   if (box.empty()) return;
-  const Posed posed{attitude(pose).transpose(), pose.centre_m};
-  // Surfaces seen at the corners of the pixels tell which pixels an edge passes through: faces and
-  // walls are told apart by their normals, marks by the shade.
+  Posed posed{attitude(pose).transpose(), pose.centre_m, {}};
+  for (const Eigen::Vector3d& to : lamp_) posed.lamp.push_back(posed.body_from_table * to);
   cv::Mat surface(box.height + 1, box.width + 1, CV_32SC1);
-  for (int y = 0; y <= box.height; ++y)
-    for (int x = 0; x <= box.width; ++x) {
-      const Seen seen = trace(box.x + x - 0.5, box.y + y - 0.5, posed);
-      int kind = 0;
-      if (seen.body) {
-        const bool face = std::abs(seen.hit.normal.z()) > 0.5;
-        const bool marked = face && !body_.marks.empty() &&
-                            shade_body(seen, posed).sum() > 1.5F * style_.body.sum();
-        const bool axle = !face && seen.hit.at.head<2>().norm() < 0.5 * body_.radius_m &&
-                          body_.inner_radius_m <= 0.0;
-        kind = face ? (marked ? 2 : 1) : (axle ? 4 : 3);
+  cv::parallel_for_(cv::Range(0, surface.rows), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y)
+      for (int x = 0; x < surface.cols; ++x)
+        surface.at<int>(y, x) = surface_at(box.x + x - 0.5, box.y + y - 0.5, posed);
+  });
+  // An edge passes through a pixel whose corners show several surfaces.
+  cv::parallel_for_(cv::Range(0, box.height), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y)
+      for (int x = 0; x < box.width; ++x) {
+        const int kind = surface.at<int>(y, x);
+        const bool even = kind == surface.at<int>(y, x + 1) && kind == surface.at<int>(y + 1, x) &&
+                          kind == surface.at<int>(y + 1, x + 1);
+        const cv::Point pixel(box.x + x, box.y + y);
+        const cv::Vec3f value = light_of_pixel(pixel, even ? 1 : style_.samples, posed);
+        sum.at<cv::Vec3f>(pixel) += share * (value - floor_.at<cv::Vec3f>(pixel));
       }
-      surface.at<int>(y, x) = kind;
-    }
-  const int n = style_.samples;
-  for (int y = 0; y < box.height; ++y)
-    for (int x = 0; x < box.width; ++x) {
-      const int kind = surface.at<int>(y, x);
-      const bool even = kind == surface.at<int>(y, x + 1) && kind == surface.at<int>(y + 1, x) &&
-                        kind == surface.at<int>(y + 1, x + 1);
-      const double px = box.x + x, py = box.y + y;
-      const cv::Vec3f plain = floor_.at<cv::Vec3f>(box.y + y, box.x + x);
-      Eigen::Vector3f colour = Eigen::Vector3f::Zero();
-      int uncovered = 0;
-      const int across = even ? 1 : n;
-      for (int k = 0; k < across * across; ++k) {
-        const Seen seen = trace(px + (k % across + 0.5) / across - 0.5,
-                                py + (k / across + 0.5) / across - 0.5, posed);
-        if (seen.body)
-          colour += shade_body(seen, posed);
-        else
-          ++uncovered;
-      }
-      colour /= static_cast<float>(across * across);
-      cv::Vec3f value(colour.z(), colour.y(), colour.x());
-      if (uncovered > 0) {
-        const Eigen::Vector3d along = direction(px, py);
-        const Eigen::Vector3d origin = eye(px, py);
-        const float lit =
-            style_.shadow ? floor_light(origin - origin.z() / along.z() * along, posed) : 1.0F;
-        value +=
-            plain * (lit * static_cast<float>(uncovered) / static_cast<float>(across * across));
-      }
-      sum.at<cv::Vec3f>(box.y + y, box.x + x) += share * (value - plain);
-    }
+  });
 }
 
 cv::Mat PictureRenderer::light(const std::vector<data::Pose<>>& during_exposure) const {

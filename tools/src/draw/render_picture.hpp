@@ -53,15 +53,21 @@ class PictureRenderer {
   [[nodiscard]] Eigen::Vector3d eye(double x_px, double y_px) const;
   [[nodiscard]] Seen trace(double x_px, double y_px, const Posed& body) const;
   [[nodiscard]] Eigen::Vector3f shade_body(const Seen& seen, const Posed& body) const;
+  [[nodiscard]] bool may_hide_lamp(const Eigen::Vector3d& to_body_m) const;
   [[nodiscard]] float floor_light(const Eigen::Vector3d& at_m, const Posed& body) const;
   [[nodiscard]] Eigen::Vector3f floor_colour(const Eigen::Vector3d& at_m) const;
   [[nodiscard]] cv::Rect window(const data::Pose<>& pose) const;
+  [[nodiscard]] int surface_at(double x_px, double y_px, const Posed& body) const;
+  [[nodiscard]] cv::Vec3f light_of_pixel(const cv::Point& pixel, int across,
+                                         const Posed& body) const;
   void draw_floor();
   void draw_body(const data::Pose<>& pose, float share, cv::Mat& sum) const;
 
   data::Body body_;
   data::Camera camera_;
   RenderStyle style_;
+  double reach_m_;                        ///< of the body, from its centre of mass
+  Eigen::Vector3d camera_m_;              ///< where it has a centre
   std::vector<Eigen::Vector3d> lamp_;     ///< directions towards points of the lamp
   std::vector<Eigen::Vector3d> corners_;  ///< ray directions at the pixels' corners
   cv::Mat texture_;                       ///< CV_32FC1, periodic
