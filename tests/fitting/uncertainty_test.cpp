@@ -134,8 +134,8 @@ TEST(FilmedTracks, MayBeOffAltogetherByHalfOfTheirScatter) {
   }
 }
 
-// A lamp shifts it to the side it leans to, wherever that is: then the top seems longer.
-TEST(FilmedTracks, MayBeOffTowardsTheSideTheBodyLeansTo) {
+// A lamp shifts it to the side its face looks to, wherever that is: then the top seems longer.
+TEST(FilmedTracks, MayBeOffTowardsTheSideTheirFaceLooksTo) {
   constexpr double kSigma_m = 1e-3, kTilt_rad = M_PI / 3.0;
   data::Track plain = thesis_track(25.0, kSigma_m, 4), seen = plain;
   for (data::TrackSample& sample : seen.samples)

@@ -128,6 +128,49 @@ TEST(PictureRenderer, ShowsTheMarkWhereTheSpinSays) {
   EXPECT_GT(green(at), 5.0F * green(opposite));
 }
 
+// Of a level body the shadow of a lamp aside is as large as its face, whichever its penumbra.
+TEST(PictureRenderer, CastsAShadowOfTheSizeOfTheFace) {
+  constexpr double kScale = 1000.0, kRadius_m = 0.03, kHeight_m = 0.1;
+  const data::Camera camera = data::Camera::from_scale(400, 160, kScale);
+  for (const double thickness_m : {0.0, 1e-6})
+    for (const double bore_m : {0.0, 0.012})
+      for (const double lamp_rad : {0.001, 0.1}) {
+        data::Body body = flat_disc();
+        body.thickness_m = thickness_m;
+        body.inner_radius_m = bore_m;
+        if (bore_m > 0.0) body.kind = data::BodyKind::ring;
+        RenderStyle style = plain();
+        style.shadow = true;
+        style.light = {1.0, 0.0, 1.0};
+        style.lamp_radius_rad = lamp_rad;
+        data::Pose<> pose;
+        pose.centre_m = {0.06, 0.0, kHeight_m};
+        const cv::Mat light = PictureRenderer(body, camera, style).light({pose});
+        const float floor = light.at<cv::Vec3f>(0, 0)[1];
+        double area_px2 = 0.0;
+        for (int y = 0; y < light.rows; ++y)
+          for (int x = 0; x < light.cols / 2; ++x)  // the body is in the other half
+            area_px2 += share(light, y, x, floor, static_cast<float>(style.ambient) * floor);
+        const double expected_px2 =
+            std::numbers::pi * kScale * kScale * (kRadius_m * kRadius_m - bore_m * bore_m);
+        // Of 190 pixels on its edge each counts whole or not at all: an error of 0.3 of one each.
+        EXPECT_NEAR(area_px2 / expected_px2, 1.0, 0.01)
+            << thickness_m << " m thick, bore " << bore_m << " m, lamp " << lamp_rad;
+      }
+}
+
+TEST(PictureRenderer, LightsTheUpperFaceOfABodyWithoutThickness) {
+  data::Body thin = flat_disc(), none = thin;
+  none.thickness_m = 0.0;
+  const data::Camera camera = data::Camera::from_scale(200, 160, 1000.0);
+  data::Pose<> pose;
+  pose.centre_m.z() = 1e-6;
+  const auto middle = [&](const data::Body& body) {
+    return PictureRenderer(body, camera, plain()).light({pose}).at<cv::Vec3f>(80, 100)[1];
+  };
+  EXPECT_FLOAT_EQ(middle(none), middle(thin));
+}
+
 TEST(PictureRenderer, RepeatsItselfForTheSameSeed) {
   RenderStyle style = plain();
   style.noise_levels = 2.0;

@@ -49,18 +49,18 @@ Ways along(int axis) {
 
 // To the side the face seen from above looks to, where its light differs; nowhere where that is not
 // seen.
-std::vector<Eigen::Vector2d> leaning(const ArcData& arc) {
+std::vector<Eigen::Vector2d> towards_seen_face(const ArcData& arc) {
   std::vector<Eigen::Vector2d> ways(arc.t_s.size(), Eigen::Vector2d::Zero());
-  double seen = 1.0;  // of a sample's faces, the one that axis 3 sticks out of, or -1
+  double upper = 1.0;  // axis 3 sticks out of the face that is seen; -1: out of the other
   int sample = -1;
   for (const Reading& reading : arc.readings) {
-    if (reading.sample != sample) seen = 1.0;
+    if (reading.sample != sample) upper = 1.0;
     sample = reading.sample;
     const double angle = reading.value[0];
-    if (reading.channel == Channel::theta && angle > 0.5 * data::kPi) seen = -1.0;
+    if (reading.channel == Channel::theta && angle > 0.5 * data::kPi) upper = -1.0;
     if (reading.channel == Channel::phi)
       ways[static_cast<std::size_t>(sample)] =
-          seen * Eigen::Vector2d(std::sin(angle), -std::cos(angle));
+          upper * Eigen::Vector2d(std::sin(angle), -std::cos(angle));
   }
   return ways;
 }
@@ -205,7 +205,7 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
     found.offsets.push_back(common_offset(problem, all, channel, along(0)));
     if (channel == Channel::position) {
       found.offsets.push_back(common_offset(problem, all, channel, along(1)));
-      found.offsets.push_back(common_offset(problem, all, channel, leaning));
+      found.offsets.push_back(common_offset(problem, all, channel, towards_seen_face));
     }
     if (found.channels.back().drift.gain > result.drift.gain)
       result.drift = found.channels.back().drift;

@@ -17,8 +17,8 @@ namespace trochoid::tools {
 namespace {
 
 constexpr const char* kNotStarted = "cannot be started: ";
-// Where signals of ended processes are ignored, the system does not keep their status.
-const std::string kUnknownEnd = "how the process ended is not known: SIGCHLD is ignored";
+// Where whoever started this program ignores SIGCHLD, the system does not keep it.
+constexpr const char* kUnknownEnd = "how the process ended is not known";
 
 /// In the child, between fork() and exec(), where nothing may be called that takes a lock.
 [[noreturn]] void end_unstarted(int error) {
@@ -80,7 +80,8 @@ ChildRun run_child(const std::vector<std::string>& arguments, const std::filesys
     run.started = run.exit_status != 127;
     if (waited != child || WIFSIGNALED(status)) {
       if (!run.error_output.empty() && run.error_output.back() != '\n') run.error_output += '\n';
-      run.error_output += (waited == child ? ended_by(WTERMSIG(status)) : kUnknownEnd) + "\n";
+      run.error_output += waited == child ? ended_by(WTERMSIG(status)) : kUnknownEnd;
+      run.error_output += '\n';
     }
     run.peak_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
   }

@@ -41,7 +41,7 @@ void meet_plane(const Eigen::Vector3d& from, const Eigen::Vector3d& along, doubl
   const Eigen::Vector3d p = from + t * along;
   const double r2 = p.head<2>().squaredNorm();
   if (r2 > outer * outer || r2 < inner * inner) return;
-  hit = {t, p, {0.0, 0.0, z > 0.0 ? 1.0 : -1.0}};
+  hit = {t, p, {0.0, 0.0, along.z() < 0.0 ? 1.0 : -1.0}};
 }
 
 // side +1: seen from outside, -1: the wall of a bore.
@@ -82,7 +82,7 @@ bool meets_tube(const Eigen::Vector3d& from, const Eigen::Vector3d& along, doubl
                 double highest, double inner, double outer) {
   const double one = (lowest - from.z()) / along.z(), other = (highest - from.z()) / along.z();
   const double enters = std::max(0.0, std::min(one, other)), leaves = std::max(one, other);
-  if (leaves <= enters) return false;
+  if (leaves <= 0.0 || leaves < enters) return false;  // equal where there is no thickness
   const Eigen::Vector2d way = along.head<2>(), start = from.head<2>();
   const double nearest =
       std::clamp(-start.dot(way) / std::max(way.squaredNorm(), 1e-300), enters, leaves);
@@ -281,12 +281,10 @@ void PictureRenderer::draw_floor() {
 
 /// Everything the body and its shadow may touch.
 cv::Rect PictureRenderer::window(const data::Pose<>& pose) const {
-  const double reach = std::hypot(body_.radius_m, body_.half_thickness_m()) +
-                       (body_.axle_radius_m > 0.0 ? body_.axle_above_m : 0.0);
   double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
   const auto include = [&](const Eigen::Vector3d& centre) {
-    for (const double dx : {-reach, reach})
-      for (const double dy : {-reach, reach}) {
+    for (const double dx : {-reach_m_, reach_m_})
+      for (const double dy : {-reach_m_, reach_m_}) {
         const Eigen::Vector2d p =
             camera_.image_from_table<double>(centre + Eigen::Vector3d(dx, dy, 0.0));
         left = std::min(left, p.x()), right = std::max(right, p.x());
@@ -294,11 +292,11 @@ cv::Rect PictureRenderer::window(const data::Pose<>& pose) const {
       }
   };
   for (const double up : {-1.0, 1.0})
-    include(pose.centre_m + Eigen::Vector3d(0.0, 0.0, up * reach));
+    include(pose.centre_m + Eigen::Vector3d(0.0, 0.0, up * reach_m_));
   if (style_.shadow)
     for (const Eigen::Vector3d& to : lamp_)
       if (to.z() > 0.1)
-        for (const double up : {0.0, reach}) {
+        for (const double up : {0.0, reach_m_}) {
           const double height = pose.centre_m.z() + up;
           include({pose.centre_m.x() - height * to.x() / to.z(),
                    pose.centre_m.y() - height * to.y() / to.z(), 0.0});
@@ -309,8 +307,8 @@ cv::Rect PictureRenderer::window(const data::Pose<>& pose) const {
          cv::Rect(0, 0, camera_.width_px, camera_.height_px);
 }
 
-/// The surface a pixel's corner shows: 0 the floor, else faces, walls, axle (told apart by their
-/// normals) and marks (by the shade).
+/// The surface a pixel's corner shows: 0 the floor, else a face or a wall (told apart by their
+/// normals), a mark (by its shade) or an axle (by how near the axis it is).
 int PictureRenderer::surface_at(double x_px, double y_px, const Posed& body) const {
   const Seen seen = trace(x_px, y_px, body);
   if (!seen.body) return 0;
