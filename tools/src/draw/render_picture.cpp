@@ -106,7 +106,7 @@ double reach_of(const data::Body& body) {
   double reach = std::hypot(body.radius_m, h);
   if (body.axle_radius_m > 0.0)
     reach = std::max({reach, std::hypot(body.axle_radius_m, h + body.axle_above_m),
-                      std::hypot(body.axle_radius_m, body.l_m.value_or(h))});
+                      std::hypot(body.axle_radius_m, axle_foot(body))});
   return reach;
 }
 
@@ -144,9 +144,8 @@ struct PictureRenderer::Posed {
 /// What a ray meets.
 struct PictureRenderer::Seen {
   bool body = false;
-  RayHit hit;               ///< in body axes
-  Eigen::Vector3d along;    ///< of the ray, in body axes
-  Eigen::Vector3d floor_m;  ///< where it would meet the floor
+  RayHit hit;             ///< in body axes
+  Eigen::Vector3d along;  ///< of the ray, in body axes
 };
 
 PictureRenderer::PictureRenderer(data::Body body, data::Camera camera, RenderStyle style)
@@ -154,6 +153,7 @@ PictureRenderer::PictureRenderer(data::Body body, data::Camera camera, RenderSty
       camera_(std::move(camera)),
       style_(style),
       reach_m_(reach_of(body_)),
+      to_lamp_(style_.light.normalized()),
       camera_m_(camera_.position_m()) {
   if (!(body_.radius_m > 0.0))
     throw InputError("render: body.radius_m must be positive; a body without a shape has no look");
@@ -161,13 +161,12 @@ PictureRenderer::PictureRenderer(data::Body body, data::Camera camera, RenderSty
     throw InputError("render: the camera says no picture size; give width and height");
   if (style_.samples < 1 || style_.times < 1)
     throw InputError("render: samples and times must be at least 1");
-  const Eigen::Vector3d middle = style_.light.normalized();
-  const Eigen::Vector3d u = middle.unitOrthogonal(), v = middle.cross(u);
+  const Eigen::Vector3d u = to_lamp_.unitOrthogonal(), v = to_lamp_.cross(u);
   constexpr double kGolden = 2.399963229728653;  // sunflower: even cover of a disc
   for (int i = 0; i < kLampPoints; ++i) {
     const double r = std::tan(style_.lamp_radius_rad) * std::sqrt((i + 0.5) / kLampPoints);
     lamp_.push_back(
-        (middle + r * std::cos(kGolden * i) * u + r * std::sin(kGolden * i) * v).normalized());
+        (to_lamp_ + r * std::cos(kGolden * i) * u + r * std::sin(kGolden * i) * v).normalized());
   }
   corners_.reserve(static_cast<std::size_t>(camera_.width_px + 1) * (camera_.height_px + 1));
   for (int y = 0; y <= camera_.height_px; ++y)
@@ -205,7 +204,6 @@ PictureRenderer::Seen PictureRenderer::trace(double x_px, double y_px, const Pos
   if (from.cross(along).squaredNorm() <= reach_m_ * reach_m_ * along.squaredNorm())
     seen.hit = meet_body(body_, body.body_from_table * from, seen.along);
   const double to_floor = along.z() < 0.0 ? -origin.z() / along.z() : kNone;
-  seen.floor_m = origin + std::min(to_floor, 1e3) * along;
   seen.body = seen.hit.distance < to_floor;
   return seen;
 }
@@ -220,7 +218,7 @@ Eigen::Vector3f PictureRenderer::shade_body(const Seen& seen, const Posed& body)
                                    mark.distance_m * std::sin(mark.angle_rad));
       if ((seen.hit.at.head<2>() - centre).norm() < mark.size_m) colour = style_.mark;
     }
-  const Eigen::Vector3d lamp = body.body_from_table * style_.light.normalized();
+  const Eigen::Vector3d lamp = body.body_from_table * to_lamp_;
   const double facing = std::max(0.0, seen.hit.normal.dot(lamp));
   const Eigen::Vector3d half = (lamp - seen.along.normalized()).normalized();
   const double shine =
@@ -233,8 +231,7 @@ Eigen::Vector3f PictureRenderer::shade_body(const Seen& seen, const Posed& body)
 bool PictureRenderer::may_hide_lamp(const Eigen::Vector3d& to_body_m) const {
   const double far_m = to_body_m.norm();
   if (far_m <= reach_m_) return true;
-  const double aside_rad =
-      std::acos(std::clamp(to_body_m.dot(style_.light.normalized()) / far_m, -1.0, 1.0));
+  const double aside_rad = std::acos(std::clamp(to_body_m.dot(to_lamp_) / far_m, -1.0, 1.0));
   return aside_rad <= style_.lamp_radius_rad + std::asin(reach_m_ / far_m);
 }
 

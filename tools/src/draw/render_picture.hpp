@@ -67,6 +67,7 @@ class PictureRenderer {
   data::Camera camera_;
   RenderStyle style_;
   double reach_m_;                        ///< of the body, from its centre of mass
+  Eigen::Vector3d to_lamp_;               ///< unit vector to its middle
   Eigen::Vector3d camera_m_;              ///< where it has a centre
   std::vector<Eigen::Vector3d> lamp_;     ///< directions towards points of the lamp
   std::vector<Eigen::Vector3d> corners_;  ///< ray directions at the pixels' corners
