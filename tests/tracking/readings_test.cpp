@@ -10,7 +10,7 @@ namespace {
 constexpr double kOff_rad = 0.3, kOff_m = 1e-3;  // between the two readings of a picture
 
 /// Finds either of two attitudes, whichever it is led to, the true one with more support or less.
-class TwoReadings final : public BodyFinder {
+class TwoReadings : public BodyFinder {
  public:
   /// @param of_the_way how far off the other one is really found, of how far off it should be.
   explicit TwoReadings(std::function<double(int)> bonus_of_truth, double of_the_way = 1.0)
@@ -43,10 +43,23 @@ class TwoReadings final : public BodyFinder {
   double found_rad_;
 };
 
+/// Of two attitudes that are each other's mirror image.
+class MirroredReadings final : public TwoReadings {
+ public:
+  using TwoReadings::TwoReadings;
+  [[nodiscard]] std::optional<data::Pose<>> mirror_image(const data::Pose<>& pose) const override {
+    data::Pose<> other = pose;
+    other.theta_rad += pose.theta_rad < kTilt + 0.5 * kOff_rad ? kOff_rad : -kOff_rad;
+    return other;
+  }
+};
+
 class Readings : public GlimpsedSequence {
  protected:
   /// As tracked, on the other edge where `wrong` says so, then chosen anew.
-  std::vector<Glimpse> chosen(const BodyFinder& finder, const std::function<bool(int)>& wrong) {
+  /// @param log_odds of all attitudes to their mirror images.
+  std::vector<Glimpse> chosen(const BodyFinder& finder, const std::function<bool(int)>& wrong,
+                              double log_odds = 0.0) {
     auto glimpses = tracked(finder, [](int) { return false; });
     for (Glimpse& g : glimpses) {
       Sighting guess = *g.seen;
@@ -54,6 +67,7 @@ class Readings : public GlimpsedSequence {
       Look look{.frame = *g.frame, .background = background_.plate()};
       look.predicted = &guess;
       g.seen = finder.find(look);
+      g.attitude_log_odds = log_odds;
     }
     (void)choose_readings(background_, finder, glimpses);
     return glimpses;
@@ -98,6 +112,14 @@ TEST_F(Readings, AStretchThatLeavesThePathIsLedBackThoughALittleMoreSpeaksForIt)
 TEST_F(Readings, ALeapStaysThatThePicturesBearOut) {
   const TwoReadings finder([](int i) { return i < 30 ? 10.0 : -10.0; });
   EXPECT_EQ(count_off(chosen(finder, [](int i) { return i >= 30; })), 30);
+}
+
+// Whether it was seen mirrored is decided by more than how well outlines fit.
+TEST_F(Readings, AStretchWhoseMirrorImageFitsBetterStaysWhereAllPicturesDecided) {
+  const MirroredReadings finder([](int i) { return i >= 20 && i < 40 ? -30.0 : 5.0; });
+  const auto as_it_is = [](int) { return false; };
+  ASSERT_GT(count_off(chosen(finder, as_it_is)), 15);
+  EXPECT_EQ(count_off(chosen(finder, as_it_is, 20.0)), 0);
 }
 
 TEST_F(Readings, WhatNoPictureTellsApartIsHeldByTheErrorOfTheTilt) {

@@ -418,6 +418,7 @@ class Chain {
     on_all_cores(background_, finder_, nodes_.size(), [&](Measuring& measure, std::size_t i) {
       AttitudeNode& node = nodes_[i];
       if (node.tilt_rad < kLeastTilt) return;
+      glimpses_[node.at].attitude_log_odds = std::abs(margin_[i]);
       auto& seen = glimpses_[node.at].seen;
       if (node.again) seen.swap(node.again);
       std::optional<Sighting>& other = node.other;

@@ -15,6 +15,8 @@ namespace trochoid::tracking {
 struct Glimpse {
   const Frame* frame = nullptr;
   std::optional<Sighting> seen{};
+  /// Log odds of its attitude to the mirror image, by all frames together; 0: not known.
+  double attitude_log_odds = 0.0;
 
   [[nodiscard]] bool posed() const { return seen && seen->pose; }
   [[nodiscard]] const data::Pose<>& pose() const { return seen->pose->pose; }

@@ -29,6 +29,7 @@ struct ReadingNode {
   std::size_t at;  ///< among the glimpses
   double t_s;
   std::vector<Sighting> readings;
+  std::optional<Pose> rejected;  ///< mirror image of the first, where that is surely wrong
   std::size_t chosen = 0;
 
   [[nodiscard]] const Sighting& seen() const { return readings[chosen]; }
@@ -60,7 +61,9 @@ class Readings {
         glimpses_(glimpses),
         alike_(finder.faces_look_alike()) {
     for (std::size_t i = 0; i < glimpses.size(); ++i)
-      if (glimpses[i].posed()) nodes_.push_back({i, glimpses[i].frame->t_s, {*glimpses[i].seen}});
+      if (glimpses[i].posed())
+        nodes_.push_back(
+            {i, glimpses[i].frame->t_s, {*glimpses[i].seen}, rejected_attitude(glimpses[i])});
     if (nodes_.size() > 1) frame_s_ = data::usual_step_s(nodes_, &ReadingNode::t_s);
   }
 
@@ -117,12 +120,28 @@ class Readings {
       known.push_back(std::move(seen));
   }
 
+  /// The mirror image where all frames together clearly decided against it: by more than how well
+  /// outlines fit.
+  [[nodiscard]] std::optional<Pose> rejected_attitude(const Glimpse& glimpse) const {
+    constexpr double kSure = 6.0;
+    return glimpse.attitude_log_odds > kSure ? finder_.mirror_image(glimpse.pose()) : std::nullopt;
+  }
+
+  [[nodiscard]] bool is_rejected(std::size_t k, const Sighting& seen) const {
+    constexpr double kNearer = 0.5;
+    const ReadingNode& node = nodes_[k];
+    if (!node.rejected) return false;
+    const Eigen::Vector3d axis = axis_of(seen.pose->pose);
+    return between_axes(axis, axis_of(*node.rejected), alike_) <
+           kNearer * between_axes(axis, axis_of(node.readings[0].pose->pose), alike_);
+  }
+
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t k,
                                                  const Pose& pose, const Pose& near) const {
     Sighting guess = nodes_[k].seen();
     guess.pose->pose = pose;
     auto seen = measure(*glimpses_[nodes_[k].at].frame, std::move(guess), near);
-    return seen && seen->pose ? std::move(seen) : std::nullopt;
+    return seen && seen->pose && !is_rejected(k, *seen) ? std::move(seen) : std::nullopt;
   }
 
   /// A pose of frame k one frame earlier (side 1) or later, moving as the body was seen to.
