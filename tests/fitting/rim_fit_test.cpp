@@ -627,6 +627,13 @@ TEST(RimFit, WarnsOfATrackShorterThanANutation) {
   EXPECT_THAT(fitting::fit(std::span(&whole.track, 1), whole.scene).warnings, testing::Not(warned));
 }
 
+// 1.08 turns; at the rate of its first frame it would be 0.91.
+TEST(RimFit, CountsTheTurnsOfABodyThatBeginsSlowly) {
+  const Case c = noisy("s06_roll_disc", 0.24, 2e-5);
+  EXPECT_THAT(fitting::fit(std::span(&c.track, 1), c.scene).warnings,
+              testing::Not(testing::Contains(testing::HasSubstr("turns of the node line"))));
+}
+
 // (theta, phi) and (pi - theta, phi + pi) are one attitude of a plain disc.
 TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
   const Case c = noisy("s06_roll_disc", 1.0, 2e-4);

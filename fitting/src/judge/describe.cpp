@@ -98,13 +98,27 @@ void warn_short_top(const Problem& problem, data::Fit& fit) {
       periods));
 }
 
+// From the first frame to the last as predicted: the rate at the first one says little of a body
+// that nutates widely or speeds up as it falls.
+double turns_of_node_line(const Problem& problem, const Eigen::VectorXd& u) {
+  const ArcData& arc = problem.arcs[0];
+  model::PredictRequest request;
+  request.t_s = arc.t_s;
+  request.start_s = arc.start_s;
+  request.observables = {model::Observable::phi_rad};
+  request.tolerance = problem.tolerance;
+  request.rolls_at_first = problem.rolls_at_first;
+  const Eigen::VectorXd phi = problem.predictor->predict(problem.values(0, u), request).values;
+  double turned = 0.0;
+  for (Eigen::Index i = 1; i < phi.size() && std::isfinite(phi[i]); ++i)
+    turned += std::abs(std::remainder(phi[i] - phi[i - 1], data::kTurn));
+  return turned / data::kTurn;
+}
+
 // A rolling body's nutation is about as fast as its node line turns.
-void warn_short_rim(const Problem& problem, data::Fit& fit) {
-  const auto* w2 = fit.find("w2_rad_s");
-  const auto* theta = fit.find("theta_rad");
-  if (w2 == nullptr || theta == nullptr) return;
-  const double rate = std::abs(w2->value) / std::max(std::sin(theta->value), 1e-6);
-  const double turns = problem.arcs[0].duration_s() * rate / data::kTurn;
+void warn_short_rim(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
+  if (problem.predictor->index_of("w2_rad_s") < 0) return;
+  const double turns = turns_of_node_line(problem, u);
   if (turns >= 1.0) return;
   fit.warnings.push_back(fmt::format(
       "the track is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and "
@@ -155,7 +169,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   describe_arcs(problem, fit);
   warn(problem, error, fit);
   tell_whether_one_friction(problem, fit);
-  warn_short_rim(problem, fit);
+  warn_short_rim(problem, solution.u, fit);
   warn_thick_air(scene, fit);
   add_derived_velocity(problem, solution.u, error.covariance, fit);
   if (!fit.model.starts_with("top")) return;
