@@ -105,6 +105,7 @@ void model_keys(Visit&& visit) {
   visit("gap_viscosity_Pa_s", &M::gap_viscosity_Pa_s, kNonNegative);
   visit("friction", &M::friction, kNonNegative);
   visit("slip_regularisation_m_s", &M::slip_regularisation_m_s, kNonNegative);
+  visit("contact_radius_m", &M::contact_radius_m, kSize);
   visit("rolling_friction_m", &M::rolling_friction_m, kNonNegative);
   visit("pivoting_friction_m", &M::pivoting_friction_m, kNonNegative);
   visit("contour_friction_m", &M::contour_friction_m, kNonNegative);

@@ -28,6 +28,7 @@ const std::vector<Readers>& readers() {
       {"model.gap_viscosity_Pa_s", rim},
       {"model.friction", {"sliding", "puck"}},
       {"model.slip_regularisation_m_s", rim},
+      {"model.contact_radius_m", {"puck"}},
       {"model.rolling_friction_m", rim},
       {"model.pivoting_friction_m", rim},
       {"model.contour_friction_m", rim},

@@ -70,7 +70,7 @@ PuckScene puck_scene(const data::Scene& scene) {
                             start.w3_rad_s.value_or(start.dpsi_rad_s.value_or(0.0)),
                             *scene.model.friction,
                             scene.model.air_force_N_s_m.value_or(0.0),
-                            puck.radius_m};
+                            scene.model.contact_radius_m.value_or(puck.radius_m)};
   std::copy(std::begin(initial), std::end(initial), puck.value);
   return puck;
 }
@@ -279,11 +279,12 @@ Trajectory simulate_puck(const data::Scene& scene) {
   for (std::size_t n = 0; n < path.rows.size(); ++n) {
     using P = Puck<double>;
     const auto& s = path.rows[n];
-    const double w = s[P::q] / puck.radius_m, m = puck.mass_kg;
+    const double w = s[P::q] / puck.value[kContact], m = puck.mass_kg;
     std::vector<double> row{t_s[n], 0.0, 0.0,     s[P::psi], 0.0,
                             0.0,    w,   s[P::x], s[P::y],   puck.height_m};
     const double kinetic =
-        0.5 * m * (s[P::vx] * s[P::vx] + s[P::vy] * s[P::vy] + puck.gyration * s[P::q] * s[P::q]);
+        0.5 * m *
+        (s[P::vx] * s[P::vx] + s[P::vy] * s[P::vy] + value_of(system.gyration) * s[P::q] * s[P::q]);
     if (puck.mass_known) row.push_back(kinetic + m * puck.gravity * puck.height_m);
     row.insert(row.end(), {w, s[P::vx], s[P::vy]});
     if (puck.mass_known) {

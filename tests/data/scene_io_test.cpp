@@ -18,7 +18,7 @@ thickness_m = 0.008
 mass_kg = 0.0337
 I_kg_m2 = 1
 Is_kg_m2 = 1.5
-mark = { distance_m = 0.02, size_m = 0.004, angle_deg = 90, faces = "both" }
+mark = { distance_m = 0.0285, size_m = 0.001, angle_deg = 90, faces = "both" }
 
 [support]
 kind = "floor"
@@ -148,6 +148,7 @@ air_force_N_s_m = 0.5
 gap_viscosity_Pa_s = 1.8e-05
 friction = 0.25
 slip_regularisation_m_s = 0.001
+contact_radius_m = 0.0234375
 rolling_friction_m = 0.0001
 pivoting_friction_m = 0.0002
 contour_friction_m = 0.0003
@@ -290,6 +291,12 @@ INSTANTIATE_TEST_SUITE_P(
         RefusedScene{"ZeroMass", "[body]\nradius_m = 1\nmass_kg = 0", ":3:", "mass_kg = 0"},
         RefusedScene{"MarkOutside", "[body]\nradius_m = 1\nmark = {distance_m = 2, size_m = 0.1}",
                      ":3:", "outside radius_m"},
+        RefusedScene{"MarkInTheBore",
+                     "[body]\nkind = 'ring'\nradius_m = 1\ninner_radius_m = 0.8\n"
+                     "mark = {distance_m = 0.5, size_m = 0.1}",
+                     ":5:", "into the bore"},
+        RefusedScene{"HeightWithoutScale", "[camera]\nheight_m = 1.2",
+                     ":2:", "height_m needs scale_px_per_m"},
         RefusedScene{"MarkWithoutSize", "[body]\nradius_m = 1\nmark = {distance_m = 0.2}",
                      ":3:", "size_m"},
         RefusedScene{"MarkNoTable", "[body]\nradius_m = 1\nmark = 3", ":3:", "must be a table"},

@@ -42,7 +42,8 @@ const Keys& disc_on_its_face() {
   static const Keys keys{{"body.radius_m", "0.03"},
                          {"body.mass_kg", "0.03"},
                          {"model.friction", "0.05"},
-                         {"start.vx_m_s", "0.3"}};
+                         {"start.vx_m_s", "0.3"},
+                         {"start.w3_rad_s", "2"}};
   return keys;
 }
 const Keys& disc_on_a_pin() {
@@ -88,8 +89,8 @@ TEST_P(IdleKeys, AreThoseThatChangeNothing) {
                {"start.w2_rad_s", "4"},
                {"start.w3_rad_s", "4"}};
   for (const char* term :
-       {"air_force_N_s_m", "gap_viscosity_Pa_s", "friction", "rolling_friction_m",
-        "pivoting_friction_m", "contour_friction_m", "spin_down_dry_rad_s2",
+       {"air_force_N_s_m", "gap_viscosity_Pa_s", "friction", "contact_radius_m",
+        "rolling_friction_m", "pivoting_friction_m", "contour_friction_m", "spin_down_dry_rad_s2",
         "spin_down_viscous_1_s", "spin_down_quadratic_1_rad", "spin_down_imbalance_sin_rad_s2",
         "spin_down_imbalance_cos_rad_s2"})
     changes[std::string("model.") + term] = "2e-4";

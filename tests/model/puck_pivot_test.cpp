@@ -138,6 +138,24 @@ TEST(Puck, SpinsDownUniformlyInPlace) {
   EXPECT_EQ(column(run, "x_m")[100], 0.1);
 }
 
+// The couple is that of the ground it covers, the inertia that of the whole body.
+TEST(Puck, SpinsDownMoreSlowlyOnASmallerContact) {
+  constexpr double kContact_m = 0.01;
+  data::Scene scene = puck_scene();
+  scene.body->mass_kg = 0.1;
+  scene.model.contact_radius_m = kContact_m;
+  scene.start.vx_m_s = scene.start.vy_m_s = 0.0;
+  scene.start.w3_rad_s = -10.0;
+  const Trajectory run = simulate(scene);
+  const double a = 0.2 * 9.81 * 4.0 / (3.0 * 0.03) * kContact_m / 0.03;
+  const double t_s = 0.2, w_rad_s = -10.0 + a * t_s;
+  EXPECT_NEAR(column(run, "w3_rad_s")[20], w_rad_s, kAngle_rad);
+  EXPECT_NEAR(column(run, "psi_rad")[20], 0.3 - 10.0 * t_s + 0.5 * a * t_s * t_s, kAngle_rad);
+  const double lost_J = column(run, "energy_J")[0] - column(run, "energy_J")[20];
+  const double axial_kg_m2 = 0.5 * 0.1 * 0.03 * 0.03;
+  EXPECT_NEAR(lost_J, 0.5 * axial_kg_m2 * (100.0 - w_rad_s * w_rad_s), 1e-12);
+}
+
 // The uniform disc comes to rest in both motions at once, with e -> 0.653 [Farkas2003].
 TEST(Puck, EndsBothMotionsTogetherAtTheKnownRatio) {
   Puck<double> puck;

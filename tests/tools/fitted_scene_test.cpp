@@ -101,6 +101,51 @@ omega_s_rad_s = 60.0
                            {"pivot_x_m", 0.003}}));
 }
 
+// Whose moments the shape would give, about the centre.
+TEST(FittedScene, RunsADiscOnAnAxleByItsGroupsNotItsShape) {
+  expect_same_path(fit_of(R"(
+[body]
+kind = "disc"
+radius_m = 0.03
+thickness_m = 0.008
+mass_kg = 0.06
+l_m = 0.045
+[support]
+kind = "pivot"
+pivot_m = [0.004, -0.003, 0.025]
+[model]
+name = "top"
+drag_spin_N_m_s = 1e-7
+[start]
+theta_rad = 0.5
+omega_s_rad_s = 150.0
+)",
+                          {{"a_1_s2", 190.0},
+                           {"b_1_s", 31.0},
+                           {"l_m", 0.044},
+                           {"gamma3_1_s", 0.02},
+                           {"omega_s_rad_s", 155.0},
+                           {"dphi_rad_s", -4.0}}));
+}
+
+TEST(FittedScene, RunsAPuckOnTheContactThatWasFitted) {
+  expect_same_path(fit_of(R"(
+[body]
+kind = "disc"
+radius_m = 0.02
+thickness_m = 0.006
+[support]
+kind = "flat"
+[model]
+name = "puck"
+friction = 0.1
+[start]
+vx_m_s = 1.2
+w3_rad_s = 20.0
+)",
+                          {{"contact_radius_m", 0.012}, {"friction", 0.08}}));
+}
+
 TEST(FittedScene, SaysHowManyArcsThereAre) {
   try {
     (void)fitted_scene(data::Fit{}, 0);

@@ -36,6 +36,7 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
     {"gap_viscosity_Pa_s", &ModelSettings::gap_viscosity_Pa_s},
     {"friction", &ModelSettings::friction},
     {"slip_regularisation_m_s", &ModelSettings::slip_regularisation_m_s},
+    {"contact_radius_m", &ModelSettings::contact_radius_m},
     {"rolling_friction_m", &ModelSettings::rolling_friction_m},
     {"pivoting_friction_m", &ModelSettings::pivoting_friction_m},
     {"contour_friction_m", &ModelSettings::contour_friction_m},
@@ -64,14 +65,16 @@ void set_air(const data::Fit& fit, const std::string& name, std::size_t arc,
   couple = value;
 }
 
-/// A top's motion depends on a = m g l / I, b = Is omega_s / I and l: bodies that have these.
+/// A top's motion depends on a = m g l / I, b = Is omega_s / I and l: bodies that have these. Its
+/// moments are about the pivot, whatever the scene's body looks like.
 void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
   constexpr double kAnySpin_rad_s = 1.0;
   const auto a = value_of(fit, "a_1_s2", arc), b = value_of(fit, "b_1_s", arc),
              l = value_of(fit, "l_m", arc);
   if (!a || !b || !l) return;
-  if (!scene.body) scene.body.emplace().kind = data::BodyKind::top;
+  if (!scene.body) scene.body.emplace();
   data::Body& body = *scene.body;
+  body.kind = data::BodyKind::top;
   const double weight_arm_m2_s2 = scene.model.gravity_m_s2 * *l;
   body.l_m = *l;
   body.I_kg_m2 = body.mass_kg ? *body.mass_kg * weight_arm_m2_s2 / *a : 1.0;
@@ -121,12 +124,6 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   set_air(fit, "air_linear_N_m_s", arc, scene.model.air_linear_N_m_s);
   set_air(fit, "air_quadratic_N_m_s2", arc, scene.model.air_quadratic_N_m_s2);
   if (fit.model == "top" || fit.model == "top-euler") set_top(fit, arc, scene);
-  const data::FitParameter* contact = fit.find("contact_radius_m");
-  if (contact != nullptr && contact->status == data::ParameterStatus::free)
-    throw InputError(fmt::format(
-        "the fit found the puck to touch the floor on a radius of {:.4g} m; a scene's puck touches "
-        "it on all of its face. Fix contact_radius_m in the fit to simulate it",
-        contact->value));
   scene.run.until_s = time_factor(fit) * (fit.arcs[arc].to_s - arc_start_s(fit, arc));
   return scene;
 }

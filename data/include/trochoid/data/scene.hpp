@@ -51,6 +51,7 @@ struct ModelSettings {
   std::optional<double> gap_viscosity_Pa_s;             ///< eta: gap layer of [Moffatt2000]
   std::optional<double> friction;                       ///< mu
   std::optional<double> slip_regularisation_m_s;        ///< eps_v; absent or 0 = exact Coulomb law
+  std::optional<double> contact_radius_m;               ///< of a puck; absent: all of its face
   std::optional<double> rolling_friction_m;             ///< mu_r
   std::optional<double> pivoting_friction_m;            ///< mu_p
   std::optional<double> contour_friction_m;             ///< mu_c
