@@ -18,11 +18,17 @@ std::optional<BodyFault> fault_of(const Body& body, const BodyKeys& keys) {
     return BodyFault{keys.axle_radius,
                      fmt::format("{} = {} must be smaller than {} = {}", keys.axle_radius,
                                  body.axle_radius_m, keys.radius, body.radius_m)};
-  for (const SpinMark& mark : body.marks)
+  for (const SpinMark& mark : body.marks) {
     if (mark.distance_m > body.radius_m)
       return BodyFault{keys.marks,
                        fmt::format("the mark's {} = {} lies outside {} = {}", keys.mark_distance,
                                    mark.distance_m, keys.radius, body.radius_m)};
+    if (mark.distance_m + mark.size_m <= body.inner_radius_m)
+      return BodyFault{
+          keys.marks,
+          fmt::format("the mark's {} = {} puts all of it into the bore of {} = {}",
+                      keys.mark_distance, mark.distance_m, keys.inner_radius, body.inner_radius_m)};
+  }
   return std::nullopt;
 }
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "json_read.hpp"
 #include "trochoid/data/io.hpp"
@@ -63,6 +65,34 @@ Transfer transfer_of(const JsonReader& json) {
   json.fail("\"transfer\" must be sRGB or linear");
 }
 
+// That some of the picture shows the floor, from above.
+void check_view(const JsonReader& json, const Camera& camera) {
+  if (camera.projection == Camera::Projection::orthographic) return;
+  constexpr double kWidest = 57.0;  // tan 89 deg: no lens looks farther to the side
+  for (const auto& [key, centre, size, focal] :
+       {std::tuple{"cx", camera.cx, camera.width_px, camera.fx},
+        std::tuple{"cy", camera.cy, camera.height_px, camera.fy}})
+    if (std::max(std::abs(centre), std::abs(size - centre)) > kWidest * focal)
+      json.fail(fmt::format(
+          "\"{}\" = {} lies so far outside a picture of {} px that nothing is seen there", key,
+          centre, size));
+  const Eigen::Matrix3d table_from_camera = camera.camera_from_table.transpose();
+  const double height_m = -(table_from_camera * camera.camera_from_table_m).z();
+  if (!(height_m > 0.0))
+    json.fail(
+        fmt::format("the camera is {:.4g} m below the floor, which is z = 0 of R_world_to_cam and "
+                    "t_world_to_cam_m",
+                    -height_m));
+  const auto looks_down = [&](double u, double v) {
+    const Eigen::Vector3d ray{(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
+    return (table_from_camera * ray).z() < 0.0;
+  };
+  for (const double u : {0.0, 1.0 * camera.width_px})
+    for (const double v : {0.0, 1.0 * camera.height_px})
+      if (looks_down(u, v)) return;
+  json.fail("the camera of \"R_world_to_cam\" looks up: no part of its picture shows the floor");
+}
+
 }  // namespace
 
 Camera read_camera(const std::filesystem::path& path) {
@@ -84,6 +114,7 @@ Camera read_camera(const std::filesystem::path& path) {
   camera.camera_from_table = rotation(json, "R_world_to_cam");
   const auto t = json.numbers("t_world_to_cam_m", 3);
   camera.camera_from_table_m = {t[0], t[1], t[2]};
+  check_view(json, camera);
   if (json.has("fps")) camera.frame_rate_hz = positive(json, "fps");
   if (json.has("shutter_fraction_of_frame")) {
     camera.exposure_fraction = json.number("shutter_fraction_of_frame");

@@ -84,7 +84,13 @@ void check_support(const TableReader& reader, Support& support, const std::optio
 }
 
 void check_camera(const TableReader& reader, const CameraSettings& camera) {
-  if (camera.file.empty()) return;
+  if (camera.file.empty()) {
+    if (reader.has("height_m") && !reader.has("scale_px_per_m"))
+      reader.fail("height_m",
+                  "height_m needs scale_px_per_m, the pixels per metre on the floor: how large a "
+                  "body looks gives no focal length");
+    return;
+  }
   for (const char* key : {"scale_px_per_m", "height_m"})
     if (reader.has(key))
       reader.fail(key,

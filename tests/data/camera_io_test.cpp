@@ -17,6 +17,12 @@ std::string with(const std::string& from, const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
 }
 
+std::string looking_up() {
+  const std::string down = "[0, -1, 0], [0, 0, -1]", height = "0.62";
+  std::string text = with(down, "[0, 1, 0], [0, 0, 1]");
+  return text.replace(text.find(height), height.size(), "-0.62");
+}
+
 TEST(CameraFile, KeepsEverythingThroughAFile) {
   const TestFolder folder;
   const Camera camera = read_camera(folder.write("c.json", kCamera));
@@ -84,6 +90,10 @@ INSTANTIATE_TEST_SUITE_P(
                     RefusedCamera{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
                     RefusedCamera{"UnknownCurve", with("\"linear\"", "\"log\""),
                                   "\"transfer\" must be sRGB or linear"},
+                    RefusedCamera{"CentreFarOutside", with("406.3", "1e6"),
+                                  "\"cx\" = 1000000 lies so far outside a picture of 800 px"},
+                    RefusedCamera{"BelowTheFloor", with("0.62", "-0.62"), "m below the floor"},
+                    RefusedCamera{"LooksUp", looking_up(), "looks up"},
                     RefusedCamera{"LongShutter", with("0.25", "2.5"), "0..1"},
                     RefusedCamera{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
     [](const auto& instance) { return instance.param.name; });
