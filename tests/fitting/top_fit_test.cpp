@@ -406,6 +406,41 @@ TEST(TopFit, TakesTheSpinFromAPriorToTellTheMoments) {
   EXPECT_NEAR(ratio->sigma / ratio->value, std::hypot(0.01, b->sigma / b->value), kSecondOrder);
 }
 
+TEST(TopFit, CombinesASpinKnownBeforehandWithThatOfTheMoments) {
+  data::Scene scene = top_scene();
+  scene.body.emplace().kind = data::BodyKind::top;
+  scene.fit.prior["I_kg_m2"] = {4e-4, 4e-6};
+  scene.fit.prior["Is_kg_m2"] = {1e-4, 1e-9};
+  const data::Fit alone = fit_one(track_of({}), scene);
+  const data::FitParameter* spin = alone.find("omega_s_rad_s");
+  ASSERT_NE(spin, nullptr);
+  EXPECT_LT(pull(alone, "omega_s_rad_s", 3.0), kFar);
+  scene.fit.prior["omega_s_rad_s"] = {3.0, spin->sigma};
+  const data::Fit both = fit_one(track_of({}), scene);
+  EXPECT_NEAR(both.find("omega_s_rad_s")->value, 0.5 * (spin->value + 3.0), 1e-6);
+  EXPECT_NEAR(both.find("omega_s_rad_s")->sigma, spin->sigma / std::sqrt(2.0), 1e-6);
+  const auto contradicts = testing::Contains(testing::HasSubstr("contradict each other"));
+  EXPECT_THAT(both.warnings, testing::Not(contradicts));
+  scene.fit.prior["omega_s_rad_s"] = {4.0, 0.03};
+  EXPECT_THAT(fit_one(track_of({}), scene).warnings, contradicts);
+}
+
+// Of a disc the moments are given about its centre, b has those about the pivot.
+TEST(TopFit, TellsTheSpinOfADiscByItsMomentsAboutThePivot) {
+  const data::Fit groups = fit_one(track_of({}));
+  const double l_m = groups.find("l_m")->value;
+  data::Scene scene = top_scene();
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.05;
+  body.mass_kg = 0.1;
+  body.I_kg_m2 = 2e-5;
+  body.Is_kg_m2 = 3e-5;
+  const data::Fit result = fit_one(track_of({}), scene);
+  const double ratio = (2e-5 + 0.1 * l_m * l_m) / 3e-5;
+  EXPECT_NEAR(result.find("omega_s_rad_s")->value, ratio * result.find("b_1_s")->value,
+              1e-6 * ratio);
+}
+
 TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
   data::Scene scene = top_scene();
   for (const auto& [name, value] : kThesis) scene.fit.fixed[name] = value;
@@ -469,6 +504,34 @@ TEST(TopFit, FollowsASpinThatDies) {
   EXPECT_LT(pull(result, "gamma3_1_s", 1.5e-6 / 2.7e-5), kFar);
   EXPECT_LT(pull(result, "I_over_Is", 5.0), kFar);
   EXPECT_LT(result.find("omega_s_rad_s")->sigma, 0.1);
+}
+
+// The rendered top's truth, of another program: it loses nothing. The scene knows nothing of its
+// spin, by which the first value of the drag should have been scaled.
+TEST(TopFit, HoldsADragThatIsNotThereAtNothing) {
+  constexpr double kPath_m = 2e-5, kAngle_rad = 3e-3;
+  const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/samples/s5_top_marker/";
+  data::Scene scene = data::read_scene(base + "scene.toml");
+  const data::Table table = data::read_table(base + "truth.csv");
+  const Eigen::VectorXd t = table.column("t"), x = table.column("x_m"), y = table.column("y_m"),
+                        psi = table.column("psi_rad");
+  std::mt19937_64 generator(8);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (Eigen::Index i = 0; i < t.size(); ++i) {
+    data::TrackSample sample;
+    sample.t_s = t[i];
+    sample.centre_m = {x[i] + kPath_m * normal(generator), y[i] + kPath_m * normal(generator)};
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPath_m * kPath_m;
+    sample.psi = data::MeasuredAngle{psi[i] + kAngle_rad * normal(generator), kAngle_rad};
+    track.samples.push_back(sample);
+  }
+  const data::Fit plain = fit_one(track, scene);
+  scene.model.drag_spin_quadratic_N_m_s2 = 0.0;
+  const data::Fit result = fit_one(track, scene);
+  ASSERT_TRUE(plain.converged && result.converged) << result.reason;
+  EXPECT_LT(result.chi2, plain.chi2 + 1.0);
+  EXPECT_LT(pull(result, "omega_s_rad_s", 155.0), kFar);
 }
 
 // A first value is no more than that: the answer is the same from drags that would stop the top

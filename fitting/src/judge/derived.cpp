@@ -1,5 +1,7 @@
 #include "judge/derived.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -80,6 +82,26 @@ void add(data::Fit& fit, const std::string& name, const std::string& unit, const
   fit.parameters.push_back(parameter);
 }
 
+void tell_contradiction(const Given& one, const Given& other, const std::string& what,
+                        data::Fit& fit) {
+  constexpr double kContradicts = 4.0;
+  const double apart = std::abs(one.value - other.value),
+               sigma = std::hypot(one.sigma, other.sigma);
+  if (apart > kContradicts * sigma)
+    fit.warnings.push_back(
+        fmt::format("{} contradict each other: {:.5g} ± {:.2g} and {:.5g} ± {:.2g}", what,
+                    one.value, one.sigma, other.value, other.sigma));
+}
+
+/// Two independent measurements of one quantity; the second may be missing.
+Given combined(const Given& one, const Given& other) {
+  if (!other.known) return one;
+  const double of_one = 1.0 / (one.sigma * one.sigma), of_other = 1.0 / (other.sigma * other.sigma);
+  if (!std::isfinite(of_one) || !std::isfinite(of_other)) return of_one > of_other ? one : other;
+  return {true, (of_one * one.value + of_other * other.value) / (of_one + of_other),
+          1.0 / std::sqrt(of_one + of_other)};
+}
+
 bool is_free(const Problem& problem, const char* name) {
   const int index = problem.predictor->index_of(name);
   for (const FreeParameter& parameter : problem.free)
@@ -101,24 +123,32 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
               Is = given(scene, "Is_kg_m2", body.Is_kg_m2);
   const Given mass = given(scene, "mass_kg", body.mass_kg);
   const Given spin = given(scene, "omega_s_rad_s", std::nullopt);
+  // A top's moments are given about the pivot, those of a body with a shape about its centre.
+  const Given to_pivot = body.kind == data::BodyKind::top ? Given{true, 0.0, 0.0} : mass;
 
   if (omega >= 0 && is_free(problem, "omega_s_rad_s")) {
     add(fit, "I_over_Is", "1",
         propagate([=](const Eigen::VectorXd& v, const auto&) { return v[omega] / v[b]; }, {}),
         "omega_s / b, the spin from the mark");
   } else if (I.known && Is.known) {
-    add(fit, "I_over_Is", "1",
-        propagate([](const auto&, const std::vector<double>& g) { return g[0] / g[1]; }, {I, Is}),
-        "from the given I and Is");
-    add(fit, "omega_s_rad_s", "rad/s",
-        propagate([=](const Eigen::VectorXd& v,
-                      const std::vector<double>& g) { return v[b] * g[0] / g[1]; },
-                  {I, Is}),
-        "b I / Is with the given I and Is");
+    const auto ratio = [=](const Eigen::VectorXd& v, const std::vector<double>& g) {
+      return (g[0] + g[2] * v[l] * v[l]) / g[1];
+    };
+    const std::vector<Given> givens{I, Is, to_pivot};
+    add(fit, "I_over_Is", "1", propagate(ratio, givens), "from the given I and Is");
+    const Given turned = propagate(
+        [=](const Eigen::VectorXd& v, const std::vector<double>& g) { return v[b] * ratio(v, g); },
+        givens);
+    if (spin.known)
+      tell_contradiction(turned, spin, "b I / Is and the spin as [fit] prior has it", fit);
+    add(fit, "omega_s_rad_s", "rad/s", combined(turned, spin),
+        spin.known ? "b I / Is with the given I and Is, and the spin as [fit] prior has it"
+                   : "b I / Is with the given I and Is");
   } else if (spin.known) {
     add(fit, "I_over_Is", "1",
-        propagate([=](const Eigen::VectorXd& v, const std::vector<double>& g) { return g[0] / v[b]; },
-                  {spin}),
+        propagate(
+            [=](const Eigen::VectorXd& v, const std::vector<double>& g) { return g[0] / v[b]; },
+            {spin}),
         "omega_s / b, the spin as [fit] prior has it");
   } else if (shaped) {
     // Per unit mass; about the pivot I = A + m l^2 with the fitted l.
@@ -138,6 +168,14 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
         "b I / Is, I / Is from the body's shape and the fitted l");
   }
   Given gravity = given(scene, "gravity_m_s2", scene.model.gravity_m_s2);
+  // A shape's given moments are about its centre, and a says nothing of the pivot's alone.
+  if (I.known && mass.known && body.kind == data::BodyKind::top)
+    tell_contradiction(
+        I,
+        propagate([=](const Eigen::VectorXd& v,
+                      const std::vector<double>& g) { return g[0] * g[1] * v[l] / v[a]; },
+                  {mass, gravity}),
+        "I_kg_m2 and m g l / a with mass_kg and the fitted a and l", fit);
   if (I.known && !mass.known)
     add(fit, "mass_kg", "kg",
         propagate([=](const Eigen::VectorXd& v,

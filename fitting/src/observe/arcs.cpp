@@ -34,7 +34,8 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
         "no sample of object {} lies {}{}{}{}{}: its track runs from {:.4g} to {:.4g} s{}",
         track.object, from.empty() ? "" : "from ", from, from.empty() || to.empty() ? "" : " ",
         to.empty() ? "" : "to ", to, start.t_s, end.t_s,
-        start.frame < 0 ? "" : fmt::format(", frames {} to {}", start.frame, end.frame)));
+        start.frame < 0 ? ", in a file without a column frame"
+                        : fmt::format(", frames {} to {}", start.frame, end.frame)));
   }
   return {first, last};
 }

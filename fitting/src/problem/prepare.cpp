@@ -11,6 +11,7 @@
 #include "observe/arcs.hpp"
 #include "observe/segments.hpp"
 #include "observe/smoothing.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
@@ -148,10 +149,11 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
 }
 
-// Is omega_s / I of a top at first, without its sign; 0 of other bodies.
-double top_spin_1_s(const Problem& problem) {
+// Is omega_s / I of a top at first, without its sign; 0 of other bodies. Of a scene that says
+// nothing of the spin one that nutates once in the record.
+double top_spin_1_s(const Problem& problem, double record_s) {
   const int index = problem.predictor->index_of("b_1_s");
-  return index < 0 ? 0.0 : std::abs(problem.base[0][index]);
+  return index < 0 ? 0.0 : std::max(std::abs(problem.base[0][index]), data::kTurn / record_s);
 }
 
 // Rates of decay start where they show in the record and let the body go on through it, whatever
@@ -168,7 +170,7 @@ void start_decay_within_sight(Problem& problem) {
       const double decay = parameter.given * longest_s;
       if (decay > kLeast && decay < kMost) continue;
       parameter.given = kTypical / longest_s;
-    } else if (const double spin_1_s = top_spin_1_s(problem);
+    } else if (const double spin_1_s = top_spin_1_s(problem, longest_s);
                parameter.given == 0.0 && spin_1_s > 0.0) {
       // A top's dry and quadratic drag; over decades nothing leads away from 0.
       parameter.given = kTypical / longest_s * (info.unit == "1/s^2" ? spin_1_s : 1.0 / spin_1_s);

@@ -31,8 +31,12 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u) {
                           value > 0.99 * parameter.transform.upper;
     if (!vanished && !at_limit) continue;
     parameter.held = any = true;
+    // Of a first value far beyond what acts a millionth may be seen.
+    double nothing = 1e-6 * parameter.given;
+    const double effect = value > 0.0 ? std::sqrt(squares[i]) * nothing / value : 0.0;
+    if (effect > kUnseen) nothing *= kUnseen / effect;
     for (Eigen::VectorXd& base : problem.base)
-      base[parameter.index] = at_limit ? 0.99 * parameter.transform.upper : 1e-6 * parameter.given;
+      base[parameter.index] = at_limit ? 0.99 * parameter.transform.upper : nothing;
   }
   return any;
 }

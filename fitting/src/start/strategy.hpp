@@ -103,8 +103,9 @@ enum class Effort { brief, full };
 void start_spin(Problem& problem, int arc);
 
 /// Losses that a minimiser sends to zero creep on for ever on a logarithmic scale: holds those
-/// which at their present value no longer change a residual, at a millionth of the given value;
-/// likewise a friction at its limit. Writes u into `base`. Returns whether anything new is held.
+/// which at their present value no longer change a residual, at a millionth of the given value
+/// or, if that would change one, below; likewise a friction at its limit. Writes u into `base`.
+/// Returns whether anything new is held.
 bool hold_vanished(Problem& problem, const Eigen::VectorXd& u);
 
 /// Whether a loss of a single-arc problem is next to nothing at u: below a hundredth of its given
