@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 // What the frames of a body become as a track.
@@ -71,6 +74,34 @@ TEST(TrackAssembly, WhatAllFramesMayBeOffByDoesNotHideHowFarTheyScatter) {
   // The scatter of the stretches it is taken from.
   constexpr double kTolerance = 0.3;
   EXPECT_NEAR((mean_m2 - 0.5 * kOff_m * kOff_m) / (kClaimed_m * kClaimed_m), 4.0, kTolerance * 4.0);
+}
+
+// Followed by its rim alone, with a mark that was seen to turn.
+BodyPath marked(const std::function<double(int)>& direction_rad) {
+  cv::Mat face(64, 64, CV_8U, cv::Scalar(90));
+  cv::circle(face, {42, 32}, 4, cv::Scalar(250), cv::FILLED);
+  const auto profile =
+      SpinProfile::from_face(face, Ellipse::from_axes({32.0, 32.0}, 20.0, 20.0, 0.0), 1.0);
+  BodyPath path;
+  path.marks = std::make_shared<const SpinProfile>(profile.value());
+  for (int i = 0; i < 20; ++i) {
+    BodyPath::At& at = path.frames[i];
+    at.t_s = 0.01 * i;
+    at.seen.rim = Ellipse::from_axes({32.0, 32.0}, 20.0, 10.0, direction_rad(i));
+    at.seen.covariance_px2 = Eigen::Matrix2d::Identity();
+    at.seen.turned_rad = 0.1 * i;
+  }
+  return path;
+}
+
+// Seen from the side a body that lies is as narrow as one that tilts; the narrow side of that goes
+// round.
+TEST(TrackAssembly, OnlyOfABodyThatLiesDoesItsFaceTellTheSpin) {
+  const auto spins = [](const BodyPath& path) {
+    return assemble_track(path, 0, {}, {}).samples.back().psi.has_value();
+  };
+  EXPECT_TRUE(spins(marked([](int) { return 0.4; })));
+  EXPECT_FALSE(spins(marked([](int i) { return 0.1 * i; })));
 }
 
 // What is thrown up before a camera that looks along the floor passes the horizon.

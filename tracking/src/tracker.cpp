@@ -431,6 +431,11 @@ class Tracking {
         decide(paths_[k], window, kOverlap / 2, *followers_[k]);
   }
 
+  [[nodiscard]] std::string camera_words() const {
+    if (!camera_ || camera_->file.empty()) return "the scene's camera";
+    return fs::path(camera_->file).filename().string();
+  }
+
   void report_progress() const {
     if (options_.progress) options_.progress(frames_, recording_.info().frames);
   }
@@ -467,7 +472,7 @@ class Tracking {
     result.file.angles_folded = has_shape(scene_) && camera_ && scene_.body->faces_look_alike();
     result.summary.frames = frames_;
     result.summary.damaged = damaged_;
-    std::string words = "camera and known body: the CoM of the fitted cylinder";
+    std::string words = fmt::format("{}: the CoM of the fitted cylinder", camera_words());
     AssemblyOptions how{.fold = result.file.angles_folded,
                         .readout_s = scene_.camera.readout_s,
                         .height_px = recording_.info().height_px};
@@ -489,9 +494,15 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
+    if (!camera_ && has_shape(scene_))
+      result.file.notes.emplace_back(
+          "metres by how large the body looks: tilted it lies nearer to the camera than the floor, "
+          "and beside the centre of its rim; the error bars do not hold that, a camera file would "
+          "measure it");
     const WhatWasRead read{.frames = frames_,
                            .missing = missing_,
                            .repeated = recording_.repeated(),
+                           .damaged = damaged_,
                            .exposure_fraction = exposure_fraction()};
     for (std::string& note : notes_about_recording(recording_.info(), read))
       result.file.notes.push_back(std::move(note));

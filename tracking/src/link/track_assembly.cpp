@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -46,13 +47,19 @@ double quality_of(const Sighting& seen) {
 }
 
 /// Whether the body lies: only then does the picture of its face turn as the body spins. One that
-/// tilts gets narrower, and shows its wall and the lamp's shading in place of marks.
+/// tilts gets narrower, or its narrow side goes round, and it shows its wall and the lamp's shading
+/// in place of marks.
 bool lies(const BodyPath& path) {
   constexpr double kAsRound = 0.1;
-  std::vector<double> roundness;
-  for (const auto& [index, at] : path.frames)
-    roundness.push_back(at.seen.rim.semi_minor_px() / at.seen.rim.semi_major_px());
-  return data::quantile(roundness, 0.9) - data::quantile(roundness, 0.1) < kAsRound;
+  std::array<std::vector<double>, 2> narrowed;  // 1 - minor / major, along twice its direction
+  for (const auto& [index, at] : path.frames) {
+    const Eigen::Matrix2d shape = at.seen.rim.shape_px / at.seen.rim.semi_major_px();
+    narrowed[0].push_back(shape(0, 0) - shape(1, 1));
+    narrowed[1].push_back(2.0 * shape(0, 1));
+  }
+  return std::all_of(narrowed.begin(), narrowed.end(), [](const std::vector<double>& values) {
+    return data::quantile(values, 0.9) - data::quantile(values, 0.1) < kAsRound;
+  });
 }
 
 /// Metres stay unknown where no floor is seen.

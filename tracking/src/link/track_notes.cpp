@@ -45,6 +45,14 @@ Note note_on_repeated(const WhatWasRead& read) {
       read.repeated, read.frames);
 }
 
+Note note_on_damaged(const WhatWasRead& read) {
+  if (read.damaged == 0) return std::nullopt;
+  return fmt::format(
+      "{} of {} pictures are damaged: what was decoded in their place need not be what the camera "
+      "saw",
+      read.damaged, read.frames);
+}
+
 Note note_on_evened(const VideoInfo& video) {
   if (!video.evened) return std::nullopt;
   return "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "
@@ -68,9 +76,9 @@ Note note_on_interlaced(const VideoInfo& video) {
 
 std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
   std::vector<std::string> notes;
-  for (const Note& note :
-       {note_on_missing(video, read), note_on_left_out(video), note_on_repeated(read),
-        note_on_evened(video), note_on_exposure(read), note_on_interlaced(video)})
+  for (const Note& note : {note_on_missing(video, read), note_on_left_out(video),
+                           note_on_repeated(read), note_on_damaged(read), note_on_evened(video),
+                           note_on_exposure(read), note_on_interlaced(video)})
     if (note) notes.push_back(*note);
   return notes;
 }

@@ -16,6 +16,7 @@ struct WhatWasRead {
   std::int64_t frames = 0;         ///< pictures
   std::int64_t missing = 0;        ///< between them, by their time stamps
   std::int64_t repeated = 0;       ///< that are the same as the one before
+  std::int64_t damaged = 0;        ///< that the decoder had to patch
   double exposure_fraction = 0.0;  ///< shutter time over frame interval, as the scene has it
 };
 
