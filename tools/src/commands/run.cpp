@@ -93,6 +93,17 @@ void track(Run& run, const RunOptions& options) {
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
 }
 
+fs::path track_file(const RunOptions& options, const fs::path& folder) {
+  return folder / (stem_of(options) + ".track.csv");
+}
+
+// What is fitted is what is written: a fit of the file alone says the same to the last digit.
+void keep_track(Run& run, const RunOptions& options, const fs::path& folder) {
+  const fs::path file = track_file(options, folder);
+  data::write_track(run.tracked.file, file);
+  run.tracked.file = data::read_track(file);
+}
+
 fitting::FitOptions fit_options(const RunOptions& options, Progress& progress) {
   fitting::FitOptions how;
   how.free_pivot = options.free_pivot;
@@ -150,11 +161,10 @@ void write_data(Run& run, const RunOptions& options, const fs::path& folder) {
   const data::Scene kept = kept_scene(run);
   data::write_text(data::to_toml(kept), folder / "scene.toml");
   if (run.camera) data::write_camera(*run.camera, folder / "camera.json");
-  data::write_track(run.tracked.file, folder / (stem + ".track.csv"));
   if (!run.fit) return;
   run.fit->scene_toml = data::to_toml(kept);
   run.fit->versions["trochoid"] = TROCHOID_VERSION;
-  run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(folder / (stem + ".track.csv"));
+  run.fit->inputs[stem + ".track.csv"] = data::sha256_of_file(track_file(options, folder));
   add_recording(run.fit->inputs, run.tracked.file.source, run.tracked.file.source_sha256,
                 stem + ".track.csv");
   if (!options.inputs.scene.empty()) add_checksum(run.fit->inputs, options.inputs.scene);
@@ -301,6 +311,7 @@ void run(const RunOptions& options) {
                     {options.inputs.video, options.inputs.scene, options.inputs.camera});
   PendingFolder pending(folder_of(options));
   run.timed("track", [&] { track(run, options); });
+  pending.told_by_its_name([&] { keep_track(run, options, pending.path()); });
   run.timed("fit", [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
   const Verdict verdict =
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
