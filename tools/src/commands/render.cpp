@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "commands.hpp"
 #include "common/json_summary.hpp"
@@ -36,6 +37,7 @@ struct RenderOptions {
   double rate_hz = 0.0, until_s = 0.0;
   int width_px = 640, height_px = 480, quality = 14;
   double body = -1.0, floor = -1.0;  // brightness, instead of the style's colours
+  std::optional<double> exposure;    // share of the frame interval, instead of the scene's
   bool no_shadow = false, lossless = false, json = false;
   RenderStyle style;
 };
@@ -200,8 +202,22 @@ void check_targets(const RenderOptions& options, const Targets& targets) {
     check_output(file, {options.scene, options.camera});
 }
 
-RenderStyle style_of(const RenderOptions& options) {
+// As a share of the frame interval.
+double exposure_of(const RenderOptions& options, const data::Scene& scene) {
+  if (options.exposure) return *options.exposure;
+  if (!scene.camera.exposure_s) return RenderStyle{}.exposure_fraction;
+  const double share = *scene.camera.exposure_s * scene.run.rate_hz;
+  if (share > 1.0)
+    throw InputError(fmt::format(
+        "{}: camera.exposure_s = {:g} is longer than a frame at {:g} frames per second; --exposure "
+        "gives another",
+        options.scene, *scene.camera.exposure_s, scene.run.rate_hz));
+  return share;
+}
+
+RenderStyle style_of(const RenderOptions& options, const data::Scene& scene) {
   RenderStyle style = options.style;
+  style.exposure_fraction = exposure_of(options, scene);
   style.shadow = !options.no_shadow;
   if (options.body >= 0.0) style.body.setConstant(static_cast<float>(options.body));
   if (options.floor >= 0.0) style.floor.setConstant(static_cast<float>(options.floor));
@@ -250,7 +266,7 @@ data::Camera recording_camera(const RenderOptions& options, const data::Scene& s
     throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
                                  camera.width_px, camera.height_px));
   camera.frame_rate_hz = scene.run.rate_hz;
-  camera.exposure_fraction = options.style.exposure_fraction;
+  camera.exposure_fraction = exposure_of(options, scene);
   if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
   return camera;
 }
@@ -317,6 +333,16 @@ void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Cam
   if (scene.tracking.objects > 1)
     note(fmt::format("one body is drawn; [tracking] objects = {} is for following a recording",
                      scene.tracking.objects));
+  if (scene.camera.readout_s > 0.0)
+    note(fmt::format(
+        "all rows are exposed at once; [camera] readout_s = {:g} is for following a recording with "
+        "a rolling shutter, leave it out to follow this one",
+        scene.camera.readout_s));
+  if (const auto& rate_hz = scene.camera.frame_rate_hz; rate_hz && *rate_hz != scene.run.rate_hz)
+    note(fmt::format(
+        "drawn at run.rate_hz = {:g}; [camera] frame_rate_hz = {:g} is for following a recording "
+        "whose file has another, leave it out to follow this one",
+        scene.run.rate_hz, *rate_hz));
 }
 
 void tell(const RenderOptions& options, const Targets& targets, const data::Camera& camera,
@@ -339,7 +365,7 @@ void write_recording(const RenderOptions& options, const data::Scene& scene, con
                      const data::Camera& camera, int frames, const Targets& targets) {
   EncodedFile video(targets.video, {camera.width_px, camera.height_px}, scene.run.rate_hz,
                     options.lossless ? coding::kLossless : coding::h264(options.quality));
-  const std::string truth = draw(motion, scene, camera, style_of(options), frames, video);
+  const std::string truth = draw(motion, scene, camera, style_of(options, scene), frames, video);
   video.finish();
   data::write_text(truth, targets.truth);
   data::write_camera(camera, targets.camera);
@@ -405,8 +431,8 @@ void add_look_options(CLI::App& command, RenderOptions& options) {
                   "Noise of the camera, standard deviation [8-bit levels, 1]")
       ->check(number_within(0.0, 100.0));
   command
-      .add_option("--exposure", style.exposure_fraction,
-                  "Exposure time as a share of the frame interval [0.25]")
+      .add_option("--exposure", options.exposure,
+                  "Exposure time as a share of the frame interval [camera.exposure_s, else 0.25]")
       ->check(number_within(0.0, 1.0));
   command
       .add_option("--flicker", style.flicker,
