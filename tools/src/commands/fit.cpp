@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "commands.hpp"
 #include "common/fit_job.hpp"
@@ -117,16 +118,28 @@ void tell_odd_units(const std::string& path, const data::Track& track) {
     note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 
+/// No fit is written over what its track was measured in, which is named without a folder.
+void check_not_recording(const std::filesystem::path& output, const std::string& track,
+                         const std::string& source) {
+  std::error_code ignored;
+  if (!source.empty() && output.filename() == source && std::filesystem::exists(output, ignored))
+    throw InputError(fmt::format("{}: {} was tracked in a recording of this name; name another",
+                                 output.string(), track));
+}
+
 /// @param inputs  the files read.
 /// @param remarks  what they note about their tracks.
 std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& inputs,
                                      std::vector<std::string>& remarks) {
   std::vector<data::Track> tracks;
+  std::set<int> objects;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
+    for (const data::Track& track : file.tracks) objects.insert(track.object);
     for (const std::string& line : file.notes) remarks.push_back(path + ": " + line);
     add_track(inputs, path);
     add_recording(inputs, file.source, file.source_sha256, path);
+    check_not_recording(command.output, path, file.source);
     for (const data::Track& track : file.tracks)
       if (!command.object || track.object == *command.object) {
         tell_odd_units(path, track);
@@ -134,7 +147,8 @@ std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& input
       }
   }
   if (tracks.empty())
-    throw InputError(fmt::format("--object {}: no track has it", command.object.value_or(0)));
+    throw InputError(fmt::format("--object {}: {} has only {}", command.object.value_or(0),
+                                 fmt::join(command.tracks, " and "), fmt::join(objects, ", ")));
   return tracks;
 }
 
@@ -180,6 +194,8 @@ void run(const FitCommand& command) {
     std::error_code ignored;
     if (std::filesystem::is_regular_file(command.scene, ignored))
       add_checksum(inputs, command.scene);
+    if (std::filesystem::is_regular_file(scene.camera.file, ignored))
+      add_checksum(inputs, scene.camera.file);
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }

@@ -45,9 +45,8 @@ std::string terminal(const std::filesystem::path& path, const std::vector<Axes>&
   if (path.extension() == ".svg")
     return fmt::format("svg size {},{} dynamic background rgb 'white' font 'sans-serif,14'", width,
                        height);
-  if (path.extension() == ".png")
-    return fmt::format("pngcairo size {},{} font 'sans,11'", width, height);
-  throw InputError(fmt::format("{}: a plot is written as .svg or .png", path.string()));
+  check_plot_name(path);
+  return fmt::format("pngcairo size {},{} font 'sans,11'", width, height);
 }
 
 void add_settings(const Axes& axes, std::back_insert_iterator<std::string> out) {
@@ -116,6 +115,11 @@ std::string script(const std::vector<Axes>& panels, const std::filesystem::path&
 }
 
 }  // namespace
+
+void check_plot_name(const std::filesystem::path& path) {
+  if (path.extension() != ".svg" && path.extension() != ".png")
+    throw InputError(fmt::format("{}: a plot is written as .svg or .png", path.string()));
+}
 
 void write_plot(const std::vector<Axes>& panels, const std::filesystem::path& path) {
   data::PendingFile pending(path);

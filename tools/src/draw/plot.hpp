@@ -29,5 +29,7 @@ struct Axes {
 /// @throws InputError if gnuplot is not installed or draws nothing (with its own last word), or the
 /// ending is another.
 void write_plot(const std::vector<Axes>& panels, const std::filesystem::path& path);
+/// To be known before long work. @throws InputError if the ending is neither .svg nor .png.
+void check_plot_name(const std::filesystem::path& path);
 
 }  // namespace trochoid::tools

@@ -145,7 +145,8 @@ void add_study_fits(CLI::App& study) {
   CLI::App* command = study.add_subcommand(
       "fits", "Success, error, honesty and run time of every fitting strategy on random scenes");
   command->add_option("--model", options->tracks.model, "top, thesis, rolling or puck")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::IsMember({"top", "thesis", "rolling", "puck"}));
   command->add_option("--count", options->count, "Scenes, one fit per strategy each")
       ->capture_default_str()
       ->check(whole_number_within(1, 1000000));

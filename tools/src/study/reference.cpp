@@ -47,6 +47,18 @@ constexpr std::array<ColumnName, 30> kColumns{
      {"Fx", "force_x_N"},    {"Fy", "force_y_N"},    {"xc", "contact_x_m"},
      {"yc", "contact_y_m"},  {"slip", "slip_m_s"},   {"mode", "mode"}}};
 
+/// A column that nothing is compared with may be a misspelt one.
+void check_columns(const data::Table& reference, const fs::path& csv) {
+  for (const std::string& column : reference.columns)
+    if (std::none_of(kColumns.begin(), kColumns.end(),
+                     [&](const ColumnName& name) { return column == name.reference; })) {
+      std::vector<std::string_view> known;
+      for (const ColumnName& name : kColumns) known.emplace_back(name.reference);
+      throw InputError(fmt::format("{}: column '{}' is none of {}", csv.string(), column,
+                                   fmt::join(known, ", ")));
+    }
+}
+
 int index_of(const std::vector<std::string>& columns, std::string_view name) {
   const auto found = std::find(columns.begin(), columns.end(), name);
   return found == columns.end() ? -1 : static_cast<int>(found - columns.begin());
@@ -161,6 +173,7 @@ bool study_case(const fs::path& json, const ReferenceOptions& options) {
   std::optional<Errors> errors;
   if (const fs::path csv = fs::path(json).replace_extension(".csv"); fs::exists(csv)) {
     const data::Table reference = data::read_table(csv);
+    check_columns(reference, csv);
     ours = on_grid_of(reference, ours, item.scene.run.rate_hz);
     errors = compare(ours, reference);
   }

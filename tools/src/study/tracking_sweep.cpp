@@ -338,6 +338,7 @@ void draw(const data::Table& table, const std::vector<Point>& all, const fs::pat
 
 void run(const SweepOptions& options) {
   check_outputs({options.output, options.plot}, {});
+  if (!options.plot.empty()) check_plot_name(options.plot);
   const std::vector<Point> all = points();
   data::Table table;
   table.header = {{"trochoid study tracking-sweep", ""},
