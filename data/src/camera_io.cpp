@@ -3,8 +3,8 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <tuple>
 
 #include "json_read.hpp"
 #include "trochoid/data/io.hpp"
@@ -65,32 +65,51 @@ Transfer transfer_of(const JsonReader& json) {
   json.fail("\"transfer\" must be sRGB or linear");
 }
 
+// No lens looks farther to the side than 89 degrees.
+void check_angle(const JsonReader& json, const char* centre_key, double centre_px, int size_px,
+                 const char* focal_key, double focal_px) {
+  constexpr double kWidest = 57.0;  // tangent
+  if (std::max(std::abs(centre_px), std::abs(size_px - centre_px)) <= kWidest * focal_px) return;
+  if (centre_px >= 0.0 && centre_px <= size_px)
+    json.fail(fmt::format(
+        "\"{}\" = {} must be the focal length in pixels: at this one, {} of them see all there is",
+        focal_key, focal_px, size_px));
+  json.fail(
+      fmt::format("\"{}\" = {} lies so far outside a picture of {} px that nothing is seen there",
+                  centre_key, centre_px, size_px));
+}
+
+bool shows_floor(const Camera& camera) {
+  constexpr std::array kShares{0.0, 0.25, 0.5, 0.75, 1.0};
+  for (const double across : kShares)
+    for (const double down : kShares) {
+      try {
+        static_cast<void>(
+            camera.table_from_image({across * camera.width_px, down * camera.height_px}, 0.0));
+        return true;
+      } catch (const NumericalError&) {  // above the horizon, or where the distortion does not hold
+      }
+    }
+  return false;
+}
+
 // That some of the picture shows the floor, from above.
 void check_view(const JsonReader& json, const Camera& camera) {
-  if (camera.projection == Camera::Projection::orthographic) return;
-  constexpr double kWidest = 57.0;  // tan 89 deg: no lens looks farther to the side
-  for (const auto& [key, centre, size, focal] :
-       {std::tuple{"cx", camera.cx, camera.width_px, camera.fx},
-        std::tuple{"cy", camera.cy, camera.height_px, camera.fy}})
-    if (std::max(std::abs(centre), std::abs(size - centre)) > kWidest * focal)
-      json.fail(fmt::format(
-          "\"{}\" = {} lies so far outside a picture of {} px that nothing is seen there", key,
-          centre, size));
-  const Eigen::Matrix3d table_from_camera = camera.camera_from_table.transpose();
-  const double height_m = -(table_from_camera * camera.camera_from_table_m).z();
+  if (camera.projection == Camera::Projection::orthographic) {
+    if (!(camera.camera_from_table(2, 2) < 0.0))
+      json.fail("the camera of \"R_world_to_cam\" looks up: its third row must point down");
+    return;
+  }
+  check_angle(json, "cx", camera.cx, camera.width_px, "fx", camera.fx);
+  check_angle(json, "cy", camera.cy, camera.height_px, "fy", camera.fy);
+  const double height_m = -(camera.camera_from_table.transpose() * camera.camera_from_table_m).z();
   if (!(height_m > 0.0))
-    json.fail(
-        fmt::format("the camera is {:.4g} m below the floor, which is z = 0 of R_world_to_cam and "
-                    "t_world_to_cam_m",
-                    -height_m));
-  const auto looks_down = [&](double u, double v) {
-    const Eigen::Vector3d ray{(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
-    return (table_from_camera * ray).z() < 0.0;
-  };
-  for (const double u : {0.0, 1.0 * camera.width_px})
-    for (const double v : {0.0, 1.0 * camera.height_px})
-      if (looks_down(u, v)) return;
-  json.fail("the camera of \"R_world_to_cam\" looks up: no part of its picture shows the floor");
+    json.fail(fmt::format(
+        "by \"R_world_to_cam\" and \"t_world_to_cam_m\" the camera is at z = {:.4g} m; it must be "
+        "above the floor, z = 0",
+        height_m));
+  if (!shows_floor(camera))
+    json.fail("the camera of \"R_world_to_cam\" looks up: no part of its picture shows the floor");
 }
 
 }  // namespace
@@ -114,7 +133,6 @@ Camera read_camera(const std::filesystem::path& path) {
   camera.camera_from_table = rotation(json, "R_world_to_cam");
   const auto t = json.numbers("t_world_to_cam_m", 3);
   camera.camera_from_table_m = {t[0], t[1], t[2]};
-  check_view(json, camera);
   if (json.has("fps")) camera.frame_rate_hz = positive(json, "fps");
   if (json.has("shutter_fraction_of_frame")) {
     camera.exposure_fraction = json.number("shutter_fraction_of_frame");
@@ -123,6 +141,7 @@ Camera read_camera(const std::filesystem::path& path) {
                             *camera.exposure_fraction));
   }
   camera.transfer = transfer_of(json);
+  check_view(json, camera);
   return camera;
 }
 

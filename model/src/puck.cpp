@@ -38,6 +38,9 @@ struct PuckScene {
   double value[kAll] = {};  ///< by Parameter
 };
 
+// On its very rim a body turns as hard as an even face half as large again.
+constexpr double kWidestContact = 1.5;
+
 PuckScene puck_scene(const data::Scene& scene) {
   if (!scene.body) throw InputError("[body] is missing: the puck model needs kind and radius_m");
   if (!scene.model.friction)
@@ -50,6 +53,10 @@ PuckScene puck_scene(const data::Scene& scene) {
   if (!(scene.model.gravity_m_s2 > 0.0))
     throw InputError(
         fmt::format("model.gravity_m_s2 = {} must be greater than 0", scene.model.gravity_m_s2));
+  if (const double contact_m = scene.model.contact_radius_m.value_or(0.0);
+      contact_m > kWidestContact * scene.body->radius_m)
+    throw InputError(fmt::format("model.contact_radius_m = {} must be at most {} of radius_m = {}",
+                                 contact_m, kWidestContact, scene.body->radius_m));
   PuckScene puck;
   puck.gravity = scene.model.gravity_m_s2;
   puck.radius_m = scene.body->radius_m;
@@ -97,9 +104,9 @@ std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
     list.push_back({"air_force_N_s_m", "N s/m", Role::dynamics, 0.0, kInfinity, true,
                     puck.value[kDrag], true, "air force on the centre of mass"});
   // Only a spin that is seen tells how far out the face rests on the floor.
-  list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kInfinity, true,
-                  puck.value[kContact], false,
-                  "radius of the contact, as of an evenly pressed disc"});
+  list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kWidestContact * puck.radius_m,
+                  true, puck.value[kContact], false,
+                  "radius of the contact, as of an evenly pressed face"});
   return list;
 }
 

@@ -80,6 +80,7 @@ TEST(Pieces, ATrackWithoutFrameNumbersIsRefusedWithoutThem) {
   EXPECT_THAT(refusal(track, "1.5", ""), testing::HasSubstr("frames"));
   for (data::TrackSample& sample : track.samples) sample.frame = -1;
   EXPECT_THAT(refusal(track, "1.5", ""), testing::EndsWith("runs from 0 to 1 s"));
+  EXPECT_THAT(refusal(track, "f99", ""), testing::EndsWith("without a column frame"));
 }
 
 TEST(Pieces, WhyNoStartLedAnywhereIsTheCommonestReason) {

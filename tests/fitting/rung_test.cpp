@@ -61,7 +61,7 @@ TEST(Rung, ThatLacksATermGoesOnFromTheSolutionOfTheOneAbove) {
   ASSERT_TRUE(above.fitted) << above.reason;
   fit_neighbour(std::span(&track, 1), above, {}, below);
   ASSERT_TRUE(below.fitted) << below.reason;
-  EXPECT_EQ(below.fit.start_path, "given") << "else it was searched for anew";
+  EXPECT_EQ(below.fit.start_path, "other_model") << "else it was searched for anew";
   EXPECT_EQ(below.parameters, above.parameters - 2);
   // What it lacks did not act: the same path, and less to pay for.
   EXPECT_LT(below.bic, above.bic);

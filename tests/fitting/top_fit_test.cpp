@@ -441,6 +441,28 @@ TEST(TopFit, TellsTheSpinOfADiscByItsMomentsAboutThePivot) {
               1e-6 * ratio);
 }
 
+// Either tells the other: m g l / a is about the pivot, m l^2 more than given.
+TEST(TopFit, TellsMassAndSpinOfADiscByItsMomentsAlone) {
+  const double l_m = kThesis.at("l_m"), mass_kg = 0.1;
+  const double I_kg_m2 = mass_kg * 9.81 * l_m / kThesis.at("a_1_s2");  // about the pivot
+  data::Scene scene = top_scene();
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.05;
+  body.I_kg_m2 = I_kg_m2 - mass_kg * l_m * l_m;
+  body.Is_kg_m2 = 0.25;
+  const data::Fit result = fit_one(track_of({}), scene);
+  EXPECT_LT(pull(result, "mass_kg", mass_kg), kFar);
+  EXPECT_LT(pull(result, "omega_s_rad_s", I_kg_m2 / 0.25 * kThesis.at("b_1_s")), kFar);
+}
+
+TEST(TopFit, TakesMomentsForThoseAboutThePivotWhereNoBodyIsGiven) {
+  data::Scene scene = top_scene();
+  scene.fit.prior = {
+      {"mass_kg", {0.1, 1e-5}}, {"I_kg_m2", {1.0, 0.05}}, {"Is_kg_m2", {0.25, 1e-6}}};
+  const data::Fit result = fit_one(track_of({}), scene);
+  EXPECT_NEAR(result.find("I_over_Is")->value, 4.0, 1e-9);
+}
+
 TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
   data::Scene scene = top_scene();
   for (const auto& [name, value] : kThesis) scene.fit.fixed[name] = value;

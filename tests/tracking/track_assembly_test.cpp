@@ -101,6 +101,7 @@ TEST(TrackAssembly, OnlyOfABodyThatLiesDoesItsFaceTellTheSpin) {
     return assemble_track(path, 0, {}, {}).samples.back().psi.has_value();
   };
   EXPECT_TRUE(spins(marked([](int) { return 0.4; })));
+  EXPECT_TRUE(spins(marked([](int i) { return 0.4 + 0.01 * i; }))) << "on its way past the camera";
   EXPECT_FALSE(spins(marked([](int i) { return 0.1 * i; })));
 }
 

@@ -494,11 +494,11 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
-    if (!camera_ && has_shape(scene_))
+    if (!camera_ && has_shape(scene_) && scene_.support.kind != data::SupportKind::flat)
       result.file.notes.emplace_back(
-          "metres by how large the body looks: tilted it lies nearer to the camera than the floor, "
-          "and beside the centre of its rim; the error bars do not hold that, a camera file would "
-          "measure it");
+          "without a camera metres go by how large the body looks, and a body that tilts is not "
+          "where the middle of its rim appears: off by more than the error bars say, which a "
+          "camera file would mend");
     const WhatWasRead read{.frames = frames_,
                            .missing = missing_,
                            .repeated = recording_.repeated(),

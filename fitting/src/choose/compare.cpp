@@ -150,6 +150,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     again.model.clear();
     again.rolls_at_first = chosen->rolls_at_first;
     again.start = values_of(chosen->fit);
+    again.start_path = chosen->fit.start_path;
     if (!again.start.empty()) again.strategy = Strategy::single;
     try {
       result.fit = fit_one_of_several(tracks, chosen->scene, again);

@@ -201,10 +201,15 @@ bool slips_unseen_at_first(std::span<const data::Track> tracks, const Rung& rung
   return slip_m_s < kFewSamples * frame_time_s(tracks) * brake_m_s2;
 }
 
+void start_from_other_model(const Values& values, FitOptions& options) {
+  options.start = values;
+  options.start_path = "other_model";
+}
+
 void fit_from(std::span<const data::Track> tracks, const Values& values, Strategy strategy,
               const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  own.start = values;
+  start_from_other_model(values, own);
   own.strategy = strategy;
   own.rolls_at_first = rung.rolls_at_first;
   try_rung(rung, [&] {
@@ -253,7 +258,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
   try_rung(rung, [&] {
     const bool extends = below != nullptr && below->fitted && below->fit.arcs.size() == 1;
     if (extends) {
-      own.start = extended_start(*below, rung);
+      start_from_other_model(extended_start(*below, rung), own);
       own.strategy = Strategy::single;
       go_on_beside(tracks, *below, own, rung);
     }
@@ -262,6 +267,7 @@ void fit_rung(std::span<const data::Track> tracks, const Rung* below, const Term
                       rung.fit.chi2 <= below->fit.chi2 * (1.0 + 1e-6);
     if (reach == Reach::search && !near && (!usable(rung.fit) || rung.fit.whiteness_p < kWhite)) {
       own.start = options.start;
+      own.start_path = options.start_path;
       if (term != nullptr)
         for (const auto& [name, value] : term->start) own.start[name] = value;
       if (extends)
@@ -347,6 +353,7 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
                          const FitOptions& options, Rung& rung) {
   FitOptions own = options;
   own.start = first_part.values;
+  own.start_path = "windows";
   const bool slides = rung.scene.model.name == "sliding";
   own.strategy = slides ? Strategy::rolls_first : Strategy::growing;
   own.rolls_at_first = rung.rolls_at_first = slides;
@@ -359,7 +366,7 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
 void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
                   const FitOptions& options, Rung& rung) {
   FitOptions own = options;
-  own.start = extended_start(rolling, rung);
+  start_from_other_model(extended_start(rolling, rung), own);
   own.start["friction"] = *rung.scene.model.friction;  // a little of it holds nothing
   own.strategy = Strategy::single;
   own.rolls_at_first = rung.rolls_at_first = true;
@@ -434,13 +441,14 @@ void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
   const Rung blank = rung;
   const Values from_known = extended_start(known, rung);
   if (!near.values.empty()) {
-    own.start = near.values;
-    own.start.insert(from_known.begin(), from_known.end());
+    Values near_by = near.values;
+    near_by.insert(from_known.begin(), from_known.end());
+    start_from_other_model(near_by, own);
     fit_beside(tracks, known, own, rung);
     if (as_expected(rung, known, near)) return;
   }
   Rung again = blank;
-  own.start = from_known;
+  start_from_other_model(from_known, own);
   fit_beside(tracks, known, own, again);
   const bool better = again.fitted && (!rung.fitted || again.bic < rung.bic);
   if (better || !usable(rung.fit)) rung = std::move(again);

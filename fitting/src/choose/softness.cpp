@@ -30,6 +30,7 @@ std::optional<Draft> fit_named(std::span<const data::Track> tracks, const data::
 FitOptions going_on_from(const data::Fit& fit, FitOptions options) {
   if (auto values = values_of(fit); !values.empty()) {
     options.start = std::move(values);
+    options.start_path = fit.start_path;
     options.strategy = Strategy::single;
   }
   return options;

@@ -82,15 +82,22 @@ void add(data::Fit& fit, const std::string& name, const std::string& unit, const
   fit.parameters.push_back(parameter);
 }
 
-void tell_contradiction(const Given& one, const Given& other, const std::string& what,
-                        data::Fit& fit) {
-  constexpr double kContradicts = 4.0;
-  const double apart = std::abs(one.value - other.value),
-               sigma = std::hypot(one.sigma, other.sigma);
-  if (apart > kContradicts * sigma)
-    fit.warnings.push_back(
-        fmt::format("{} contradict each other: {:.5g} ± {:.2g} and {:.5g} ± {:.2g}", what,
-                    one.value, one.sigma, other.value, other.sigma));
+std::string words_of(const Given& given) {
+  return given.sigma > 0.0 ? fmt::format("{:.5g} ± {:.2g}", given.value, given.sigma)
+                           : fmt::format("{:.5g}", given.value);
+}
+
+/// Whether two measurements of one quantity do, beyond what was rounded where it was written down;
+/// says so.
+bool contradict(const Given& one, const Given& other, const std::string& what, data::Fit& fit) {
+  constexpr double kSigmas = 4.0, kRounded = 0.05;
+  const double apart = std::abs(one.value - other.value);
+  if (apart <= kSigmas * std::hypot(one.sigma, other.sigma) ||
+      apart <= kRounded * std::abs(other.value))
+    return false;
+  fit.warnings.push_back(
+      fmt::format("{} contradict each other: {} and {}", what, words_of(one), words_of(other)));
+  return true;
 }
 
 /// Two independent measurements of one quantity; the second may be missing.
@@ -123,27 +130,36 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
               Is = given(scene, "Is_kg_m2", body.Is_kg_m2);
   const Given mass = given(scene, "mass_kg", body.mass_kg);
   const Given spin = given(scene, "omega_s_rad_s", std::nullopt);
-  // A top's moments are given about the pivot, those of a body with a shape about its centre.
-  const Given to_pivot = body.kind == data::BodyKind::top ? Given{true, 0.0, 0.0} : mass;
+  const Given gravity = given(scene, "gravity_m_s2", scene.model.gravity_m_s2);
+  // Of a top's moments: I is given about the pivot, of a shape about its centre, m l^2 less. With
+  // a = m g l / I about the pivot either tells the mass. Of the givens I, Is, mass and gravity.
+  using Values = Eigen::VectorXd;
+  using Givens = std::vector<double>;
+  const std::vector<Given> givens{I, Is, mass, gravity};
+  const auto mass_of_I = [=](const Values& v, const Givens& g) {
+    return v[a] * g[0] / (v[l] * (g[3] - (shaped ? v[a] * v[l] : 0.0)));
+  };
+  const auto I_at_pivot = [=, weighed = mass.known](const Values& v, const Givens& g) {
+    return shaped ? g[0] + (weighed ? g[2] : mass_of_I(v, g)) * v[l] * v[l] : g[0];
+  };
+  const auto ratio = [=](const Values& v, const Givens& g) { return I_at_pivot(v, g) / g[1]; };
 
   if (omega >= 0 && is_free(problem, "omega_s_rad_s")) {
-    add(fit, "I_over_Is", "1",
-        propagate([=](const Eigen::VectorXd& v, const auto&) { return v[omega] / v[b]; }, {}),
-        "omega_s / b, the spin from the mark");
+    const Given seen =
+        propagate([=](const Values& v, const Givens&) { return v[omega] / v[b]; }, {});
+    add(fit, "I_over_Is", "1", seen, "omega_s / b, the spin from the mark");
+    if (I.known && Is.known)
+      contradict(propagate(ratio, givens), seen, "the given I / Is and omega_s / b by the mark",
+                 fit);
   } else if (I.known && Is.known) {
-    const auto ratio = [=](const Eigen::VectorXd& v, const std::vector<double>& g) {
-      return (g[0] + g[2] * v[l] * v[l]) / g[1];
-    };
-    const std::vector<Given> givens{I, Is, to_pivot};
     add(fit, "I_over_Is", "1", propagate(ratio, givens), "from the given I and Is");
-    const Given turned = propagate(
-        [=](const Eigen::VectorXd& v, const std::vector<double>& g) { return v[b] * ratio(v, g); },
-        givens);
-    if (spin.known)
-      tell_contradiction(turned, spin, "b I / Is and the spin as [fit] prior has it", fit);
-    add(fit, "omega_s_rad_s", "rad/s", combined(turned, spin),
-        spin.known ? "b I / Is with the given I and Is, and the spin as [fit] prior has it"
-                   : "b I / Is with the given I and Is");
+    const Given turned =
+        propagate([=](const Values& v, const Givens& g) { return v[b] * ratio(v, g); }, givens);
+    const bool both =
+        spin.known && !contradict(turned, spin, "b I / Is and the spin as [fit] prior has it", fit);
+    add(fit, "omega_s_rad_s", "rad/s", both ? combined(turned, spin) : turned,
+        both ? "b I / Is with the given I and Is, and the spin as [fit] prior has it"
+             : "b I / Is with the given I and Is");
   } else if (spin.known) {
     add(fit, "I_over_Is", "1",
         propagate(
@@ -157,31 +173,27 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
     unit.I_kg_m2.reset();
     unit.Is_kg_m2.reset();
     const model::CentralInertia inertia = model::central_inertia(unit);
-    const auto ratio = [=](const Eigen::VectorXd& v) {
+    const auto by_shape = [=](const Values& v) {
       return (inertia.transverse_kg_m2 + v[l] * v[l]) / inertia.axial_kg_m2;
     };
     add(fit, "I_over_Is", "1",
-        propagate([=](const Eigen::VectorXd& v, const auto&) { return ratio(v); }, {}),
+        propagate([=](const Values& v, const Givens&) { return by_shape(v); }, {}),
         "from the body's shape and the fitted l");
     add(fit, "omega_s_rad_s", "rad/s",
-        propagate([=](const Eigen::VectorXd& v, const auto&) { return v[b] * ratio(v); }, {}),
+        propagate([=](const Values& v, const Givens&) { return v[b] * by_shape(v); }, {}),
         "b I / Is, I / Is from the body's shape and the fitted l");
   }
-  Given gravity = given(scene, "gravity_m_s2", scene.model.gravity_m_s2);
-  // A shape's given moments are about its centre, and a says nothing of the pivot's alone.
-  if (I.known && mass.known && body.kind == data::BodyKind::top)
-    tell_contradiction(
-        I,
-        propagate([=](const Eigen::VectorXd& v,
-                      const std::vector<double>& g) { return g[0] * g[1] * v[l] / v[a]; },
-                  {mass, gravity}),
-        "I_kg_m2 and m g l / a with mass_kg and the fitted a and l", fit);
+  if (I.known && mass.known)
+    contradict(I,
+               propagate(
+                   [=](const Values& v, const Givens& g) {
+                     return g[2] * v[l] * (g[3] / v[a] - (shaped ? v[l] : 0.0));
+                   },
+                   givens),
+               "I_kg_m2 and what mass_kg and the fitted a and l make of it", fit);
   if (I.known && !mass.known)
-    add(fit, "mass_kg", "kg",
-        propagate([=](const Eigen::VectorXd& v,
-                      const std::vector<double>& g) { return v[a] * g[0] / (g[1] * v[l]); },
-                  {I, gravity}),
-        "a I / (g l) with the given I and gravity");
+    add(fit, "mass_kg", "kg", propagate(mass_of_I, givens),
+        "from a and l with the given I and gravity");
 }
 
 void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "judge/derived.hpp"
 #include "judge/one_friction.hpp"
@@ -102,8 +103,11 @@ void warn_short_top(const Problem& problem, data::Fit& fit) {
 // that nutates widely or speeds up as it falls.
 double turns_of_node_line(const Problem& problem, const Eigen::VectorXd& u) {
   const ArcData& arc = problem.arcs[0];
+  constexpr int kTimes = 1000;  // whatever gaps the record has
+  std::vector<double> t_s;
+  for (int i = 0; i <= kTimes; ++i) t_s.push_back(arc.t_s.front() + arc.duration_s() * i / kTimes);
   model::PredictRequest request;
-  request.t_s = arc.t_s;
+  request.t_s = t_s;
   request.start_s = arc.start_s;
   request.observables = {model::Observable::phi_rad};
   request.tolerance = problem.tolerance;

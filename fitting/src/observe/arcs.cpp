@@ -30,12 +30,15 @@ SampleRange chosen_range(const data::Track& track, const std::string& from, cons
     throw TrackError(fmt::format("object {} has no sample", track.object));
   if (first >= last) {
     const data::TrackSample &start = track.samples.front(), &end = track.samples.back();
+    std::string frames;
+    if (start.frame >= 0)
+      frames = fmt::format(", frames {} to {}", start.frame, end.frame);
+    else if (from.starts_with('f') || to.starts_with('f'))
+      frames = ", in a file without a column frame";
     throw TrackError(fmt::format(
         "no sample of object {} lies {}{}{}{}{}: its track runs from {:.4g} to {:.4g} s{}",
         track.object, from.empty() ? "" : "from ", from, from.empty() || to.empty() ? "" : " ",
-        to.empty() ? "" : "to ", to, start.t_s, end.t_s,
-        start.frame < 0 ? ", in a file without a column frame"
-                        : fmt::format(", frames {} to {}", start.frame, end.frame)));
+        to.empty() ? "" : "to ", to, start.t_s, end.t_s, frames));
   }
   return {first, last};
 }

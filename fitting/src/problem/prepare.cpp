@@ -140,17 +140,18 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       !scene.fit.fixed.contains("contact_radius_m")) {
     // Where they do not, it lies somewhere within the face: at its bounds it would bend the spin.
     constexpr double kAnywhere = 0.5;
-    const double radius_m = problem.predictor->parameters()[contact].value;
-    FreeParameter radius = free_parameter(*problem.predictor, scene.fit, contact, -1, radius_m);
-    if (!radius.prior) radius.prior = data::Prior{radius_m, kAnywhere * radius_m};
+    FreeParameter radius = free_parameter(*problem.predictor, scene.fit, contact, -1,
+                                          problem.predictor->parameters()[contact].value);
+    const double face_m = scene.body->radius_m;
+    if (!radius.prior) radius.prior = data::Prior{face_m, kAnywhere * face_m};
     problem.free.push_back(radius);
   }
   std::stable_sort(problem.free.begin(), problem.free.end(),
                    [](const FreeParameter& a, const FreeParameter& b) { return a.arc < b.arc; });
 }
 
-// Is omega_s / I of a top at first, without its sign; 0 of other bodies. Of a scene that says
-// nothing of the spin one that nutates once in the record.
+// Is omega_s / I of a top at first, without its sign; 0 of other bodies. At least what nutates once
+// in the record: a scene may say nothing of the spin.
 double top_spin_1_s(const Problem& problem, double record_s) {
   const int index = problem.predictor->index_of("b_1_s");
   return index < 0 ? 0.0 : std::max(std::abs(problem.base[0][index]), data::kTurn / record_s);

@@ -276,7 +276,7 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
-  if (info.name == "contact_radius_m") return {Transform::Kind::limited, 0.0, 1.5 * info.value};
+  if (info.name == "contact_radius_m") return {Transform::Kind::limited, 0.0, info.upper};
   if (info.name == kSlipScale)
     return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};

@@ -355,7 +355,7 @@ Found find_arc(Problem problem, const SearchRequest& asked) {
     return with_spin(problem, find_arc(path, asked));
   }
   const FitOptions& options = *asked.options;
-  const Start given{"given", options.start};
+  const Start given{options.start_path, options.start};
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   switch (options.strategy) {
     case Strategy::single:

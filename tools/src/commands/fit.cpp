@@ -147,8 +147,9 @@ std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& input
       }
   }
   if (tracks.empty())
-    throw InputError(fmt::format("--object {}: {} has only {}", command.object.value_or(0),
-                                 fmt::join(command.tracks, " and "), fmt::join(objects, ", ")));
+    throw InputError(fmt::format("--object {}: no such number in {}, only {}",
+                                 command.object.value_or(0), fmt::join(command.tracks, " and "),
+                                 fmt::join(objects, ", ")));
   return tracks;
 }
 

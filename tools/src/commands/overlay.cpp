@@ -30,6 +30,16 @@ struct OverlayCommandOptions {
   bool json = false;
 };
 
+/// The camera of a scene that was kept in a fit may have gone since.
+void tell_missing_camera(const data::Scene& scene, const std::string& fit) {
+  std::error_code ignored;
+  if (scene.camera.file.empty() || std::filesystem::exists(scene.camera.file, ignored)) return;
+  note(
+      fmt::format("{}: its camera, {}, is not there: metres are placed in the picture by the "
+                  "track, as if seen from straight above; --camera names it",
+                  fit, scene.camera.file));
+}
+
 OverlayInput read_inputs(const OverlayCommandOptions& options) {
   OverlayInput input;
   input.video = options.video;
@@ -39,11 +49,12 @@ OverlayInput read_inputs(const OverlayCommandOptions& options) {
     input.fit = data::read_fit(options.fit);
     check_made_from(*input.fit, options.fit, options.track);
   }
-  if (!options.scene.empty())
+  if (!options.scene.empty()) {
     input.scene = data::read_scene(options.scene);
-  else if (input.fit)
+  } else if (input.fit) {
     input.scene = scene_of_fit(*input.fit, options.fit);
-  // The camera of a scene that was kept in a fit may have gone since; one given here is named.
+    if (options.camera.empty()) tell_missing_camera(*input.scene, options.fit);
+  }
   input.camera = named_camera(options.camera, options.scene.empty() ? data::Scene{} : *input.scene,
                               options.scene);
   input.fit_track = options.fit_track;

@@ -202,22 +202,25 @@ void check_targets(const RenderOptions& options, const Targets& targets) {
     check_output(file, {options.scene, options.camera});
 }
 
-// As a share of the frame interval.
-double exposure_of(const RenderOptions& options, const data::Scene& scene) {
+// As a share of the frame interval: by option, scene, camera file.
+double exposure_of(const RenderOptions& options, const data::Scene& scene,
+                   const data::Camera& camera) {
   if (options.exposure) return *options.exposure;
-  if (!scene.camera.exposure_s) return RenderStyle{}.exposure_fraction;
+  if (!scene.camera.exposure_s)
+    return camera.exposure_fraction.value_or(RenderStyle{}.exposure_fraction);
+  constexpr double kRounding = 1e-3;
   const double share = *scene.camera.exposure_s * scene.run.rate_hz;
-  if (share > 1.0)
+  if (share > 1.0 + kRounding)
     throw InputError(fmt::format(
         "{}: camera.exposure_s = {:g} is longer than a frame at {:g} frames per second; --exposure "
         "gives another",
         options.scene, *scene.camera.exposure_s, scene.run.rate_hz));
-  return share;
+  return std::min(share, 1.0);
 }
 
-RenderStyle style_of(const RenderOptions& options, const data::Scene& scene) {
+RenderStyle style_of(const RenderOptions& options, const data::Camera& camera) {
   RenderStyle style = options.style;
-  style.exposure_fraction = exposure_of(options, scene);
+  style.exposure_fraction = *camera.exposure_fraction;
   style.shadow = !options.no_shadow;
   if (options.body >= 0.0) style.body.setConstant(static_cast<float>(options.body));
   if (options.floor >= 0.0) style.floor.setConstant(static_cast<float>(options.floor));
@@ -266,7 +269,7 @@ data::Camera recording_camera(const RenderOptions& options, const data::Scene& s
     throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
                                  camera.width_px, camera.height_px));
   camera.frame_rate_hz = scene.run.rate_hz;
-  camera.exposure_fraction = exposure_of(options, scene);
+  camera.exposure_fraction = exposure_of(options, scene, camera);
   if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
   return camera;
 }
@@ -365,7 +368,7 @@ void write_recording(const RenderOptions& options, const data::Scene& scene, con
                      const data::Camera& camera, int frames, const Targets& targets) {
   EncodedFile video(targets.video, {camera.width_px, camera.height_px}, scene.run.rate_hz,
                     options.lossless ? coding::kLossless : coding::h264(options.quality));
-  const std::string truth = draw(motion, scene, camera, style_of(options, scene), frames, video);
+  const std::string truth = draw(motion, scene, camera, style_of(options, camera), frames, video);
   video.finish();
   data::write_text(truth, targets.truth);
   data::write_camera(camera, targets.camera);
@@ -431,8 +434,9 @@ void add_look_options(CLI::App& command, RenderOptions& options) {
                   "Noise of the camera, standard deviation [8-bit levels, 1]")
       ->check(number_within(0.0, 100.0));
   command
-      .add_option("--exposure", options.exposure,
-                  "Exposure time as a share of the frame interval [camera.exposure_s, else 0.25]")
+      .add_option(
+          "--exposure", options.exposure,
+          "Exposure time as a share of the frame interval [as the camera has it, else 0.25]")
       ->check(number_within(0.0, 1.0));
   command
       .add_option("--flicker", style.flicker,

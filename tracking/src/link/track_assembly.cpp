@@ -2,7 +2,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -48,18 +47,26 @@ double quality_of(const Sighting& seen) {
 
 /// Whether the body lies: only then does the picture of its face turn as the body spins. One that
 /// tilts gets narrower, or its narrow side goes round, and it shows its wall and the lamp's shading
-/// in place of marks.
+/// in place of marks. The narrow side of one that lies and is seen from the side turns a little on
+/// its way through the picture.
 bool lies(const BodyPath& path) {
-  constexpr double kAsRound = 0.1;
-  std::array<std::vector<double>, 2> narrowed;  // 1 - minor / major, along twice its direction
-  for (const auto& [index, at] : path.frames) {
-    const Eigen::Matrix2d shape = at.seen.rim.shape_px / at.seen.rim.semi_major_px();
-    narrowed[0].push_back(shape(0, 0) - shape(1, 1));
-    narrowed[1].push_back(2.0 * shape(0, 1));
-  }
-  return std::all_of(narrowed.begin(), narrowed.end(), [](const std::vector<double>& values) {
-    return data::quantile(values, 0.9) - data::quantile(values, 0.1) < kAsRound;
-  });
+  constexpr double kAsRound = 0.1, kTurned = 0.3;
+  const auto spread = [&](const auto& value) {
+    std::vector<double> values;
+    for (const auto& [index, at] : path.frames) values.push_back(value(at.seen.rim));
+    return data::quantile(values, 0.9) - data::quantile(values, 0.1);
+  };
+  // 1 - minor / major, along twice its direction.
+  const auto along = [](const Ellipse& rim) {
+    return (rim.shape_px(0, 0) - rim.shape_px(1, 1)) / rim.semi_major_px();
+  };
+  const auto across = [](const Ellipse& rim) {
+    return 2.0 * rim.shape_px(0, 1) / rim.semi_major_px();
+  };
+  const auto roundness = [](const Ellipse& rim) {
+    return rim.semi_minor_px() / rim.semi_major_px();
+  };
+  return spread(roundness) < kAsRound && spread(along) < kTurned && spread(across) < kTurned;
 }
 
 /// Metres stay unknown where no floor is seen.

@@ -48,9 +48,8 @@ Note note_on_repeated(const WhatWasRead& read) {
 Note note_on_damaged(const WhatWasRead& read) {
   if (read.damaged == 0) return std::nullopt;
   return fmt::format(
-      "{} of {} pictures are damaged: what was decoded in their place need not be what the camera "
-      "saw",
-      read.damaged, read.frames);
+      "{} of {} pictures {} damaged: what was decoded need not be what the camera saw",
+      read.damaged, read.frames, read.damaged == 1 ? "is" : "are");
 }
 
 Note note_on_evened(const VideoInfo& video) {

@@ -38,6 +38,7 @@ struct FitOptions {
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
   Strategy strategy = Strategy::automatic;
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
+  std::string start_path = "given";     ///< what data::Fit::start_path calls it
   /// A sliding body rolls when the record begins: its velocity there follows from its spin. What a
   /// slip that friction has ended by the second sample was is not seen, and what goes with it is
   /// not known either. Where friction sets in softly it creeps at first as it would later. For one

@@ -1,7 +1,7 @@
 #pragma once
 #include "trochoid/model/events.hpp"
 
-/// A disc spinning down on a fixed pivot (M8): dry, viscous and quadratic resistance over the axial
+/// A disc spinning down on a fixed pivot (M7): dry, viscous and quadratic resistance over the axial
 /// moment, and a weight out of balance. Equation numbers of model/theory/pivot.md.
 namespace trochoid::model {
 inline namespace TROCHOID_ISA {
