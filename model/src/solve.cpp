@@ -23,9 +23,11 @@ Choice choose_integrator(const std::string& asked) {
         "run.integrator = \"radau\" is for friction that sets in softly (model.friction above 0, "
         "with model.slip_regularisation_m_s); other models take auto, taylor, dop853, cvode-adams, "
         "cvode-bdf or arkode");
-  throw InputError(fmt::format(
-      "run.integrator = \"{}\" must be auto, taylor, dop853, cvode-adams, cvode-bdf or arkode",
-      asked));
+  throw InputError(
+      fmt::format("run.integrator = \"{}\" must be auto, taylor, dop853, cvode-adams, cvode-bdf, "
+                  "arkode or, for "
+                  "friction that sets in softly, radau",
+                  asked));
 }
 
 SundialsOptions sundials_options(Method method, double rtol, const double* atol, int states) {

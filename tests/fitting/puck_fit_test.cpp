@@ -320,5 +320,20 @@ TEST(PuckFit, RefusesABodyAtRest) {
   EXPECT_THROW((void)fitting::fit(std::span(&thrown.track(), 1), puck_scene()), InputError);
 }
 
+// A first value is no more than that, however far below.
+TEST(PuckFit, FindsTheContactFromAnyFirstValue) {
+  constexpr double kContact_m = 0.012;
+  Turning puck;
+  puck.slide({{"vx_m_s", 0.8}, {"w3_rad_s", 60.0}, {"contact_radius_m", kContact_m}}, 60);
+  for (const double first_m : {0.002, 0.015}) {
+    puck.scene.model.contact_radius_m = first_m;
+    const data::Fit result = fitting::fit(std::span(&puck.track, 1), puck.scene);
+    ASSERT_TRUE(result.converged) << result.reason;
+    for (const auto& [name, truth] :
+         {std::pair{"contact_radius_m", kContact_m}, {"friction", kFriction}})
+      EXPECT_LT(std::abs(result.find(name)->value - truth), 4.0 * result.find(name)->sigma) << name;
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::fitting
