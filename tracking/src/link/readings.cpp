@@ -121,9 +121,9 @@ class Readings {
   }
 
   /// The mirror image where all frames together clearly decided against it: by more than how well
-  /// outlines fit.
+  /// outlines fit, and by more than a leap costs there (12), which a body that rattles may do.
   [[nodiscard]] std::optional<Pose> rejected_attitude(const Glimpse& glimpse) const {
-    constexpr double kSure = 6.0;
+    constexpr double kSure = 18.0;
     return glimpse.attitude_log_odds > kSure ? finder_.mirror_image(glimpse.pose()) : std::nullopt;
   }
 
