@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -364,6 +366,27 @@ TEST(TopFit, AdmitsThatSteadyPrecessionWithDragHidesTheTop) {
     EXPECT_FALSE(result.find(name)->identifiable) << name;
 }
 
+// What a camera would see of a table's motion, with noise.
+data::Track seen_with_spin(const data::Table& table, const std::array<const char*, 4>& t_x_y_psi,
+                           double path_m, double angle_rad) {
+  std::array<Eigen::VectorXd, 4> column;
+  std::transform(t_x_y_psi.begin(), t_x_y_psi.end(), column.begin(),
+                 [&](const char* name) { return table.column(name); });
+  const auto& [t, x, y, psi] = column;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (Eigen::Index i = 0; i < t.size(); ++i) {
+    data::TrackSample sample;
+    sample.t_s = t[i];
+    sample.centre_m = {x[i] + path_m * normal(generator), y[i] + path_m * normal(generator)};
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * path_m * path_m;
+    sample.psi = data::MeasuredAngle{psi[i] + angle_rad * normal(generator), angle_rad};
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
 // By scipy; its spin falls from 155 to 111 rad/s, nine radians from sample to sample.
 struct DyingTop {
   data::Scene scene;
@@ -372,22 +395,11 @@ struct DyingTop {
 
 DyingTop dying_top() {
   const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/s11_top_drag";
-  DyingTop top{data::read_reference_case(base + ".json").scene, {}};
-  top.scene.start = {};
-  const data::Table table = data::read_table(base + ".csv");
-  const Eigen::VectorXd t = table.column("t"), x = table.column("x"), y = table.column("y");
-  const Eigen::VectorXd psi = table.column("psi");
   constexpr double kPath_m = 1e-4, kAngle_rad = 0.02;
-  std::mt19937_64 generator(5);
-  std::normal_distribution<double> normal;
-  for (Eigen::Index i = 0; i < t.size(); ++i) {
-    data::TrackSample sample;
-    sample.t_s = t[i];
-    sample.centre_m = {x[i] + kPath_m * normal(generator), y[i] + kPath_m * normal(generator)};
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPath_m * kPath_m;
-    sample.psi = data::MeasuredAngle{psi[i] + kAngle_rad * normal(generator), kAngle_rad};
-    top.track.samples.push_back(sample);
-  }
+  DyingTop top{
+      data::read_reference_case(base + ".json").scene,
+      seen_with_spin(data::read_table(base + ".csv"), {"t", "x", "y", "psi"}, kPath_m, kAngle_rad)};
+  top.scene.start = {};
   return top;
 }
 
@@ -534,20 +546,8 @@ TEST(TopFit, HoldsADragThatIsNotThereAtNothing) {
   constexpr double kPath_m = 2e-5, kAngle_rad = 3e-3;
   const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/samples/s5_top_marker/";
   data::Scene scene = data::read_scene(base + "scene.toml");
-  const data::Table table = data::read_table(base + "truth.csv");
-  const Eigen::VectorXd t = table.column("t"), x = table.column("x_m"), y = table.column("y_m"),
-                        psi = table.column("psi_rad");
-  std::mt19937_64 generator(8);
-  std::normal_distribution<double> normal;
-  data::Track track;
-  for (Eigen::Index i = 0; i < t.size(); ++i) {
-    data::TrackSample sample;
-    sample.t_s = t[i];
-    sample.centre_m = {x[i] + kPath_m * normal(generator), y[i] + kPath_m * normal(generator)};
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPath_m * kPath_m;
-    sample.psi = data::MeasuredAngle{psi[i] + kAngle_rad * normal(generator), kAngle_rad};
-    track.samples.push_back(sample);
-  }
+  const data::Track track = seen_with_spin(data::read_table(base + "truth.csv"),
+                                           {"t", "x_m", "y_m", "psi_rad"}, kPath_m, kAngle_rad);
   const data::Fit plain = fit_one(track, scene);
   scene.model.drag_spin_quadratic_N_m_s2 = 0.0;
   const data::Fit result = fit_one(track, scene);
