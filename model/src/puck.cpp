@@ -55,8 +55,9 @@ PuckScene puck_scene(const data::Scene& scene) {
         fmt::format("model.gravity_m_s2 = {} must be greater than 0", scene.model.gravity_m_s2));
   if (const double contact_m = scene.model.contact_radius_m.value_or(0.0);
       contact_m > kWidestContact * scene.body->radius_m)
-    throw InputError(fmt::format("model.contact_radius_m = {} must be at most {} of radius_m = {}",
-                                 contact_m, kWidestContact, scene.body->radius_m));
+    throw InputError(
+        fmt::format("model.contact_radius_m = {} must be at most {} times radius_m = {}", contact_m,
+                    kWidestContact, scene.body->radius_m));
   PuckScene puck;
   puck.gravity = scene.model.gravity_m_s2;
   puck.radius_m = scene.body->radius_m;

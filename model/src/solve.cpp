@@ -25,8 +25,7 @@ Choice choose_integrator(const std::string& asked) {
         "cvode-bdf or arkode");
   throw InputError(
       fmt::format("run.integrator = \"{}\" must be auto, taylor, dop853, cvode-adams, cvode-bdf, "
-                  "arkode or, for "
-                  "friction that sets in softly, radau",
+                  "arkode or, for friction that sets in softly, radau",
                   asked));
 }
 

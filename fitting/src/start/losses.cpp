@@ -31,12 +31,14 @@ bool hold_vanished(Problem& problem, const Eigen::VectorXd& u) {
                           value > 0.99 * parameter.transform.upper;
     if (!vanished && !at_limit) continue;
     parameter.held = any = true;
-    // Of a first value far beyond what acts a millionth may be seen.
-    double nothing = 1e-6 * parameter.given;
-    const double effect = value > 0.0 ? std::sqrt(squares[i]) * nothing / value : 0.0;
-    if (effect > kUnseen) nothing *= kUnseen / effect;
-    for (Eigen::VectorXd& base : problem.base)
-      base[parameter.index] = at_limit ? 0.99 * parameter.transform.upper : nothing;
+    double at = 0.99 * parameter.transform.upper;
+    if (!at_limit) {
+      // Of a first value far beyond what acts a millionth may be seen.
+      at = 1e-6 * parameter.given;
+      const double effect = value > 0.0 ? std::sqrt(squares[i]) * at / value : 0.0;
+      if (effect > kUnseen) at *= kUnseen / effect;
+    }
+    for (Eigen::VectorXd& base : problem.base) base[parameter.index] = at;
   }
   return any;
 }

@@ -50,6 +50,8 @@ double quality_of(const Sighting& seen) {
 /// in place of marks. The narrow side of one that lies and is seen from the side turns a little on
 /// its way through the picture.
 bool lies(const BodyPath& path) {
+  // Of a disc that slides across the picture, seen at 45 degrees, 0.16; of one that goes round at a
+  // tilt of 60 degrees, 0.9.
   constexpr double kAsRound = 0.1, kTurned = 0.3;
   const auto spread = [&](const auto& value) {
     std::vector<double> values;
