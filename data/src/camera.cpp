@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 #include <string>
@@ -86,6 +88,38 @@ Camera Camera::overhead(int width_px, int height_px, double scale_px_per_m, doub
   camera.fx = camera.fy = scale_px_per_m * height_m;
   camera.camera_from_table_m = {0.0, 0.0, height_m};
   return camera;
+}
+
+Camera Camera::moved(const Deviation& by) const {
+  Camera out = *this;
+  out.fx += by[0];
+  out.fy += by[1];
+  out.cx += by[2];
+  out.cy += by[3];
+  for (std::size_t i = 0; i < distortion.size(); ++i)
+    out.distortion[i] += by[4 + static_cast<Eigen::Index>(i)];
+  const Eigen::Vector3d turn = by.segment<3>(9);
+  if (const double angle = turn.norm(); angle > 0.0)
+    out.camera_from_table = Eigen::AngleAxisd(angle, turn / angle) * camera_from_table;
+  out.camera_from_table_m += by.tail<3>();
+  return out;
+}
+
+Eigen::Matrix<double, Camera::kNumbers, Eigen::Dynamic> Camera::likely_deviations() const {
+  Eigen::Matrix<double, kNumbers, Eigen::Dynamic> out(kNumbers, 0);
+  if (covariance.size() == 0) return out;
+  // Pixels, radians and metres are told apart by their own standard deviations.
+  const Eigen::VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 0.0);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(inverse.asDiagonal() * covariance *
+                                                            inverse.asDiagonal());
+  constexpr double kNothing = 1e-12;  // of a variance: rounding
+  for (int i = kNumbers - 1; i >= 0 && axes.eigenvalues()[i] > kNothing; --i) {
+    out.conservativeResize(Eigen::NoChange, out.cols() + 1);
+    out.rightCols<1>() =
+        std::sqrt(axes.eigenvalues()[i]) * sd.cwiseProduct(axes.eigenvectors().col(i));
+  }
+  return out;
 }
 
 void Camera::check_size(int recorded_width_px, int recorded_height_px,

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -12,6 +14,11 @@
 // camera.json: docs/formats.md.
 namespace trochoid::data {
 namespace {
+
+// In the order of Camera::Deviation.
+constexpr std::array<const char*, Camera::kNumbers> kNumberNames{
+    "fx", "fy",         "cx",         "cy",         "k1",        "k2",        "p1",       "p2",
+    "k3", "turn_x_rad", "turn_y_rad", "turn_z_rad", "shift_x_m", "shift_y_m", "shift_z_m"};
 
 int image_size(const JsonReader& json, const char* key) {
   constexpr double kLargest_px = 65536.0;
@@ -63,6 +70,74 @@ Transfer transfer_of(const JsonReader& json) {
   if (name == "sRGB") return Transfer::srgb;
   if (name == "linear") return Transfer::linear;
   json.fail("\"transfer\" must be sRGB or linear");
+}
+
+std::vector<Eigen::Index> numbers_named(const JsonReader& json, const char* key) {
+  const nlohmann::json& names = json.at(key);
+  if (!names.is_array() || names.empty())
+    json.fail(fmt::format("\"covariance\": \"{}\" must be a list of the numbers meant", key));
+  std::vector<Eigen::Index> out;
+  for (const nlohmann::json& name : names) {
+    const auto at = std::find_if(kNumberNames.begin(), kNumberNames.end(),
+                                 [&](const char* known) { return name == known; });
+    const Eigen::Index index = at - kNumberNames.begin();
+    if (at == kNumberNames.end())
+      json.fail(fmt::format("\"covariance\": {} is none of {}", name.dump(),
+                            fmt::join(kNumberNames, ", ")));
+    if (std::find(out.begin(), out.end(), index) != out.end())
+      json.fail(fmt::format("\"covariance\": {} is named twice", name.dump()));
+    out.push_back(index);
+  }
+  return out;
+}
+
+// "covariance": {"of": the numbers that are uncertain, "matrix": as many rows of as many}.
+Eigen::MatrixXd covariance_of(const JsonReader& json, const char* key) {
+  const nlohmann::json& object = json.at(key);
+  if (!object.is_object()) json.fail(fmt::format("\"{}\" must be an object", key));
+  const JsonReader inner(object, json.where());
+  const std::vector<Eigen::Index> of = numbers_named(inner, "of");
+  const nlohmann::json& rows = inner.at("matrix");
+  const auto n = static_cast<Eigen::Index>(of.size());
+  if (!rows.is_array() || rows.size() != of.size())
+    json.fail(fmt::format("\"{}\": \"matrix\" must have {} rows", key, n));
+  Eigen::MatrixXd given(n, n);
+  for (Eigen::Index row = 0; row < n; ++row) {
+    const nlohmann::json wrapped{{"matrix", rows[static_cast<std::size_t>(row)]}};
+    const auto values = JsonReader(wrapped, json.where()).numbers("matrix", of.size());
+    given.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), n);
+  }
+  constexpr double kRounded = 1e-6;  // of what the variances allow
+  const Eigen::VectorXd sd = given.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const bool symmetric =
+      ((given - given.transpose()).array().abs() <= kRounded * (sd * sd.transpose()).array()).all();
+  const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 1.0);
+  if (!symmetric || (given.diagonal().array() < 0.0).any() ||
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
+          inverse.asDiagonal() * given * inverse.asDiagonal(), Eigen::EigenvaluesOnly)
+              .eigenvalues()
+              .minCoeff() < -kRounded)
+    json.fail(
+        fmt::format("\"{}\" is no covariance: its matrix must be symmetric, and no "
+                    "combination of what it is of may have a variance below 0",
+                    key));
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(Camera::kNumbers, Camera::kNumbers);
+  out(of, of) = given;
+  return out;
+}
+
+nlohmann::ordered_json json_of(const Eigen::MatrixXd& covariance) {
+  nlohmann::ordered_json out;
+  std::vector<Eigen::Index> of;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    if (covariance(i, i) > 0.0) of.push_back(i);
+  for (const Eigen::Index i : of) out["of"].push_back(kNumberNames[static_cast<std::size_t>(i)]);
+  for (const Eigen::Index i : of) {
+    nlohmann::ordered_json row;
+    for (const Eigen::Index k : of) row.push_back(covariance(i, k));
+    out["matrix"].push_back(std::move(row));
+  }
+  return out;
 }
 
 // No lens looks farther to the side than 89 degrees.
@@ -141,6 +216,7 @@ Camera read_camera(const std::filesystem::path& path) {
                             *camera.exposure_fraction));
   }
   camera.transfer = transfer_of(json);
+  if (json.has("covariance")) camera.covariance = covariance_of(json, "covariance");
   check_view(json, camera);
   return camera;
 }
@@ -176,6 +252,8 @@ void write_camera(const Camera& camera, const std::filesystem::path& path) {
   json["t_world_to_cam_m"] = {t.x(), t.y(), t.z()};
   const Eigen::Vector3d at = camera.position_m();
   json["camera_position_m"] = {at.x(), at.y(), at.z()};
+  if ((camera.covariance.diagonal().array() > 0.0).any())
+    json["covariance"] = json_of(camera.covariance);
   write_text(json.dump(1) + "\n", path);
 }
 

@@ -23,6 +23,22 @@ std::string looking_up() {
   return text.replace(text.find(height), height.size(), "-0.62");
 }
 
+std::string uncertain(const std::string& covariance) {
+  return with("\"transfer\"", "\"covariance\": " + covariance + ", \"transfer\"");
+}
+
+TEST(CameraFile, KeepsWhatTheCalibrationLeavesUncertain) {
+  const TestFolder folder;
+  const Camera camera = read_camera(folder.write(
+      "c.json",
+      uncertain(R"({"of": ["fx", "shift_z_m"], "matrix": [[4.0, 1.9e-3], [1.9e-3, 1e-6]]})")));
+  EXPECT_EQ(camera.covariance(0, 0), 4.0);
+  EXPECT_EQ(camera.covariance(14, 0), 1.9e-3);
+  EXPECT_EQ(camera.covariance(1, 1), 0.0);
+  write_camera(camera, folder / "d.json");
+  EXPECT_EQ(read_camera(folder / "d.json").covariance, camera.covariance);
+}
+
 TEST(CameraFile, KeepsEverythingThroughAFile) {
   const TestFolder folder;
   const Camera camera = read_camera(folder.write("c.json", kCamera));
@@ -75,29 +91,40 @@ TEST_P(CameraRefusal, NamesFileAndKey) {
 
 INSTANTIATE_TEST_SUITE_P(
     Files, CameraRefusal,
-    testing::Values(RefusedCamera{"Empty", "", "empty"},
-                    RefusedCamera{"NotJson", "width = 3", "not JSON"},
-                    RefusedCamera{"Missing", with("\"fx\"", "\"gx\""), "key \"fx\" is missing"},
-                    RefusedCamera{"ZeroFocalLength", with("1180.0", "0"),
-                                  "\"fx\" = 0 must be greater than 0"},
-                    RefusedCamera{"WordForNumber", with("406.3", "\"middle\""),
-                                  "\"cx\" must be a finite number"},
-                    RefusedCamera{"NoPixels", with("800", "0"), "\"width\""},
-                    RefusedCamera{"HalfPixels", with("800", "800.5"), "\"width\""},
-                    RefusedCamera{"ShortDistortion", with("-0.24, ", ""), "list of 5"},
-                    RefusedCamera{"Mirrored", with("[0, -1, 0]", "[0, 1, 0]"), "no rotation"},
-                    RefusedCamera{"Stretched", with("[1, 0, 0]", "[2, 0, 0]"), "no rotation"},
-                    RefusedCamera{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
-                    RefusedCamera{"UnknownCurve", with("\"linear\"", "\"log\""),
-                                  "\"transfer\" must be sRGB or linear"},
-                    RefusedCamera{"CentreFarOutside", with("406.3", "1e6"),
-                                  "\"cx\" = 1000000 lies so far outside a picture of 800 px"},
-                    RefusedCamera{"BelowTheFloor", with("0.62", "-0.62"), "above the floor"},
-                    RefusedCamera{"FocalLengthInMillimetres", with("1180.0", "4.5"),
-                                  "\"fx\" = 4.5 must be the focal length in pixels"},
-                    RefusedCamera{"LooksUp", looking_up(), "looks up"},
-                    RefusedCamera{"LongShutter", with("0.25", "2.5"), "0..1"},
-                    RefusedCamera{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
+    testing::Values(
+        RefusedCamera{"Empty", "", "empty"}, RefusedCamera{"NotJson", "width = 3", "not JSON"},
+        RefusedCamera{"Missing", with("\"fx\"", "\"gx\""), "key \"fx\" is missing"},
+        RefusedCamera{"ZeroFocalLength", with("1180.0", "0"), "\"fx\" = 0 must be greater than 0"},
+        RefusedCamera{"WordForNumber", with("406.3", "\"middle\""),
+                      "\"cx\" must be a finite number"},
+        RefusedCamera{"NoPixels", with("800", "0"), "\"width\""},
+        RefusedCamera{"HalfPixels", with("800", "800.5"), "\"width\""},
+        RefusedCamera{"ShortDistortion", with("-0.24, ", ""), "list of 5"},
+        RefusedCamera{"Mirrored", with("[0, -1, 0]", "[0, 1, 0]"), "no rotation"},
+        RefusedCamera{"Stretched", with("[1, 0, 0]", "[2, 0, 0]"), "no rotation"},
+        RefusedCamera{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
+        RefusedCamera{"UnknownCurve", with("\"linear\"", "\"log\""),
+                      "\"transfer\" must be sRGB or linear"},
+        RefusedCamera{"CentreFarOutside", with("406.3", "1e6"),
+                      "\"cx\" = 1000000 lies so far outside a picture of 800 px"},
+        RefusedCamera{"BelowTheFloor", with("0.62", "-0.62"), "above the floor"},
+        RefusedCamera{"FocalLengthInMillimetres", with("1180.0", "4.5"),
+                      "\"fx\" = 4.5 must be the focal length in pixels"},
+        RefusedCamera{"LooksUp", looking_up(), "looks up"},
+        RefusedCamera{"UncertainOfWhat", uncertain(R"({"of": ["f"], "matrix": [[1]]})"),
+                      "\"f\" is none of fx, fy"},
+        RefusedCamera{"UncertainTwice",
+                      uncertain(R"({"of": ["fx", "fx"], "matrix": [[1, 0], [0, 1]]})"),
+                      "named twice"},
+        RefusedCamera{"UncertainByALine", uncertain(R"({"of": ["fx"], "matrix": [1]})"),
+                      "list of 1"},
+        RefusedCamera{"UncertainByTooFewRows",
+                      uncertain(R"({"of": ["fx", "fy"], "matrix": [[1, 0]]})"), "must have 2 rows"},
+        RefusedCamera{"UncertainByLessThanNothing",
+                      uncertain(R"({"of": ["fx", "fy"], "matrix": [[1, 2], [2, 1]]})"),
+                      "no covariance"},
+        RefusedCamera{"LongShutter", with("0.25", "2.5"), "0..1"},
+        RefusedCamera{"NoRate", with("\"fps\": 120", "\"fps\": 0"), "\"fps\" = 0"}),
     [](const auto& instance) { return instance.param.name; });
 
 // The rendered recordings print truth with five digits after the point in pixels; metres with

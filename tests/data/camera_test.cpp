@@ -144,5 +144,42 @@ TEST(CameraSize, ThatIsNotTheRecordingsIsRefusedWithBothNames) {
   EXPECT_NO_THROW(camera.check_size(1280, 720, "ring.mp4"));
 }
 
+// Straight above, a turn about the line of sight turns the picture, one about x lowers a side.
+TEST(MovedCamera, IsOffByWhatIsSaid) {
+  constexpr double kHeight_m = 0.8;
+  const Camera camera = Camera::overhead(640, 480, 1500.0, kHeight_m);
+  const auto moves = [&](int number, double by, const Eigen::Vector3d& point_m) {
+    return Eigen::Vector2d(
+        camera.moved(by * Camera::Deviation::Unit(number)).image_from_table<double>(point_m) -
+        camera.image_from_table<double>(point_m));
+  };
+  constexpr double kTurn_rad = 1e-4, kShift_m = 1e-4, kOff_m = 0.1;
+  const Eigen::Vector3d right(kOff_m, 0.0, 0.0), up(0.0, kOff_m, 0.0);
+  EXPECT_NEAR(moves(2, 3.0, right).x(), 3.0, 1e-12);  // cx
+  EXPECT_NEAR(moves(12, kShift_m, right).x(), 1500.0 * kShift_m, 1e-12);
+  EXPECT_NEAR(moves(11, kTurn_rad, right).y(), 1500.0 * kOff_m * kTurn_rad, 1e-6);
+  // What is up in the picture comes nearer by 0.01 mm, and is seen farther out.
+  EXPECT_NEAR(moves(9, kTurn_rad, up).y(), -1500.0 * kOff_m * kOff_m * kTurn_rad / kHeight_m, 1e-5);
+  EXPECT_EQ(camera.moved(0.1 * Camera::Deviation::Unit(4)).distortion[0], 0.1);
+}
+
+TEST(LikelyDeviations, AddUpToTheCovariance) {
+  Camera camera = tilted_camera();
+  EXPECT_EQ(camera.likely_deviations().cols(), 0);
+  // Of three independent causes, in pixels, radians and metres.
+  Eigen::Matrix<double, Camera::kNumbers, 3> causes = decltype(causes)::Zero();
+  causes(0, 0) = 2.0, causes(14, 0) = 1e-3;
+  causes(9, 1) = 1e-4, causes(13, 1) = -2e-4;
+  causes(0, 2) = 0.5, causes(9, 2) = 3e-5;
+  camera.covariance = causes * causes.transpose();
+  const auto found = camera.likely_deviations();
+  ASSERT_EQ(found.cols(), 3);
+  const Eigen::MatrixXd sum = found * found.transpose();
+  for (int i = 0; i < Camera::kNumbers; ++i)
+    for (int k = 0; k < Camera::kNumbers; ++k)
+      EXPECT_NEAR(sum(i, k), camera.covariance(i, k),
+                  1e-12 * std::sqrt(camera.covariance(i, i) * camera.covariance(k, k)));
+}
+
 }  // namespace
 }  // namespace trochoid::data

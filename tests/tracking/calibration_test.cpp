@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <numbers>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -278,6 +279,120 @@ TEST(Calibration, LeavesNoViewOutThatIsAsGoodAsTheOthers) {
         p += Eigen::Vector2d(noise_px(random), noise_px(random));
     EXPECT_TRUE(calibrate(views, {640, 480}).left_out.empty()) << seed;
   }
+}
+
+// Corners of the boards of kLooks, off by noise of 0.1 px.
+constexpr double kCornerNoise_px = 0.1;
+
+std::vector<BoardView> noisy_views(std::mt19937_64& generator) {
+  std::normal_distribution<double> normal(0.0, kCornerNoise_px);
+  std::vector<BoardView> views;
+  for (const auto& [distance, about_x, about_y] : kLooks) {
+    const data::Camera camera = looking(distance, about_x, about_y);
+    BoardView view;
+    for (int i = 0; i < kColumns * kRows; ++i) {
+      view.board_m.emplace_back(kSquare_m * (i % kColumns - 0.5 * (kColumns - 1)),
+                                kSquare_m * (i / kColumns - 0.5 * (kRows - 1)));
+      const Eigen::Vector2d& at = view.board_m.back();
+      view.image_px.push_back(camera.image_from_table<double>({at.x(), at.y(), 0.0}) +
+                              Eigen::Vector2d(normal(generator), normal(generator)));
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+// Points of a plane off by as much, as the true camera sees them.
+std::vector<Eigen::Vector2d> noisy_images(const data::Camera& truth,
+                                          const std::vector<Eigen::Vector3d>& points_m,
+                                          std::mt19937_64& generator) {
+  std::normal_distribution<double> normal(0.0, kCornerNoise_px);
+  std::vector<Eigen::Vector2d> out;
+  for (const Eigen::Vector3d& at : points_m)
+    out.push_back(truth.image_from_table<double>(at) +
+                  Eigen::Vector2d(normal(generator), normal(generator)));
+  return out;
+}
+
+// What the true camera is off by, as the one found counts it.
+data::Camera::Deviation off_by(const data::Camera& found, const data::Camera& truth) {
+  const Eigen::AngleAxisd turn(
+      Eigen::Matrix3d(truth.camera_from_table * found.camera_from_table.transpose()));
+  data::Camera::Deviation out;
+  out << truth.fx - found.fx, truth.fy - found.fy, truth.cx - found.cx, truth.cy - found.cy,
+      Eigen::Matrix<double, 5, 1>::Zero(), turn.angle() * turn.axis(),
+      truth.camera_from_table_m - found.camera_from_table_m;
+  for (int i = 0; i < 5; ++i) out[4 + i] = truth.distortion[i] - found.distortion[i];
+  return out;
+}
+
+// Mean over seeds of the square of what the camera is off by in its own standard deviations, over
+// how many numbers are uncertain: 1 if these are honest.
+double normalised_square(const data::Camera& truth,
+                         const std::function<void(Calibration&, const std::vector<BoardView>&,
+                                                  std::mt19937_64&)>& place_floor) {
+  constexpr int kSeeds = 25;
+  double sum = 0.0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    std::mt19937_64 generator(static_cast<std::uint64_t>(seed));
+    const std::vector<BoardView> views = noisy_views(generator);
+    Calibration result = calibrate(views, {640, 480});
+    place_floor(result, views, generator);
+    const Eigen::MatrixXd causes = result.camera.likely_deviations();
+    const Eigen::VectorXd along = causes.colPivHouseholderQr().solve(off_by(result.camera, truth));
+    sum += along.squaredNorm() / static_cast<double>(causes.cols()) / kSeeds;
+  }
+  return sum;
+}
+
+// Of 25 times 13 or 14 squares the mean scatters by sqrt(2 / 340) = 8 %; four of these.
+constexpr double kHonest = 0.3;
+
+TEST(Calibration, KnowsHowFarACameraMayBeOffWhereABoardShowsTheFloor) {
+  const auto& [distance, about_x, about_y] = kLooks[0];
+  EXPECT_NEAR(normalised_square(looking(distance, about_x, about_y),
+                                [](Calibration& result, const auto& views, auto&) {
+                                  (void)set_floor(result.camera,
+                                                  {views[0].board_m, views[0].image_px}, 0.0,
+                                                  result.rms_px);
+                                }),
+              1.0, kHonest);
+}
+
+TEST(Calibration, KnowsHowFarACameraMayBeOffWhereFourPointsShowTheFloor) {
+  const data::Camera truth = looking(0.6, 0.3, -0.2);
+  const std::vector<Eigen::Vector2d> table_m{{0.0, 0.0}, {0.1, 0.0}, {0.1, 0.08}, {0.0, 0.08}};
+  std::vector<Eigen::Vector3d> points_m;
+  for (const Eigen::Vector2d& at : table_m) points_m.emplace_back(at.x(), at.y(), 0.0);
+  // Their own scatter, of eight numbers less six, is larger than the corners' every third time.
+  EXPECT_NEAR(normalised_square(truth,
+                                [&](Calibration& result, const auto&, auto& generator) {
+                                  (void)set_floor(
+                                      result.camera,
+                                      {table_m, noisy_images(truth, points_m, generator)}, 0.0,
+                                      result.rms_px);
+                                }),
+              1.0 - 0.5 * kHonest, kHonest);
+}
+
+TEST(Calibration, KnowsHowFarACameraMayBeOffWhereACircleShowsTheFloor) {
+  // Its x is to the right in the picture and its origin under the circle, as the found one's; of
+  // the two planes that look the same this one is seen more squarely.
+  data::Camera truth = looking(0.6, 0.05, 0.0);
+  truth.camera_from_table_m = {0.12, 0.06, 0.6};
+  constexpr double kRadius_m = 0.08, kHeight_m = 0.008;
+  std::vector<Eigen::Vector3d> rim_m;
+  for (int i = 0; i < 24; ++i) {
+    const double a = 2.0 * std::numbers::pi * i / 24;
+    rim_m.emplace_back(kRadius_m * std::cos(a), kRadius_m * std::sin(a), kHeight_m);
+  }
+  EXPECT_NEAR(normalised_square(truth,
+                                [&](Calibration& result, const auto&, auto& generator) {
+                                  (void)set_floor_from_circle(result.camera,
+                                                              noisy_images(truth, rim_m, generator),
+                                                              kRadius_m, kHeight_m, result.rms_px);
+                                }),
+              1.0, kHonest);
 }
 
 TEST(Calibration, RefusesTooLittle) {

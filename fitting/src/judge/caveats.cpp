@@ -108,6 +108,9 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
         "nothing shows the puck's spin: the friction is that of one that does not turn, and its "
         "error bar allows for a rim as fast as the puck slides, as far as the path does not rule "
         "that out; a mark on the face would tell");
+}
+
+void tell_idle_priors(const Problem& problem, const data::Scene& scene, data::Fit& fit) {
   for (const std::string& name : idle_priors(problem, scene))
     fit.warnings.push_back(fmt::format(
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
@@ -141,6 +144,18 @@ void tell_other_rate(const data::Scene& scene, std::span<const data::Track> trac
                   "and its times are kept; if they are wrong, track again with [camera] "
                   "frame_rate_hz = {:g}",
                   prior->second.value, rate_hz, prior->second.value));
+}
+
+void tell_camera_share(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+  constexpr double kMost = 0.5;
+  std::vector<std::string> names;
+  for (int i = 0; i < static_cast<int>(error.camera_share.size()); ++i)
+    if (error.camera_share[i] > kMost) names.push_back(problem.name(i));
+  if (!names.empty())
+    fit.warnings.push_back(fmt::format(
+        "most of the error bar{} of {} is the camera's calibration: more pictures of "
+        "the board, on the floor and tilted, would narrow {}",
+        names.size() == 1 ? "" : "s", fmt::join(names, ", "), names.size() == 1 ? "it" : "them"));
 }
 
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {

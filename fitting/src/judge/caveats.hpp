@@ -27,9 +27,15 @@ void heed_single_samples(const Problem& problem, const Solution& solution, Uncer
 void heed_doubts(const Problem& problem, const Solution& solution, const data::Scene& scene,
                  double frame_s, Uncertainty& error, data::Fit& fit);
 
+/// Priors of what the model does not have.
+void tell_idle_priors(const Problem& problem, const data::Scene& scene, data::Fit& fit);
+
 /// A recording's own rate and one that is given for its camera may differ: then only what the
 /// latter says of its own error is taken.
 void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks, data::Fit& fit);
+
+/// Error bars that the camera's calibration makes up most of.
+void tell_camera_share(const Problem& problem, const Uncertainty& error, data::Fit& fit);
 
 /// Slips of units that a fit would follow without a word.
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);

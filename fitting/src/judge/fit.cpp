@@ -298,6 +298,7 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
   const auto refuse_with = [&](const std::string& reason) {
     refused_ = true;
     refuse(problem_, reason, fit_);
+    tell_idle_priors(problem_, scene_, fit_);
     tell_unlikely_body(scene_, fit_);
     tell_held(scene_, fit_);
   };
@@ -345,6 +346,8 @@ data::Fit OneFit::described(Bars bars) {
   if (bars == Bars::full) heed_far_side(problem_, solution_, options_.threads, error, fit);
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
+  tell_idle_priors(problem_, scene_, fit);
+  tell_camera_share(problem_, error, fit);
   tell_idle_pivot(problem_, scene_, fit);
   tell_unlikely_body(scene_, fit);
   tell_other_rate(scene_, tracks_, fit);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "observe/camera_error.hpp"
 #include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "problem/linearise.hpp"
@@ -95,6 +96,26 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
   return typical > 0.0 ? Eigen::VectorXd(size / typical * rows) : rows;
 }
 
+// What the camera's likely deviations do to the residuals of all channels, one each.
+std::vector<Eigen::VectorXd> camera_offsets(const Problem& problem, const Linearised& all) {
+  std::vector<Eigen::VectorXd> out(problem.arcs.front().camera_shifts.size(),
+                                   Eigen::VectorXd::Zero(all.jacobian.rows()));
+  int first = 0;
+  for (int a = 0; a < static_cast<int>(problem.arcs.size()); ++a) {
+    const ArcData& arc = problem.arcs[static_cast<std::size_t>(a)];
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      Eigen::VectorXd rows = whitened(arc, arc.camera_shifts[k]);
+      for (const Reading& reading : arc.readings)
+        rows.segment(reading.row, rows_of(reading.channel)) *=
+            robust_weight(problem, a, reading) /
+            problem.noise_scale[static_cast<std::size_t>(reading.channel)];
+      out[k].segment(first, arc.rows) = rows;
+    }
+    first += arc.rows;
+  }
+  return out;
+}
+
 data::NullVector null_vector(const Problem& problem, const Eigen::VectorXd& direction, double sd) {
   data::NullVector vector;
   std::string list;
@@ -179,10 +200,11 @@ double student_factor(double degrees_of_freedom) {
   return 1.0 + (first + second / n) / (n * z);
 }
 
-// Noise of all channels, and the offsets that may be common to a whole record.
+// Noise of all channels, and the offsets that may be common to a whole record: the tracker's, and
+// what the camera's calibration allows for.
 struct Noise {
   std::vector<ChannelNoise> channels;
-  std::vector<Eigen::VectorXd> offsets;
+  std::vector<Eigen::VectorXd> offsets, of_camera;
 };
 
 Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::MatrixXd& scaled,
@@ -215,6 +237,7 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
       result.whiteness.correlation_time_s = one.correlation_time_s;
     }
   }
+  found.of_camera = camera_offsets(problem, all);
   return found;
 }
 
@@ -232,10 +255,10 @@ Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const No
 }
 
 // What offsets that are common to a whole record add to it.
-Eigen::MatrixXd of_offsets(const Noise& noise, const Eigen::MatrixXd& scaled,
-                           const Eigen::MatrixXd& bread) {
+Eigen::MatrixXd of_offsets(const std::vector<Eigen::VectorXd>& offsets,
+                           const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(bread.rows(), bread.cols());
-  for (const Eigen::VectorXd& offset : noise.offsets) {
+  for (const Eigen::VectorXd& offset : offsets) {
     const Eigen::VectorXd shift = bread * (scaled.transpose() * offset);
     covariance += shift * shift.transpose();
   }
@@ -290,7 +313,8 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const Directions seen = directions_of(problem, scaled, result);
   const Noise noise = noise_of(problem, all, scaled, seen, result);
   const Eigen::MatrixXd scatter = sandwich(problem, all, noise, scaled, seen.bread);
-  Eigen::MatrixXd covariance = scatter + of_offsets(noise, scaled, seen.bread);
+  const Eigen::MatrixXd of_camera = of_offsets(noise.of_camera, scaled, seen.bread);
+  Eigen::MatrixXd covariance = scatter + of_offsets(noise.offsets, scaled, seen.bread) + of_camera;
   result.chi2_inflation.resize(count);
   for (int i = 0; i < count; ++i)
     result.chi2_inflation[i] =
@@ -316,6 +340,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   result.widened = typical_widening(variances_given(hung, kept), variances_given(plain, kept));
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
+  result.camera_share = of_camera.diagonal().cwiseQuotient(covariance.diagonal());
   return result;
 }
 

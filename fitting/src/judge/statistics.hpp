@@ -23,6 +23,7 @@ struct Uncertainty {
   /// Times the error bars are wider than those of independent residuals, typically, for what these
   /// have in common; offsets of a whole record, which no residuals show, not counted.
   double widened = 1.0;
+  Eigen::VectorXd camera_share;  ///< of each variance, that of the camera's calibration; 0..1
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
   /// their correlation allowed for, without its constant.
   double minus2_log_likelihood = 0.0;
@@ -41,8 +42,8 @@ struct Uncertainty {
 /// residuals of each channel allow (noise.hpp), and by Student's quantile where these are few.
 /// Every filmed channel may be off altogether, in all recordings alike, by half of what its
 /// readings scatter by or a quarter of their own sigmas, positions also to the side the face that
-/// is seen looks to. Where the valley of chi-square bends within a standard deviation, the second
-/// moment of the bend is added.
+/// is seen looks to; and the camera as its calibration allows (camera_error.hpp). Where the valley
+/// of chi-square bends within a standard deviation, the second moment of the bend is added.
 [[nodiscard]] Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u);
 
 /// Largest change of a whitened residual when the integrator works a hundred times finer; where

@@ -129,6 +129,8 @@ ArcData ArcData::keep(const std::vector<int>& samples) const {
     reading.sample = renumbered[reading.sample];
     if (reading.sample >= 0) part.readings.push_back(reading);
   }
+  for (CameraShifts& shifts : part.camera_shifts)
+    shifts = CameraShifts(shifts(samples, Eigen::all));
   number_rows(part);
   return part;
 }

@@ -26,6 +26,10 @@ struct Reading {
   int row = 0;                      ///< first residual row
 };
 
+/// What one likely deviation of the camera shifts each sample by: x, y [m], tilt, precession times
+/// its sine, spin [rad].
+using CameraShifts = Eigen::Matrix<double, Eigen::Dynamic, 5>;
+
 /// The measurements of one arc, ready for residuals.
 struct ArcData {
   int track = 0;
@@ -40,7 +44,8 @@ struct ArcData {
   /// Tilt and precession are compared each by itself: from afar every turn leads downhill.
   bool angles_apart = false;
   bool filmed = false;  ///< has pixel positions: measured in images, with their common errors
-  bool held = false;    ///< samples before these were left out: the body was held or pushed
+  std::vector<CameraShifts> camera_shifts;  ///< of the deviations that matter (camera_error.hpp)
+  bool held = false;           ///< samples before these were left out: the body was held or pushed
   bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
 
   [[nodiscard]] int observable_index(model::Observable observable) const;  ///< -1 if absent

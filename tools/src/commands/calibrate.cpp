@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -266,20 +267,23 @@ std::vector<Eigen::Vector2d> circle_points(const CalibrateOptions& options) {
 }
 
 // The table frame from whatever says where the floor is; a sentence about it.
-std::string place_floor(const CalibrateOptions& options, const Views& views, data::Camera& camera) {
+std::string place_floor(const CalibrateOptions& options, const Views& views,
+                        tracking::Calibration& result) {
   const double height_m = 1e-3 * options.floor_height_mm;
+  data::Camera& camera = result.camera;
   if (!options.floor_points.empty()) {
     const tracking::FloorPoints floor = floor_points(options);
-    const double rms = tracking::set_floor(camera, floor, height_m);
+    const double rms = tracking::set_floor(camera, floor, height_m, result.rms_px);
     return fmt::format("floor from {} points, rms {:.3f} px", floor.table_m.size(), rms);
   }
   if (!options.circle_points.empty()) {
-    const double rms = tracking::set_floor_from_circle(camera, circle_points(options),
-                                                       1e-3 * options.radius_mm, height_m);
+    const double rms = tracking::set_floor_from_circle(
+        camera, circle_points(options), 1e-3 * options.radius_mm, height_m, result.rms_px);
     return fmt::format("floor from a circle, rms {:.3f} px", rms);
   }
   const tracking::BoardView& view = views.found[floor_view(options, views)];
-  const double rms = tracking::set_floor(camera, {view.board_m, view.image_px}, height_m);
+  const double rms =
+      tracking::set_floor(camera, {view.board_m, view.image_px}, height_m, result.rms_px);
   return fmt::format(
       "floor: the board in {}, rms {:.3f} px{}; origin in its middle, x along its rows", view.name,
       rms, options.floor.empty() ? " (the first picture; choose another with --floor)" : "");
@@ -308,6 +312,41 @@ void draw_check(const CalibrateOptions& options, const Views& views, data::Camer
   write_picture(picture, options.picture);
 }
 
+// Standard deviation of where a pixel's point of the floor is, the longer axis [m].
+double floor_sigma_m(const data::Camera& camera, const Eigen::Vector2d& image_px) {
+  constexpr double kPart = 1e-3;  // of a deviation, so that the distortion holds
+  const Eigen::Vector3d here = camera.table_from_image(image_px);
+  const auto deviations = camera.likely_deviations();
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (Eigen::Index k = 0; k < deviations.cols(); ++k) {
+    const data::Camera moved = camera.moved(kPart * deviations.col(k));
+    const Eigen::Vector2d off = (moved.table_from_image(image_px) - here).head<2>() / kPart;
+    covariance += off * off.transpose();
+  }
+  return std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
+}
+
+// The same in the middle of the picture and at the worst of its corners that show the floor.
+struct FloorSigma {
+  double middle_m = 0.0, worst_m = 0.0;
+};
+
+FloorSigma floor_sigma(const data::Camera& camera) {
+  const Eigen::Vector2d size(camera.width_px - 1, camera.height_px - 1);
+  FloorSigma out;
+  for (const Eigen::Vector2d& share :
+       {Eigen::Vector2d(0.5, 0.5), Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1.0, 0.0),
+        Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(1.0, 1.0)}) {
+    try {
+      const double here_m = floor_sigma_m(camera, size.cwiseProduct(share));
+      if (share.x() == 0.5) out.middle_m = here_m;
+      out.worst_m = std::max(out.worst_m, here_m);
+    } catch (const NumericalError&) {  // above the horizon, or where the distortion does not hold
+    }
+  }
+  return out;
+}
+
 void tell(const CalibrateOptions& options, const Views& views, const tracking::Calibration& result,
           const std::string& floor) {
   const std::size_t worst = worst_view(result);
@@ -318,6 +357,7 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
     if (is_left_out(result, i)) left_out.push_back(views.found[i].name);
   const data::Camera& c = result.camera;
   const Eigen::Vector3d at = c.position_m();
+  const FloorSigma known = floor_sigma(c);
   if (options.json)
     return print_json({{"camera", options.output.string()},
                        {"views", views.found.size()},
@@ -329,6 +369,7 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
                        {"sigma_focal_px", result.sigma_focal_px},
                        {"sigma_centre_px", result.sigma_centre_px},
                        {"floor", floor},
+                       {"floor_sigma_m", {known.middle_m, known.worst_m}},
                        {"camera_m", {at.x(), at.y(), at.z()}}});
   fmt::print(
       "{}: board found in {} of {} pictures{}, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
@@ -341,6 +382,11 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
       c.fx, c.fy, result.sigma_focal_px, c.cx, c.cy, result.sigma_centre_px, c.distortion[0],
       result.sigma_k1, c.distortion[1]);
   fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
+  constexpr double kMm = 1e3;
+  fmt::print(
+      "a point of the floor is known to {:.2g} mm in the middle of the picture, {:.2g} mm in the "
+      "worst corner (squares of the board taken as exact)\n",
+      kMm * known.middle_m, kMm * known.worst_m);
 }
 
 // Before the pictures, which take time to look at.
@@ -367,7 +413,7 @@ void run(const CalibrateOptions& options) {
   Views views = look_at_inputs(options, pattern);
   tracking::Calibration result = tracking::calibrate(views.found, views.size);
   set_aside(result, views);
-  const std::string floor = place_floor(options, views, result.camera);
+  const std::string floor = place_floor(options, views, result);
   // The picture first, which may fail: an earlier camera is still there then.
   if (!options.picture.empty()) draw_check(options, views, result.camera);
   data::write_camera(result.camera, options.output);

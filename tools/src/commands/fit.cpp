@@ -2,9 +2,11 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
@@ -14,6 +16,7 @@
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
 #include "common/scene_library.hpp"
+#include "common/timing.hpp"
 #include "common/validators.hpp"
 #include "common/value_words.hpp"
 #include "trochoid/data/error.hpp"
@@ -182,9 +185,10 @@ std::string advice(const data::Fit& fit, const data::Scene& scene,
 }
 
 void run(const FitCommand& command) {
+  const Stopwatch watch;
   std::vector<std::filesystem::path> read(command.tracks.begin(), command.tracks.end());
   read.emplace_back(command.scene);
-  check_output(command.output, read);
+  check_outputs({command.output, timing_file(command.output)}, read);
   static_cast<void>(data::parse_window(command.options.from, command.options.to));
   Checksums inputs;
   std::vector<std::string> remarks;
@@ -202,7 +206,12 @@ void run(const FitCommand& command) {
   }
   data::Fit fit = fitted(command, tracks, scene);
   fit.inputs = std::move(inputs);
-  if (!command.output.empty()) data::write_fit(fit, command.output);
+  if (!command.output.empty()) {
+    data::write_fit(fit, command.output);
+    write_timing(command.output, {{"command", "fit"},
+                                  {"seconds", watch.seconds()},
+                                  {"models", std::max<std::size_t>(1, fit.comparison.size())}});
+  }
   if (command.json)
     fmt::print("{}", data::fit_text(fit, "fit"));
   else

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
+#include "common/timing.hpp"
 #include "common/track_options.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -28,28 +28,6 @@ struct TrackCommandOptions {
   fs::path edges, smooth, output;
   bool json = false;
 };
-
-/// Run times live beside the track, so that the track itself is the same from run to run. Beside a
-/// device or a pipe (/dev/stdout, also where it leads into a file) there is no place for them:
-/// empty.
-fs::path timing_file(fs::path track) {
-  std::error_code ignored;
-  const fs::path folder = fs::weakly_canonical(fs::absolute(track, ignored).parent_path(), ignored);
-  if (folder == "/dev" || folder.string().starts_with("/proc/") ||
-      (fs::exists(track, ignored) && !fs::is_regular_file(track, ignored)))
-    return {};
-  return track.replace_extension(".timing.json");
-}
-
-void write_timing(const fs::path& track, double seconds, const tracking::TrackSummary& summary) {
-  const fs::path file = timing_file(track);
-  if (file.empty()) return;
-  const nlohmann::json timing = {{"command", "track"},
-                                 {"seconds", seconds},
-                                 {"frames", summary.frames},
-                                 {"frames_per_s", static_cast<double>(summary.frames) / seconds}};
-  data::write_text(timing.dump(2) + "\n", file);
-}
 
 /// Frame by frame what deserves a look: gaps, and samples to be doubted.
 void detail_tracks(const data::TrackFile& file) {
@@ -105,7 +83,7 @@ void tell(const TrackCommandOptions& options, const tracking::TrackResult& resul
 }
 
 void run(const TrackCommandOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   check_outputs({options.output, options.edges, options.smooth, timing_file(options.output)},
                 {options.inputs.video, options.inputs.scene, options.inputs.camera});
   const TrackInputs& inputs = options.inputs;
@@ -128,8 +106,12 @@ void run(const TrackCommandOptions& options) {
     smoothed = tracking::smooth_track(result.file);
     data::write_table(smoothed->table, options.smooth);
   }
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  write_timing(options.output, elapsed.count(), result.summary);
+  const double seconds = watch.seconds();
+  write_timing(options.output,
+               {{"command", "track"},
+                {"seconds", seconds},
+                {"frames", result.summary.frames},
+                {"frames_per_s", static_cast<double>(result.summary.frames) / seconds}});
   detail_tracks(result.file);
   tell(options, result, smoothed);
   check_found(result.file, scene.tracking.objects);

@@ -46,6 +46,7 @@ data::Fit fit_job(std::span<const data::Track> tracks, data::Scene scene,
   fit.versions["trochoid"] = TROCHOID_VERSION;
   if (!options.model.empty() && !compare) scene.model.name = fit.model;
   if (scene.model.name == "auto") scene.model.name = fit.model;
+  scene.fit.free_pivot = scene.fit.free_pivot || options.free_pivot;
   fit.scene_toml = data::to_toml(scene);
   return fit;
 }

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <opencv2/calib3d.hpp>
 
+#include "calibrate/camera_error.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/quantile.hpp"
 #include "trochoid/tracking/calibration.hpp"
@@ -32,6 +33,22 @@ std::size_t different_tilts(const std::vector<cv::Mat>& rotations) {
       normals.push_back(normal);
   }
   return normals.size();
+}
+
+// A view as the camera sees it from where OpenCV puts the camera, the board in units of `unit_m`.
+PosedView posed(const data::Camera& camera, const BoardView& view, double unit_m,
+                const cv::Mat& rotation, const cv::Mat& translation) {
+  PosedView out{camera, [&view, unit_m](const data::Camera& at) {
+                  return reprojection_px(at, view.board_m, view.image_px, 1.0 / unit_m, 0.0);
+                }};
+  cv::Mat attitude;
+  cv::Rodrigues(rotation, attitude);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      out.camera.camera_from_table(row, column) = attitude.at<double>(row, column);
+    out.camera.camera_from_table_m[row] = translation.at<double>(row);
+  }
+  return out;
 }
 
 // The farthest coordinate of a corner on the board.
@@ -64,12 +81,12 @@ Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_
                                 static_cast<float>(view.image_px[i].y()));
     }
   }
-  cv::Mat matrix, distortion, intrinsic_sd, extrinsic_sd, view_rms;
+  cv::Mat matrix, distortion, view_rms;
   std::vector<cv::Mat> rotations, translations;
   double rms = 0.0;
   try {
     rms = cv::calibrateCamera(board, image, size_px, matrix, distortion, rotations, translations,
-                              intrinsic_sd, extrinsic_sd, view_rms, cv::CALIB_FIX_K3);
+                              cv::noArray(), cv::noArray(), view_rms, cv::CALIB_FIX_K3);
   } catch (const cv::Exception& error) {
     throw NumericalError(
         fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
@@ -92,9 +109,14 @@ Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_
   out.rms_px = rms / std::sqrt(2.0);  // OpenCV counts both coordinates of a corner as one
   for (int i = 0; i < view_rms.rows; ++i)
     out.view_rms_px.push_back(view_rms.at<double>(i) / std::sqrt(2.0));
-  out.sigma_focal_px = std::max(intrinsic_sd.at<double>(0), intrinsic_sd.at<double>(1));
-  out.sigma_centre_px = std::max(intrinsic_sd.at<double>(2), intrinsic_sd.at<double>(3));
-  out.sigma_k1 = intrinsic_sd.at<double>(4);
+  std::vector<PosedView> seen;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    seen.push_back(posed(camera, views[i], unit_m, rotations[i], translations[i]));
+  set_optics_covariance(camera, seen);
+  const Eigen::VectorXd sigma = camera.covariance.diagonal().cwiseSqrt();
+  out.sigma_focal_px = std::max(sigma[0], sigma[1]);
+  out.sigma_centre_px = std::max(sigma[2], sigma[3]);
+  out.sigma_k1 = sigma[4];
   constexpr double kUseless = 0.2;
   // Boards that are never tilted let the focal length run away, with an error bar that is none.
   constexpr double kLongestLens = 1000.0;  // in pictures' widths: 0.06 degrees from side to side

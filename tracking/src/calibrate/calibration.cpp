@@ -13,6 +13,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calibrate/camera_error.hpp"
 #include "trochoid/data/error.hpp"
 
 namespace trochoid::tracking {
@@ -161,14 +162,8 @@ bool lie_on_a_line(const std::vector<Eigen::Vector2d>& points) {
   return scatter.determinant() <= 1e-6 * scatter.trace() * scatter.trace();
 }
 
-double rms_px(const data::Camera& camera, const FloorPoints& points, double height_m) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < points.table_m.size(); ++i)
-    sum +=
-        (camera.image_from_table<double>({points.table_m[i].x(), points.table_m[i].y(), height_m}) -
-         points.image_px[i])
-            .squaredNorm();
-  return std::sqrt(0.5 * sum / static_cast<double>(points.table_m.size()));
+double rms_of(const Eigen::VectorXd& residuals) {
+  return std::sqrt(residuals.squaredNorm() / static_cast<double>(residuals.size()));
 }
 
 }  // namespace
@@ -184,7 +179,8 @@ std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pat
   return view;
 }
 
-double set_floor(data::Camera& camera, const FloorPoints& points, double height_m) {
+double set_floor(data::Camera& camera, const FloorPoints& points, double height_m,
+                 double sigma_px) {
   const std::size_t n = points.table_m.size();
   if (n < 4 || n != points.image_px.size())
     throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
@@ -218,7 +214,11 @@ double set_floor(data::Camera& camera, const FloorPoints& points, double height_
         fmt::format("the {} points of the floor are seen from below; x, y and up must be "
                     "right-handed as seen by the camera",
                     n));
-  return rms_px(camera, points, height_m);
+  const auto residuals = [&](const data::Camera& at) {
+    return reprojection_px(at, points.table_m, points.image_px, 1.0, height_m);
+  };
+  add_pose_covariance(camera, residuals, sigma_px);
+  return rms_of(residuals(camera));
 }
 
 namespace {
@@ -278,10 +278,6 @@ struct RimRays {
   }
 };
 
-double rms_of(const Eigen::VectorXd& residuals) {
-  return std::sqrt(residuals.squaredNorm() / static_cast<double>(residuals.size()));
-}
-
 /// Levenberg-Marquardt with differences. @throws NumericalError if it does not settle.
 SeenCircle nearest_circle(const RimRays& rim, const SeenCircle& start) {
   constexpr int kIterations = 50;
@@ -328,10 +324,25 @@ void set_frame(const SeenCircle& circle, double height_m, data::Camera& camera) 
   camera.camera_from_table_m = centre_of(circle) - height_m * up;
 }
 
+/// How far points are from the circle about the table's origin, and last how far x, which nothing
+/// in the picture tells, points from where set_frame wants it.
+Eigen::VectorXd off_circle_px(const data::Camera& camera,
+                              const std::vector<Eigen::Vector2d>& rim_px, double radius_m,
+                              double height_m) {
+  constexpr double kExactly = 1e9;
+  const double px_per_m = camera.fx / camera.depth_m({0.0, 0.0, height_m});
+  Eigen::VectorXd out(static_cast<Eigen::Index>(rim_px.size()) + 1);
+  for (std::size_t i = 0; i < rim_px.size(); ++i)
+    out[static_cast<Eigen::Index>(i)] =
+        px_per_m * (camera.table_from_image(rim_px[i], height_m).head<2>().norm() - radius_m);
+  out[out.size() - 1] = kExactly * camera.camera_from_table(0, 1);
+  return out;
+}
+
 }  // namespace
 
 double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
-                             double radius_m, double height_m) {
+                             double radius_m, double height_m, double sigma_px) {
   constexpr std::size_t kFewest = 6;
   if (rim_px.size() < kFewest)
     throw InputError(
@@ -349,6 +360,9 @@ double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vect
         "points and the camera",
         rim_px.size(), centre_of(circle).z(), -centre_of(circle).dot(normal_of(circle))));
   set_frame(circle, height_m, camera);
+  add_pose_covariance(
+      camera, [&](const data::Camera& at) { return off_circle_px(at, rim_px, radius_m, height_m); },
+      sigma_px);
   return rms_of(rim.residuals(circle));
 }
 

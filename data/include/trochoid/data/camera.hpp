@@ -40,12 +40,26 @@ struct Camera {
   Transfer transfer = Transfer::srgb;
   std::string file;  ///< where it was read from, for messages; empty if it was made
 
+  /// By how much the numbers of a camera may be off: fx, fy, cx, cy (as above), k1, k2, p1, p2, k3,
+  /// a turn about the camera's axes [rad] and a shift along them [m]. A camera that is off by
+  /// `turn` and `shift` has R = exp(turn) R, t = t + shift.
+  static constexpr int kNumbers = 15;
+  using Deviation = Eigen::Matrix<double, kNumbers, 1>;
+  /// Of the deviations that its calibration allows for, kNumbers square; empty if it is exact.
+  Eigen::MatrixXd covariance;
+
   /// Orthographic camera straight above: table origin at the centre of the image.
   /// @param scale_px_per_m pixels per metre on the floor, > 0.
   static Camera from_scale(int width_px, int height_px, double scale_px_per_m);
   /// Distortion-free pinhole straight above the image centre, `height_m` over the floor, that shows
   /// `scale_px_per_m` on the floor.
   static Camera overhead(int width_px, int height_px, double scale_px_per_m, double height_m);
+
+  /// The camera with its numbers off by that much.
+  [[nodiscard]] Camera moved(const Deviation& by) const;
+  /// Independent deviations, one in a column, each as large as its standard deviation: their outer
+  /// products sum up to the covariance. The largest in proportion first; none of an exact camera.
+  [[nodiscard]] Eigen::Matrix<double, kNumbers, Eigen::Dynamic> likely_deviations() const;
 
   /// A camera that was calibrated for pictures of another size measures nothing in these.
   /// @throws InputError naming the camera's file and the recording, unless its size is unknown.

@@ -44,7 +44,8 @@ struct LeftOut {
   double rms_px = 0.0;  ///< of the view, per coordinate, as the camera of the others sees it
 };
 
-/// A camera from several views of a board. Its table frame is not set yet.
+/// A camera from several views of a board. Its table frame is not set yet; its covariance is that
+/// of its optics.
 struct Calibration {
   data::Camera camera;
   double rms_px = 0.0;              ///< reprojection error per coordinate, over all corners used
@@ -68,17 +69,22 @@ struct FloorPoints {
 };
 
 /// Sets the table frame of a camera from at least four points of a plane `height_m` above the floor
-/// (a board lying on it: its thickness). @returns the rms reprojection error per coordinate [px].
+/// (a board lying on it: its thickness), and completes the camera's covariance.
+/// @param sigma_px  standard deviation of the points per coordinate, should they scatter by less.
+/// @returns the rms reprojection error per coordinate [px].
 /// @throws InputError for fewer than four points or points on a line.
-double set_floor(data::Camera& camera, const FloorPoints& points, double height_m);
+double set_floor(data::Camera& camera, const FloorPoints& points, double height_m,
+                 double sigma_px = 0.0);
 
 /// Sets the table frame from points of the rim [px] of a body of known radius that lies on its
 /// face, `height_m` the height of that rim above the floor: origin under its centre, x to the right
 /// in the picture. Of the two planes in which a circle can lie to look the same, the one the camera
-/// looks at more squarely is taken. @returns the rms distance of the points from the circle [px].
+/// looks at more squarely is taken. Completes the camera's covariance.
+/// @param sigma_px  standard deviation of the points, should they scatter by less.
+/// @returns the rms distance of the points from the circle [px].
 /// @throws InputError for fewer than six points, all within a pixel or on a line; NumericalError if
 /// no circle settles on them, or one that is not seen from above.
 double set_floor_from_circle(data::Camera& camera, const std::vector<Eigen::Vector2d>& rim_px,
-                             double radius_m, double height_m);
+                             double radius_m, double height_m, double sigma_px = 0.0);
 
 }  // namespace trochoid::tracking
