@@ -540,20 +540,57 @@ TEST(TopFit, FollowsASpinThatDies) {
   EXPECT_LT(result.find("omega_s_rad_s")->sigma, 0.1);
 }
 
-// The rendered top's truth, of another program: it loses nothing. The scene knows nothing of its
-// spin, by which the first value of the drag should have been scaled.
-TEST(TopFit, HoldsADragThatIsNotThereAtNothing) {
+// The rendered top's truth, of another program: it loses nothing. Its scene knows nothing of its
+// spin, by which first values of drags should have been scaled.
+struct FreeTop {
+  data::Scene scene;
+  data::Track track;
+};
+
+FreeTop free_top() {
   constexpr double kPath_m = 2e-5, kAngle_rad = 3e-3;
   const std::string base = std::string(TROCHOID_SOURCE_DIR) + "/data/samples/s5_top_marker/";
-  data::Scene scene = data::read_scene(base + "scene.toml");
-  const data::Track track = seen_with_spin(data::read_table(base + "truth.csv"),
-                                           {"t", "x_m", "y_m", "psi_rad"}, kPath_m, kAngle_rad);
-  const data::Fit plain = fit_one(track, scene);
-  scene.model.drag_spin_quadratic_N_m_s2 = 0.0;
-  const data::Fit result = fit_one(track, scene);
-  ASSERT_TRUE(plain.converged && result.converged) << result.reason;
-  EXPECT_LT(result.chi2, plain.chi2 + 1.0);
-  EXPECT_LT(pull(result, "omega_s_rad_s", 155.0), kFar);
+  return {data::read_scene(base + "scene.toml"),
+          seen_with_spin(data::read_table(base + "truth.csv"), {"t", "x_m", "y_m", "psi_rad"},
+                         kPath_m, kAngle_rad)};
+}
+
+TEST(TopFit, HoldsADragThatIsNotThereAtNothing) {
+  FreeTop top = free_top();
+  const data::Fit plain = fit_one(top.track, top.scene);
+  ASSERT_TRUE(plain.converged) << plain.reason;
+  // From drags that nothing would ever show to those that would stop the top between two samples.
+  for (const double drag_N_m_s2 : {0.0, 1e-12, 1e-3}) {
+    top.scene.model.drag_spin_quadratic_N_m_s2 = drag_N_m_s2;
+    const data::Fit result = fit_one(top.track, top.scene);
+    ASSERT_TRUE(result.converged) << drag_N_m_s2 << ": " << result.reason;
+    EXPECT_LT(result.chi2, plain.chi2 + 1.0) << drag_N_m_s2;
+    EXPECT_LT(pull(result, "omega_s_rad_s", 155.0), kFar) << drag_N_m_s2;
+    EXPECT_TRUE(result.find("gamma3_quadratic")->identifiable) << drag_N_m_s2;
+  }
+}
+
+// While the spin hardly changes, dry, viscous and quadratic drags do the same. They could trade
+// with each other if one of them were below 0.
+TEST(TopFit, KnowsDragsThatAreNotThereAsWellAsEachAlone) {
+  FreeTop top = free_top();
+  const auto sigma_of = [&](const char* name) {
+    const data::Fit result = fit_one(top.track, top.scene);
+    EXPECT_TRUE(result.converged) << result.reason;
+    EXPECT_EQ(result.verdict_words.find("not determined"), std::string::npos)
+        << result.verdict_words;
+    return result.find(name)->sigma;
+  };
+  constexpr double kSame = 0.05;  // their fits end at slightly different places
+  top.scene.model.drag_spin_dry_N_m = 0.0;
+  const double dry = sigma_of("gamma3_dry_1_s2");
+  top.scene.model.drag_spin_N_m_s = top.scene.model.drag_spin_quadratic_N_m_s2 = 0.0;
+  EXPECT_NEAR(sigma_of("gamma3_dry_1_s2"), dry, kSame * dry);
+  const double all = sigma_of("gamma3_1_s");
+  top.scene.model.drag_spin_dry_N_m.reset();
+  top.scene.model.drag_spin_quadratic_N_m_s2.reset();
+  const double viscous = sigma_of("gamma3_1_s");
+  EXPECT_NEAR(all, viscous, kSame * viscous);
 }
 
 // A first value is no more than that: the answer is the same from drags that would stop the top

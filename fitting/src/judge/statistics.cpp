@@ -303,6 +303,45 @@ Eigen::VectorXd variances_given(const Eigen::MatrixXd& covariance, const std::ve
   return rest;
 }
 
+namespace {
+
+// Losses that came out as nothing.
+std::vector<int> vanished(const Problem& problem) {
+  std::vector<int> out;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (problem.free[i].held && problem.free[i].transform.is_over_decades()) out.push_back(i);
+  return out;
+}
+
+// None of them is below 0: what one may be is what it may be without the others, whatever it could
+// trade with these.
+void heed_floor(const Problem& problem, const Eigen::VectorXd& u, Uncertainty& result) {
+  constexpr double kTrades = 0.25;  // of its variance: looked at more closely
+  const std::vector<int> losses = vanished(problem);
+  if (losses.size() < 2) return;
+  const Eigen::MatrixXd covariance = result.covariance;
+  for (const int loss : losses) {
+    std::vector<int> others = losses;
+    std::erase(others, loss);
+    if (variances_given(covariance, others)[loss] > kTrades * covariance(loss, loss)) continue;
+    Problem alone = problem;
+    alone.free.clear();
+    std::vector<int> kept;
+    for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+      if (std::find(others.begin(), others.end(), i) == others.end())
+        kept.push_back(i), alone.free.push_back(problem.free[i]);
+    const Uncertainty without = uncertainty(alone, u(kept));
+    const auto place = std::find(kept.begin(), kept.end(), loss) - kept.begin();
+    const double shrunk = std::sqrt(without.covariance(place, place) / covariance(loss, loss));
+    if (!(shrunk < 1.0)) continue;
+    result.covariance.row(loss) *= shrunk;
+    result.covariance.col(loss) *= shrunk;
+    result.identifiable[loss] = without.identifiable[static_cast<std::size_t>(place)];
+  }
+}
+
+}  // namespace
+
 Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   const Linearised all = linearise(problem, u);
   const int count = static_cast<int>(problem.free.size());
@@ -341,6 +380,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
   result.camera_share = of_camera.diagonal().cwiseQuotient(covariance.diagonal());
+  heed_floor(problem, u, result);
   return result;
 }
 

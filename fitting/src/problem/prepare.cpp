@@ -158,6 +158,15 @@ double top_spin_1_s(const Problem& problem, double record_s) {
   return index < 0 ? 0.0 : std::max(std::abs(problem.base[0][index]), data::kTurn / record_s);
 }
 
+// What a loss is to be multiplied by to be a rate of decay [1/s]: of a top's dry and quadratic
+// drags that depends on how fast it spins. 0: it is none.
+double decay_per_rate(const Problem& problem, const std::string& unit, double record_s) {
+  if (unit == "1/s") return 1.0;
+  const double spin_1_s = top_spin_1_s(problem, record_s);
+  if (spin_1_s == 0.0) return 0.0;
+  return unit == "1/s^2" ? 1.0 / spin_1_s : spin_1_s;
+}
+
 // Rates of decay start where they show in the record and let the body go on through it, whatever
 // the scene's first value: a start decades away ends before the track does or moves nothing.
 void start_decay_within_sight(Problem& problem) {
@@ -168,17 +177,11 @@ void start_decay_within_sight(Problem& problem) {
   for (FreeParameter& parameter : problem.free) {
     const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
     if (!is_loss(problem, parameter)) continue;
-    if (info.unit == "1/s") {
-      const double decay = parameter.given * longest_s;
-      if (decay > kLeast && decay < kMost) continue;
-      parameter.given = kTypical / longest_s;
-    } else if (const double spin_1_s = top_spin_1_s(problem, longest_s);
-               parameter.given == 0.0 && spin_1_s > 0.0) {
-      // A top's dry and quadratic drag; over decades nothing leads away from 0.
-      parameter.given = kTypical / longest_s * (info.unit == "1/s^2" ? spin_1_s : 1.0 / spin_1_s);
-    } else {
-      continue;
-    }
+    const double per_rate = decay_per_rate(problem, info.unit, longest_s);
+    if (per_rate == 0.0) continue;
+    const double decay = parameter.given * per_rate * longest_s;
+    if (decay > kLeast && decay < kMost) continue;
+    parameter.given = kTypical / (per_rate * longest_s);
     for (Eigen::VectorXd& base : problem.base) base[parameter.index] = parameter.given;
   }
 }
