@@ -132,9 +132,9 @@ void Camera::check_size(int recorded_width_px, int recorded_height_px,
   if (std::abs(x_scale * height_px - recorded_height_px) <= 1.0)
     words += fmt::format(
         ", or if it is the same view scaled, nothing cut off, write a camera file with width {}, "
-        "height {}, fx {:.7g}, fy {:.7g}, cx {:.7g}, cy {:.7g}, all else as it is",
+        "height {}, fx {:.7g}, fy {:.7g}, cx {:.7g}, cy {:.7g}, all else as it is{}",
         recorded_width_px, recorded_height_px, x_scale * fx, y_scale * fy, centre(x_scale, cx),
-        centre(y_scale, cy));
+        centre(y_scale, cy), covariance.size() > 0 ? " but without the covariance" : "");
   throw InputError(fmt::format("{} is for {} x {} pictures, {} has {} x {}; {}",
                                file.empty() ? "the camera" : file + ": the camera", width_px,
                                height_px, recording, recorded_width_px, recorded_height_px, words));

@@ -27,6 +27,15 @@ double median(std::vector<double> values) {
   return quantile(std::move(values), 0.5);
 }
 
+double student_factor(double degrees_of_freedom) {
+  constexpr double z = 1.959963984540054;
+  const double n = degrees_of_freedom;
+  const double first = (z * z + 1.0) / 4.0;
+  const double second = (5.0 * std::pow(z, 4) + 16.0 * z * z + 3.0) / 96.0;
+  const double third = (3.0 * std::pow(z, 6) + 19.0 * std::pow(z, 4) + 17.0 * z * z - 15.0) / 384.0;
+  return 1.0 + (first + (second + third / n) / n) / n;
+}
+
 double usual_step_s(const std::vector<double>& t_s) {
   if (t_s.size() < 2) return 0.0;
   std::vector<double> steps_s;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -146,16 +147,22 @@ void tell_other_rate(const data::Scene& scene, std::span<const data::Track> trac
                   prior->second.value, rate_hz, prior->second.value));
 }
 
-void tell_camera_share(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
+void tell_camera(const Problem& problem, const Uncertainty& error, const data::Scene& scene,
+                 data::Fit& fit) {
+  std::error_code ignored;
+  const std::string& file = scene.camera.file;
+  if (!file.empty() && !std::filesystem::is_regular_file(file, ignored))
+    fit.warnings.push_back(fmt::format(
+        "{}: the camera is not there; what its calibration leaves uncertain is in no error bar",
+        file));
   constexpr double kMost = 0.5;
   std::vector<std::string> names;
-  for (int i = 0; i < static_cast<int>(error.camera_share.size()); ++i)
-    if (error.camera_share[i] > kMost) names.push_back(problem.name(i));
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (error.of_camera(i, i) > kMost * error.covariance(i, i)) names.push_back(problem.name(i));
   if (!names.empty())
     fit.warnings.push_back(fmt::format(
-        "most of the error bar{} of {} is the camera's calibration: more pictures of "
-        "the board, on the floor and tilted, would narrow {}",
-        names.size() == 1 ? "" : "s", fmt::join(names, ", "), names.size() == 1 ? "it" : "them"));
+        "what the camera's calibration leaves uncertain is most of the error bar{} of {}",
+        names.size() == 1 ? "" : "s", fmt::join(names, ", ")));
 }
 
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {

@@ -34,8 +34,10 @@ void tell_idle_priors(const Problem& problem, const data::Scene& scene, data::Fi
 /// latter says of its own error is taken.
 void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks, data::Fit& fit);
 
-/// Error bars that the camera's calibration makes up most of.
-void tell_camera_share(const Problem& problem, const Uncertainty& error, data::Fit& fit);
+/// Error bars that the camera's calibration makes up most of; a camera that has gone. To be told
+/// when the error bars are all they will be.
+void tell_camera(const Problem& problem, const Uncertainty& error, const data::Scene& scene,
+                 data::Fit& fit);
 
 /// Slips of units that a fit would follow without a word.
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);

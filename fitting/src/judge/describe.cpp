@@ -24,14 +24,15 @@ Eigen::VectorXd sigma_of_one_camera(const Problem& problem, const Eigen::MatrixX
     if (const std::string name = problem.name(i); name == kScale || name == kTimeFactor)
       shared.push_back(i);
   if (shared.empty()) return {};
-  return variances_given(covariance, shared).cwiseSqrt();
+  return variances_given(covariance, shared).cwiseMax(0.0).cwiseSqrt();
 }
 
 void report_parameters(const Problem& problem, const Uncertainty& error,
                        const data::FitSettings& asked, data::Fit& fit) {
   const auto& infos = problem.predictor->parameters();
   fit.covariance = error.covariance;
-  const Eigen::VectorXd one_camera = sigma_of_one_camera(problem, error.covariance);
+  const Eigen::VectorXd one_camera =
+      sigma_of_one_camera(problem, error.covariance - error.of_camera);
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     fit.covariance_names.push_back(problem.name(i));
     const FreeParameter& free = problem.free[i];

@@ -347,7 +347,7 @@ data::Fit OneFit::described(Bars bars) {
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
   tell_idle_priors(problem_, scene_, fit);
-  tell_camera_share(problem_, error, fit);
+  tell_camera(problem_, error, scene_, fit);
   tell_idle_pivot(problem_, scene_, fit);
   tell_unlikely_body(scene_, fit);
   tell_other_rate(scene_, tracks_, fit);

@@ -25,6 +25,7 @@ Estimate friction_of(const Problem& problem, int arc, int friction) {
     // Common to all arcs, and a few of them cannot tell it from friction.
     return name == kScale || name == kTimeFactor || name == "contact_radius_m";
   });
+  alone.arcs.front().camera_shifts.clear();  // likewise
   int place = -1;
   for (int i = 0; i < static_cast<int>(alone.free.size()); ++i)
     if (alone.free[i].index == friction) place = i;

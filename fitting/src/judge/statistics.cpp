@@ -14,6 +14,7 @@
 #include "problem/linearise.hpp"
 #include "problem/valley.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 
@@ -190,16 +191,6 @@ Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
   return seen;
 }
 
-// The noise is known from its few residuals only: 97.5 % quantile of Student's distribution over
-// that of the normal one (Abramowitz and Stegun 26.7.5), so that two sigmas hold what they promise.
-double student_factor(double degrees_of_freedom) {
-  constexpr double z = 1.959963984540054;
-  const double n = std::max(degrees_of_freedom, 5.0);  // fewer say nothing of the noise at all
-  const double first = (z * z * z + z) / 4.0;
-  const double second = (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / 96.0;
-  return 1.0 + (first + second / n) / (n * z);
-}
-
 // Noise of all channels, and the offsets that may be common to a whole record: the tracker's, and
 // what the camera's calibration allows for.
 struct Noise {
@@ -245,7 +236,9 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
 Eigen::MatrixXd sandwich(const Problem& problem, const Linearised& all, const Noise& noise,
                          const Eigen::MatrixXd& scaled, const Eigen::MatrixXd& bread) {
   const auto rows = static_cast<double>(problem.rows());
-  const double few = student_factor(rows - static_cast<double>(problem.free.size()));
+  constexpr double kFewest = 5.0;  // fewer say nothing of the noise at all
+  const double few =
+      data::student_factor(std::max(kFewest, rows - static_cast<double>(problem.free.size())));
   Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(scaled.cols(), scaled.cols());
   for (const ChannelNoise& one : noise.channels)
     filling += few * few * seen_through(problem, all, one, scaled);
@@ -334,8 +327,10 @@ void heed_floor(const Problem& problem, const Eigen::VectorXd& u, Uncertainty& r
     const auto place = std::find(kept.begin(), kept.end(), loss) - kept.begin();
     const double shrunk = std::sqrt(without.covariance(place, place) / covariance(loss, loss));
     if (!(shrunk < 1.0)) continue;
-    result.covariance.row(loss) *= shrunk;
-    result.covariance.col(loss) *= shrunk;
+    for (Eigen::MatrixXd* each : {&result.covariance, &result.of_camera}) {
+      each->row(loss) *= shrunk;
+      each->col(loss) *= shrunk;
+    }
     result.identifiable[loss] = without.identifiable[static_cast<std::size_t>(place)];
   }
 }
@@ -358,8 +353,11 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   for (int i = 0; i < count; ++i)
     result.chi2_inflation[i] =
         seen.bread(i, i) > 0.0 ? std::max(1.0, covariance(i, i) / seen.bread(i, i)) : 1.0;
-  const Eigen::VectorXd sd =
-      (seen.axes.transpose() * covariance * seen.axes).diagonal().cwiseMax(0.0).cwiseSqrt();
+  // What the camera may do is no walk along the valley but a shift of known direction.
+  const Eigen::VectorXd sd = (seen.axes.transpose() * (covariance - of_camera) * seen.axes)
+                                 .diagonal()
+                                 .cwiseMax(0.0)
+                                 .cwiseSqrt();
   const Eigen::MatrixXd to_sizes = seen.axes * seen.inverse.asDiagonal();
   const Valley valley{problem,
                       u,
@@ -379,7 +377,7 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   result.widened = typical_widening(variances_given(hung, kept), variances_given(plain, kept));
   result.identifiable.resize(count);
   for (int i = 0; i < count; ++i) result.identifiable[i] = covariance(i, i) < 1.0;
-  result.camera_share = of_camera.diagonal().cwiseQuotient(covariance.diagonal());
+  result.of_camera = size.asDiagonal() * of_camera * size.asDiagonal();
   heed_floor(problem, u, result);
   return result;
 }

@@ -23,7 +23,7 @@ struct Uncertainty {
   /// Times the error bars are wider than those of independent residuals, typically, for what these
   /// have in common; offsets of a whole record, which no residuals show, not counted.
   double widened = 1.0;
-  Eigen::VectorXd camera_share;  ///< of each variance, that of the camera's calibration; 0..1
+  Eigen::MatrixXd of_camera;  ///< what the camera's calibration has of the covariance
   /// Twice the negative logarithm of the residuals' likelihood in units of the track's own sigmas,
   /// their correlation allowed for, without its constant.
   double minus2_log_likelihood = 0.0;

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -18,8 +20,8 @@ using data::Camera;
 
 // How a body is seen from another camera that shows it in the same place of the picture.
 struct Shift {
-  Eigen::Vector2d place_m;
-  Eigen::Vector3d turn_rad;  // of all its directions
+  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  // of all its directions
 };
 
 // The turn w for which the body is seen, up to its size, as before: A' (I + [w]) = (1 + s) A, with
@@ -38,53 +40,88 @@ Eigen::Vector3d turn_between(const Eigen::Matrix<double, 2, 3>& before,
   return (slope.transpose() * slope).ldlt().solve(slope.transpose() * wanted).head<3>();
 }
 
-Shift shift_between(const Camera& camera, const Camera& moved, const Eigen::Vector2d& place_m) {
-  const Eigen::Vector3d here(place_m.x(), place_m.y(), 0.0);
-  const Eigen::Vector3d there = moved.table_from_image(camera.image_from_table<double>(here), 0.0);
-  return {(there - here).head<2>(),
-          turn_between(camera.jacobian_px_per_m(here), moved.jacobian_px_per_m(there))};
+// None of a place that the camera cannot have seen: another tool's slip, which a fit gives up.
+Shift shift_between(const Camera& camera, const Camera& moved, const Eigen::Vector3d& here) {
+  if (camera.projection == Camera::Projection::perspective && !(camera.depth_m(here) > 0.0))
+    return {};
+  try {
+    const Eigen::Vector3d there =
+        moved.table_from_image(camera.image_from_table<double>(here), here.z());
+    return {(there - here).head<2>(),
+            turn_between(camera.jacobian_px_per_m(here), moved.jacobian_px_per_m(there))};
+  } catch (const NumericalError&) {
+    return {};
+  }
 }
 
 // Deviations are small; a part of one says what all of it does, and stays where the distortion
 // holds.
 constexpr double kPart = 1e-3;
 
-// What was read of a sample, for what its axis is turned by.
+// What was read of a sample, and how high its centre then was.
 struct Seen {
-  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
-  double theta = 0.0, phi = 0.0;
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+  std::optional<double> theta, phi;
 };
 
-std::vector<Seen> seen_in(const ArcData& arc) {
+// How far from its pivot a body's centre is along its axis, typically; 0 if no tilt tells.
+double arm_m(const std::vector<Seen>& seen, const Eigen::Vector3d& pivot_m) {
+  constexpr double kLeastSine = 0.2;
+  std::vector<double> arms;
+  for (const Seen& each : seen)
+    if (each.theta && std::sin(*each.theta) > kLeastSine)
+      arms.push_back((each.place_m - pivot_m).head<2>().norm() / std::sin(*each.theta));
+  return arms.empty() ? 0.0 : data::median(std::move(arms));
+}
+
+// A body whose tilt was not read counts as lying.
+void set_heights(const data::Scene& scene, std::vector<Seen>& seen) {
+  if (scene.support.kind == data::SupportKind::pivot) {
+    const Eigen::Vector3d pivot_m = scene.support.pivot_m.value_or(Eigen::Vector3d::Zero());
+    const double arm = arm_m(seen, pivot_m);
+    for (Seen& each : seen)
+      each.place_m.z() = pivot_m.z() + arm * std::cos(each.theta.value_or(0.0));
+  } else if (scene.body) {
+    for (Seen& each : seen) {
+      const double theta = each.theta.value_or(0.0);
+      each.place_m.z() = scene.body->radius_m * std::abs(std::sin(theta)) +
+                         scene.body->half_thickness_m() * std::abs(std::cos(theta));
+    }
+  }
+}
+
+std::vector<Seen> seen_in(const ArcData& arc, const data::Scene& scene) {
   std::vector<Seen> out(arc.t_s.size());
   for (const Reading& reading : arc.readings) {
     Seen& seen = out[static_cast<std::size_t>(reading.sample)];
-    if (reading.channel == Channel::position) seen.place_m = reading.value;
+    if (reading.channel == Channel::position) seen.place_m.head<2>() = reading.value;
     if (reading.channel == Channel::theta) seen.theta = reading.value[0];
     if (reading.channel == Channel::phi) seen.phi = reading.value[0];
   }
+  set_heights(scene, out);
   return out;
 }
 
 // A turn of R = Rz(phi) Rx(theta) Rz(psi) by w: dtheta is its part along the node line, and of the
-// rest spin takes what precession cannot.
+// rest spin takes what precession cannot; all of it where no precession was read.
 Eigen::Matrix<double, 1, 5> row_of(const Shift& shift, const Seen& seen) {
-  constexpr double kLeastSine = 0.1;  // nearly flat bodies turn about the vertical only
-  const Eigen::Vector2d node(std::cos(seen.phi), std::sin(seen.phi));
+  constexpr double kLeastSine = 0.02;  // nearly flat bodies: their azimuth means nothing
+  const double theta = seen.theta.value_or(0.0), phi = seen.phi.value_or(0.0);
+  const Eigen::Vector2d node(std::cos(phi), std::sin(phi));
   const Eigen::Vector2d across(-node.y(), node.x());
   const Eigen::Vector3d& turn = shift.turn_rad;
-  const double sine = std::sin(seen.theta), along = across.dot(turn.head<2>());
-  const double spin = std::abs(sine) < kLeastSine ? 0.0 : -along / sine;
-  const double parallel = sine * turn.z() + std::cos(seen.theta) * along;
+  const double sine = std::max(kLeastSine, std::sin(theta)), cosine = std::cos(theta);
+  const double along = across.dot(turn.head<2>());
   Eigen::Matrix<double, 1, 5> out;
-  out << shift.place_m.x(), shift.place_m.y(), node.dot(turn.head<2>()), parallel,
-      std::abs(sine) < kLeastSine ? turn.z() : spin;
+  out << shift.place_m.x(), shift.place_m.y(), node.dot(turn.head<2>()),
+      sine * turn.z() + cosine * along,
+      seen.phi ? -along / sine : std::copysign(turn.z(), cosine * turn.z());
   return out / kPart;
 }
 
 CameraShifts shifts_by(const Camera& camera, const Camera& moved, const std::vector<Seen>& seen,
                        std::size_t step) {
-  CameraShifts out = CameraShifts::Zero(static_cast<Eigen::Index>(seen.size()), 5);
+  CameraShifts out = CameraShifts::Zero(std::ssize(seen), 5);
   for (std::size_t i = 0; i < seen.size(); i += step)
     out.row(static_cast<Eigen::Index>(i)) =
         row_of(shift_between(camera, moved, seen[i].place_m), seen[i]);
@@ -101,30 +138,25 @@ std::optional<Camera> uncertain_camera(const data::Scene& scene) {
   return camera;
 }
 
-void note_camera_shifts(const Camera& camera, std::vector<ArcData>& arcs) {
+void note_camera_shifts(const Camera& camera, const data::Scene& scene,
+                        std::vector<ArcData>& arcs) {
   constexpr double kMatters = 3e-3;  // sigmas: of a thousand samples, a tenth of their mean's
   constexpr std::size_t kLook = 16;  // samples, before all of them are worked out
   const auto deviations = camera.likely_deviations();
-  const auto shifts = [&](const ArcData& arc, Eigen::Index deviation, std::size_t step) {
-    const std::vector<Seen> seen = seen_in(arc);
-    if (!arc.filmed) return CameraShifts(CameraShifts::Zero(std::ssize(seen), 5));
-    return shifts_by(camera, camera.moved(kPart * deviations.col(deviation)), seen, step);
-  };
-  const auto matters = [&](const ArcData& arc, Eigen::Index deviation) {
-    const std::size_t step = std::max<std::size_t>(1, arc.t_s.size() / kLook);
-    return whitened(arc, shifts(arc, deviation, step)).cwiseAbs().maxCoeff() > kMatters;
-  };
-  std::vector<ArcData> noted = arcs;
-  try {
-    for (Eigen::Index k = 0; k < deviations.cols(); ++k) {
-      if (std::none_of(arcs.begin(), arcs.end(), [&](const auto& arc) { return matters(arc, k); }))
-        continue;
-      for (ArcData& arc : noted) arc.camera_shifts.push_back(shifts(arc, k, 1));
+  std::vector<std::vector<Seen>> seen;
+  for (const ArcData& arc : arcs) seen.push_back(seen_in(arc, scene));
+  for (Eigen::Index k = 0; k < deviations.cols(); ++k) {
+    const Camera moved = camera.moved(kPart * deviations.col(k));
+    bool matters = false;
+    for (std::size_t a = 0; a < arcs.size() && !matters; ++a) {
+      const std::size_t step = std::max<std::size_t>(1, seen[a].size() / kLook);
+      const Eigen::VectorXd few = whitened(arcs[a], shifts_by(camera, moved, seen[a], step));
+      matters = few.cwiseAbs().maxCoeff() > kMatters;
     }
-  } catch (const NumericalError&) {  // positions of another tool that the camera cannot have seen
-    return;
+    if (!matters) continue;
+    for (std::size_t a = 0; a < arcs.size(); ++a)
+      arcs[a].camera_shifts.push_back(shifts_by(camera, moved, seen[a], 1));
   }
-  arcs = std::move(noted);
 }
 
 Eigen::VectorXd whitened(const ArcData& arc, const CameraShifts& shifts) {

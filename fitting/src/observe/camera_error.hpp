@@ -12,10 +12,12 @@ namespace trochoid::fitting {
 /// is still there.
 [[nodiscard]] std::optional<data::Camera> uncertain_camera(const data::Scene& scene);
 
-/// Notes in filmed arcs what the camera's likely deviations shift their readings by, those that
-/// matter beside the readings' own errors; in the same order in all arcs. Heights above the floor
-/// are left out of account: they change a shift by as much as they are of the camera's height.
-void note_camera_shifts(const data::Camera& camera, std::vector<ArcData>& arcs);
+/// Notes in arcs what the camera's likely deviations shift their readings by, those that matter
+/// beside the readings' own errors; in the same order in all arcs. What a camera changes of a
+/// body's apparent size is left out of account.
+/// @param scene  tells how high the centre is, with the tilt that was read.
+void note_camera_shifts(const data::Camera& camera, const data::Scene& scene,
+                        std::vector<ArcData>& arcs);
 
 /// One of these shifts as the residuals see it, whitened; arc.rows long.
 [[nodiscard]] Eigen::VectorXd whitened(const ArcData& arc, const CameraShifts& shifts);

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 
 #include "commands.hpp"
@@ -326,9 +328,14 @@ double floor_sigma_m(const data::Camera& camera, const Eigen::Vector2d& image_px
   return std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
 }
 
+nlohmann::json json_of(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
+}
+
 // The same in the middle of the picture and at the worst of its corners that show the floor.
 struct FloorSigma {
-  double middle_m = 0.0, worst_m = 0.0;
+  std::optional<double> middle_m;  ///< nothing if no floor is seen there
+  double worst_m = 0.0;
 };
 
 FloorSigma floor_sigma(const data::Camera& camera) {
@@ -369,7 +376,7 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
                        {"sigma_focal_px", result.sigma_focal_px},
                        {"sigma_centre_px", result.sigma_centre_px},
                        {"floor", floor},
-                       {"floor_sigma_m", {known.middle_m, known.worst_m}},
+                       {"floor_sigma_m", {json_of(known.middle_m), known.worst_m}},
                        {"camera_m", {at.x(), at.y(), at.z()}}});
   fmt::print(
       "{}: board found in {} of {} pictures{}, reprojection rms {:.3f} px (worst {:.3f} in {})\n",
@@ -384,9 +391,12 @@ void tell(const CalibrateOptions& options, const Views& views, const tracking::C
   fmt::print("{}; camera at {:.4f}, {:.4f}, {:.4f} m\n", floor, at.x(), at.y(), at.z());
   constexpr double kMm = 1e3;
   fmt::print(
-      "a point of the floor is known to {:.2g} mm in the middle of the picture, {:.2g} mm in the "
-      "worst corner (squares of the board taken as exact)\n",
-      kMm * known.middle_m, kMm * known.worst_m);
+      "a point of the floor is known to {}{:.2g} mm at the worst corner (lengths "
+      "that were given taken as exact)\n",
+      known.middle_m
+          ? fmt::format("{:.2g} mm in the middle of the picture, ", kMm * *known.middle_m)
+          : "",
+      kMm * known.worst_m);
 }
 
 // Before the pictures, which take time to look at.

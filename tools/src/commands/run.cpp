@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "common/provenance.hpp"
 #include "common/recording_name.hpp"
 #include "common/scene_library.hpp"
+#include "common/timing.hpp"
 #include "common/track_options.hpp"
 #include "common/validators.hpp"
 #include "draw/overlay.hpp"
@@ -33,7 +33,6 @@ namespace trochoid::tools {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 struct RunOptions {
   TrackInputs inputs;
@@ -56,9 +55,9 @@ struct Run {
 
   template <class Stage>
   void timed(const char* name, const Stage& stage) {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     stage();
-    times[std::string(name) + "_s"] = std::chrono::duration<double>(Clock::now() - start).count();
+    times[std::string(name) + "_s"] = watch.seconds();
   }
 };
 
@@ -78,7 +77,9 @@ Run prepared(const RunOptions& options) {
   run.scene = chosen_scene(std::move(run.scene), options.choices);
   if (!options.model.empty()) run.scene.model.name = options.model;
   run.camera = named_camera(inputs.camera, run.scene, inputs.scene);
+  run.scene.fit.free_pivot = run.scene.fit.free_pivot || options.free_pivot;
   if (!inputs.camera.empty()) {
+    run.scene.camera.file = inputs.camera.string();
     run.scene.camera.scale_px_per_m.reset();
     run.scene.camera.height_m.reset();
   }

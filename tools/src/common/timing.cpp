@@ -16,7 +16,8 @@ fs::path timing_file(fs::path result) {
   if (result.empty() || folder == "/dev" || folder.string().starts_with("/proc/") ||
       (fs::exists(result, ignored) && !fs::is_regular_file(result, ignored)))
     return {};
-  return result.replace_extension(".timing.json");
+  const bool plain_fit = result.extension() == ".json" && result.stem().extension() != ".fit";
+  return result.replace_extension(plain_fit ? ".fit.timing.json" : ".timing.json");
 }
 
 double Stopwatch::seconds() const {

@@ -6,8 +6,9 @@
 
 namespace trochoid::tools {
 
-/// Run times live beside a result, in "NAME.timing.json" for "NAME.csv" or "NAME.json", so that the
-/// result itself is the same from run to run. Beside a device or a pipe (/dev/stdout, also where it
+/// Run times live beside a result, so that the result itself is the same from run to run: those of
+/// a track "NAME.csv" in "NAME.timing.json", of a fit "NAME.json" or "NAME.fit.json" in
+/// "NAME.fit.timing.json". Beside a device or a pipe (/dev/stdout, also where it
 /// leads into a file), or without a name, there is no place for them: empty.
 [[nodiscard]] std::filesystem::path timing_file(std::filesystem::path result);
 

@@ -78,7 +78,8 @@ void check_holds_results_only(const fs::path& folder) {
                                    "overlay.mp4", "report.html",   "path.png",
                                    "path.svg",    "residuals.png", ".DS_Store"};
   const std::string stem = stem_of_run(folder);
-  for (const char* ending : {".track.csv", ".fit.json", ".timing.json"})
+  for (const char* ending : {".track.csv", ".fit.json", ".timing.json", ".track.timing.json",
+                             ".fit.timing.json"})  // the last two where track or fit were repeated
     results.push_back(stem + ending);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trochoid/data/quantile.hpp"
+
 namespace trochoid::tracking {
 namespace {
 
@@ -79,8 +81,10 @@ void add_pose_covariance(Camera& camera, const CameraResiduals& residuals, doubl
   const Eigen::MatrixXd follow = following(slope);
   const Eigen::VectorXd left = residuals(camera);
   const double free = static_cast<double>(left.size()) - kPose;
-  const double variance =
-      std::max(sigma_px * sigma_px, free > 0.0 ? left.squaredNorm() / free : 0.0);
+  // Four points leave two numbers to tell their scatter by.
+  const double own_px =
+      free > 0.0 ? data::student_factor(free) * std::sqrt(left.squaredNorm() / free) : 0.0;
+  const double variance = std::pow(std::max(sigma_px, own_px), 2);
   // What each residual moves the pose by.
   const Eigen::MatrixXd moves = slope.rightCols<kPose>().colPivHouseholderQr().solve(
       Eigen::MatrixXd::Identity(slope.rows(), slope.rows()));

@@ -15,6 +15,12 @@ namespace trochoid::data {
 /// middle, 1 / quantile of 3/4.
 inline constexpr double kSdOverMedianDistance = 1.4826;
 
+/// By what a standard deviation that was estimated from few residuals is to be multiplied so that
+/// two of them hold what they promise: the 97.5 % quantile of Student's distribution over that of
+/// the normal one (Abramowitz and Stegun 26.7.5; 3 % too small for two degrees of freedom).
+/// @param degrees_of_freedom  > 0
+[[nodiscard]] double student_factor(double degrees_of_freedom);
+
 /// Median of the times from each moment to the next [s]; 0 for fewer than two.
 [[nodiscard]] double usual_step_s(const std::vector<double>& t_s);
 
