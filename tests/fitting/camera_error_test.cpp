@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "common.hpp"
+#include "observe/camera_error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
@@ -176,6 +178,59 @@ TEST_F(FilmedByAnUncertainCamera, IsNamedWhereItMakesUpMostOfAnErrorBar) {
               testing::Contains(testing::HasSubstr("camera's calibration")));
   EXPECT_THAT(fit_of(track, scene(false)).warnings,
               testing::Not(testing::Contains(testing::HasSubstr("camera's calibration"))));
+}
+
+// Tilt, precession and spin of R = Rz(phi) Rx(theta) Rz(psi).
+Eigen::Vector3d angles_of(const Eigen::Matrix3d& attitude) {
+  const Eigen::Vector3d axis = attitude.col(2);
+  return {std::acos(axis.z()), std::atan2(axis.x(), -axis.y()),
+          std::atan2(attitude(2, 0), attitude(2, 1))};
+}
+
+// At the table's origin, which such a camera shows where it did, a body is seen turned.
+TEST(CameraShifts, TurnAnglesAsRotationsDo) {
+  constexpr double kTurn_rad = 1e-5;
+  data::Camera camera = data::Camera::overhead(640, 480, 1500.0, 0.7);
+  const Eigen::Vector3d turn = kTurn_rad * Eigen::Vector3d(1.0, -0.5, 0.7);
+  data::Camera::Deviation by = data::Camera::Deviation::Zero();
+  by.segment<3>(9) = turn;
+  camera.covariance = by * by.transpose();
+  const Eigen::Matrix3d seen_turned =
+      camera.moved(by).camera_from_table.transpose() * camera.camera_from_table;
+  data::Track track;
+  std::vector<Eigen::Vector3d> wanted;
+  for (const double theta : {0.05, 0.4, 1.2, 2.2, 3.05})
+    for (const double phi : {-2.0, 0.3, 1.9}) {
+      const Eigen::Matrix3d attitude = (Eigen::AngleAxisd(phi, Eigen::Vector3d::UnitZ()) *
+                                        Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitX()) *
+                                        Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitZ()))
+                                           .toRotationMatrix();
+      wanted.emplace_back(angles_of(seen_turned * attitude) - angles_of(attitude));
+      data::TrackSample sample;
+      sample.t_s = static_cast<double>(wanted.size());
+      sample.centre_m.setZero();
+      sample.covariance_m2 = 1e-12 * Eigen::Matrix2d::Identity();
+      sample.theta = {theta, 1e-6};
+      sample.phi = {phi, 1e-6};
+      sample.psi = {0.8, 1e-6};
+      track.samples.push_back(sample);
+    }
+  std::vector<ArcData> arcs{make_arc(track, 0, static_cast<int>(wanted.size()),
+                                     {.position = true, .theta = true, .phi = true, .psi = true},
+                                     false)};
+  note_camera_shifts(camera, {}, arcs);
+  ASSERT_EQ(arcs[0].camera_shifts.size(), 1U);
+  const CameraShifts& shifts = arcs[0].camera_shifts[0];
+  const double sign = shifts(0, 2) * wanted[0][0] > 0.0 ? 1.0 : -1.0;  // of a deviation: either
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double sine = std::sin(track.samples[i].theta->value_rad);
+    constexpr double kSecondOrder = 0.01;
+    const double near = kSecondOrder * kTurn_rad / sine;
+    EXPECT_NEAR(sign * shifts(row, 2), wanted[i][0], near) << i;
+    EXPECT_NEAR(sign * shifts(row, 3) / sine, wanted[i][1], near) << i;
+    EXPECT_NEAR(sign * shifts(row, 4), wanted[i][2], near) << i;
+  }
 }
 
 }  // namespace
