@@ -152,7 +152,7 @@ TEST_F(FilmedByAnUncertainCamera, IsHeededWhateverElseTheTrackHolds) {
     return fit_of(each, scene()).find("l_m")->sigma;
   };
   const double sigma = sigma_m(track);
-  constexpr double kSame = 0.05;
+  constexpr double kSame = 0.05;  // without pixels no offset of the tracker is allowed for
   data::Track with_a_slip = track;
   with_a_slip.samples[70].centre_m.x() = 40.0;  // farther than its distortion holds
   EXPECT_NEAR(sigma_m(with_a_slip), sigma, kSame * sigma);
@@ -225,7 +225,7 @@ TEST(CameraShifts, TurnAnglesAsRotationsDo) {
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double sine = std::sin(track.samples[i].theta->value_rad);
-    constexpr double kSecondOrder = 0.01;
+    constexpr double kSecondOrder = 0.01;  // turns of 1e-5 bend angles by 1e-5 / sine of theirs
     const double near = kSecondOrder * kTurn_rad / sine;
     EXPECT_NEAR(sign * shifts(row, 2), wanted[i][0], near) << i;
     EXPECT_NEAR(sign * shifts(row, 3) / sine, wanted[i][1], near) << i;

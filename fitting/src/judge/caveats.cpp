@@ -152,9 +152,11 @@ void tell_camera(const Problem& problem, const Uncertainty& error, const data::S
   std::error_code ignored;
   const std::string& file = scene.camera.file;
   if (!file.empty() && !std::filesystem::is_regular_file(file, ignored))
-    fit.warnings.push_back(fmt::format(
-        "{}: the camera is not there; what its calibration leaves uncertain is in no error bar",
-        file));
+    fit.warnings.push_back(
+        fmt::format("{}: the camera is not there, and what its calibration leaves uncertain is in "
+                    "no error bar; "
+                    "name its place under [camera] file",
+                    file));
   constexpr double kMost = 0.5;
   std::vector<std::string> names;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)

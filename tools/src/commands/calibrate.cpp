@@ -314,6 +314,10 @@ void draw_check(const CalibrateOptions& options, const Views& views, data::Camer
   write_picture(picture, options.picture);
 }
 
+nlohmann::json json_of(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
+}
+
 // Standard deviation of where a pixel's point of the floor is, the longer axis [m].
 double floor_sigma_m(const data::Camera& camera, const Eigen::Vector2d& image_px) {
   constexpr double kPart = 1e-3;  // of a deviation, so that the distortion holds
@@ -326,10 +330,6 @@ double floor_sigma_m(const data::Camera& camera, const Eigen::Vector2d& image_px
     covariance += off * off.transpose();
   }
   return std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
-}
-
-nlohmann::json json_of(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
 // The same in the middle of the picture and at the worst of its corners that show the floor.

@@ -41,8 +41,8 @@ struct Camera {
   std::string file;  ///< where it was read from, for messages; empty if it was made
 
   /// By how much the numbers of a camera may be off: fx, fy, cx, cy (as above), k1, k2, p1, p2, k3,
-  /// a turn about the camera's axes [rad] and a shift along them [m]. A camera that is off by
-  /// `turn` and `shift` has R = exp(turn) R, t = t + shift.
+  /// a turn along the camera's axes [rad], about the table's origin, and a shift along them [m]: a
+  /// camera that is off by `turn` and `shift` has R = exp(turn) R, t = t + shift.
   static constexpr int kNumbers = 15;
   using Deviation = Eigen::Matrix<double, kNumbers, 1>;
   /// Of the deviations that its calibration allows for, kNumbers square; empty if it is exact.
