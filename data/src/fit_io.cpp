@@ -53,6 +53,13 @@ void null_vector_keys(Visit&& visit) {
 }
 
 template <class Visit>
+void broken_degeneracy_keys(Visit&& visit) {
+  visit("readings", &BrokenDegeneracy::readings);
+  visit("parameters", &BrokenDegeneracy::parameters);
+  visit("words", &BrokenDegeneracy::words);
+}
+
+template <class Visit>
 void score_keys(Visit&& visit) {
   visit("model", &ModelScore::model);
   visit("parameters", &ModelScore::parameters);
@@ -113,6 +120,7 @@ void fit_file_keys(Visit&& visit) {
   visit("rank", &Fit::rank);
   visit("condition", &Fit::condition);
   visit("null_vectors", &Fit::null_vectors);
+  visit("broken_degeneracies", &Fit::broken_degeneracies);
   visit("integration_error_sigma", &Fit::integration_error_sigma);
   visit("time_origin_s", &Fit::time_origin_s);
   visit("arcs", &Fit::arcs);
@@ -139,6 +147,10 @@ void keys_of(const FitArc*, Visit&& visit) {
 template <class Visit>
 void keys_of(const NullVector*, Visit&& visit) {
   null_vector_keys(visit);
+}
+template <class Visit>
+void keys_of(const BrokenDegeneracy*, Visit&& visit) {
+  broken_degeneracy_keys(visit);
 }
 template <class Visit>
 void keys_of(const ModelScore*, Visit&& visit) {

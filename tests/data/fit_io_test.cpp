@@ -32,6 +32,7 @@ Fit full_fit() {
   fit.rank = 2;
   fit.condition = 1e7;
   fit.null_vectors = {{{{"I_kg_m2", 0.8}, {"Is_kg_m2", -0.6}}, "only their ratio"}};
+  fit.broken_degeneracies = {{"tilt", {"l_m", "a_1_s2"}, "without the tilt"}};
   fit.integration_error_sigma = 1e-3;
   fit.time_origin_s = 0.5;
   fit.arcs = {{0, 1, 0.5, 2.5, 200}};
@@ -61,6 +62,7 @@ TEST(FitFile, KeepsEverythingThroughAFile) {
   EXPECT_TRUE(std::isnan(read.parameters[3].value));
   EXPECT_EQ(read.covariance, fit.covariance);
   EXPECT_EQ(read.null_vectors.at(0).components, fit.null_vectors[0].components);
+  EXPECT_EQ(read.broken_degeneracies.at(0).parameters, fit.broken_degeneracies[0].parameters);
   EXPECT_EQ(read.seed, fit.seed);
   EXPECT_EQ(read.scene_toml, fit.scene_toml);
   ASSERT_NE(read.find("mass_kg"), nullptr);

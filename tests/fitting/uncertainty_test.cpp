@@ -297,5 +297,46 @@ TEST_F(BlurredFirstPictures, DoNotTellTheStartBetterThanTheOthersDoWithoutOneOfT
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("hang on the sample at t = ")));
 }
 
+// A steady precession, of closed form: its path is a circle of radius l sin(theta), whatever l.
+data::Track circling_track(bool tilt_seen) {
+  constexpr double kLength_m = 0.05, kTilt_rad = 0.8, kRate_rad_s = 6.0;
+  constexpr double kSigma_m = 1e-4, kSigma_rad = 0.01;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  data::Track track;
+  for (int i = 0; i < 200; ++i) {
+    data::TrackSample sample;
+    sample.t_s = 0.02 * i;
+    const double phi_rad = kRate_rad_s * sample.t_s;
+    sample.centre_m =
+        kLength_m * std::sin(kTilt_rad) * Eigen::Vector2d(std::sin(phi_rad), -std::cos(phi_rad)) +
+        kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    if (tilt_seen)
+      sample.theta = data::MeasuredAngle{kTilt_rad + kSigma_rad * normal(generator), kSigma_rad};
+    track.samples.push_back(sample);
+  }
+  return track;
+}
+
+TEST(BrokenDegeneracies, AreThoseOfLengthAndTiltOfACircleWhoseTiltIsSeen) {
+  const data::Fit blind = fit_top(circling_track(false), {});
+  EXPECT_THAT(blind.broken_degeneracies, testing::IsEmpty()) << "no angle is seen";
+  const data::Fit seen = fit_top(circling_track(true), {});
+  ASSERT_EQ(seen.broken_degeneracies.size(), 1U);
+  const data::BrokenDegeneracy& broken = seen.broken_degeneracies.front();
+  EXPECT_EQ(broken.readings, "tilt");
+  EXPECT_THAT(broken.parameters, testing::IsSupersetOf({"l_m", "theta_rad"}));
+  EXPECT_THAT(broken.words, testing::HasSubstr("without the tilt"));
+}
+
+TEST(BrokenDegeneracies, AreNoneWhereThePathTellsAsMuch) {
+  data::Track track = thesis_track(25.0, 2e-4, 1);
+  const Eigen::VectorXd tilt = thesis_motion(25.0, {model::Observable::theta_rad});
+  for (std::size_t i = 0; i < track.samples.size(); ++i)
+    track.samples[i].theta = data::MeasuredAngle{tilt[static_cast<Eigen::Index>(i)], 0.01};
+  EXPECT_THAT(fit_top(track, {}).broken_degeneracies, testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

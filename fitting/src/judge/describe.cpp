@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "judge/degeneracies.hpp"
 #include "judge/derived.hpp"
 #include "judge/one_friction.hpp"
 #include "judge/steady_top.hpp"
@@ -156,6 +157,7 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
   fit.rank = error.rank;
   fit.condition = error.condition;
   fit.null_vectors = error.null_vectors;
+  fit.broken_degeneracies = broken_degeneracies(problem, u, error);
 }
 
 }  // namespace

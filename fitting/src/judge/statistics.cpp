@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "judge/directions.hpp"
 #include "observe/camera_error.hpp"
 #include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
@@ -151,44 +152,18 @@ void heed_priors(const Problem& problem, Eigen::MatrixXd& covariance) {
   }
 }
 
-// The directions of parameter space in natural sizes, and how sharply the data see each.
-struct Directions {
-  Eigen::MatrixXd axes;     // one per column
-  Eigen::VectorXd inverse;  // standard deviation of independent residuals along each; 0: unseen
-  Eigen::MatrixXd blind;    // covariance of the unseen ones
-  Eigen::MatrixXd bread;    // covariance of the seen ones
-};
-
-Directions directions_of(const Problem& problem, const Eigen::MatrixXd& scaled,
-                         Uncertainty& result) {
-  const Eigen::Index count = scaled.cols();
-  const Axes axes = right_singular(scaled.rows() > count ? Reflections(scaled).triangle() : scaled);
-  Eigen::VectorXd singular = Eigen::VectorXd::Zero(count);
-  singular.head(axes.values.size()) = axes.values;
-  const double largest = std::max(singular.maxCoeff(), 1e-300);
-  // 1e-9: below that the derivatives themselves (integrated at ~1e-8) are rounding.
-  const double floor = 1e-9 * largest;
-  // Standard deviation of what the data do not see at all, in natural sizes: no derivative says how
-  // large, and with small residuals 1 / floor would read as a sharp measurement.
-  const double unseen = std::max(1.0 / floor, 1e3);
-  Directions seen{
-      axes.directions, Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count), {}};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::VectorXd direction = seen.axes.col(i);
-    const bool sees = singular[i] > floor;
-    if (sees)
-      seen.inverse[i] = 1.0 / singular[i];
-    else
-      seen.blind += unseen * unseen * direction * direction.transpose();
-    if (sees && singular[i] > 1.0)
+// Counts the directions the data see, and says which they do not.
+void judge_directions(const Problem& problem, const Directions& seen, Uncertainty& result) {
+  for (Eigen::Index i = 0; i < seen.singular.size(); ++i) {
+    const bool sees = seen.inverse[i] > 0.0;
+    if (sees && seen.singular[i] > 1.0)
       ++result.rank;
     else
       result.null_vectors.push_back(
-          null_vector(problem, direction, sees ? seen.inverse[i] : INFINITY));
+          null_vector(problem, seen.axes.col(i), sees ? seen.inverse[i] : INFINITY));
   }
-  result.condition = largest / std::max(singular.minCoeff(), 1e-300);
-  seen.bread = seen.axes * seen.inverse.cwiseAbs2().asDiagonal() * seen.axes.transpose();
-  return seen;
+  result.condition =
+      std::max(seen.singular.maxCoeff(), 1e-300) / std::max(seen.singular.minCoeff(), 1e-300);
 }
 
 // Noise of all channels, and the offsets that may be common to a whole record: the tracker's, and
@@ -344,7 +319,8 @@ Uncertainty uncertainty(const Problem& problem, const Eigen::VectorXd& u) {
   Eigen::VectorXd size(count);
   for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
   const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
-  const Directions seen = directions_of(problem, scaled, result);
+  const Directions seen = directions_of(scaled);
+  judge_directions(problem, seen, result);
   const Noise noise = noise_of(problem, all, scaled, seen, result);
   const Eigen::MatrixXd scatter = sandwich(problem, all, noise, scaled, seen.bread);
   const Eigen::MatrixXd of_camera = of_offsets(noise.of_camera, scaled, seen.bread);

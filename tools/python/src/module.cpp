@@ -234,7 +234,8 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
 #endif
 
 void add_fit_parts(py::module_& module) {
-  using data::FitParameter, data::FitArc, data::ModelScore, data::NullVector;
+  using data::BrokenDegeneracy, data::FitParameter, data::FitArc, data::ModelScore,
+      data::NullVector;
   py::class_<FitParameter>(module, "Parameter", "One parameter of a fit.")
       .def_readonly("name", &FitParameter::name)
       .def_readonly("value", &FitParameter::value)
@@ -268,6 +269,11 @@ void add_fit_parts(py::module_& module) {
                          "A direction of parameter space the data do not see.")
       .def_readonly("components", &NullVector::components, "Weight by parameter name, unit length.")
       .def_readonly("words", &NullVector::words);
+  py::class_<BrokenDegeneracy>(module, "BrokenDegeneracy",
+                               "What only some of the angles seen in the recording tell.")
+      .def_readonly("readings", &BrokenDegeneracy::readings, "tilt, precession, spin or angles.")
+      .def_readonly("parameters", &BrokenDegeneracy::parameters, "Names.")
+      .def_readonly("words", &BrokenDegeneracy::words);
 }
 
 void add_error_bars(py::module_& module) {
@@ -317,6 +323,7 @@ void add_fit_values(py::module_& module) {
       .def_readonly("rank", &Fit::rank)
       .def_readonly("condition", &Fit::condition)
       .def_readonly("null_vectors", &Fit::null_vectors)
+      .def_readonly("broken_degeneracies", &Fit::broken_degeneracies)
       .def_readonly("integration_error_sigma", &Fit::integration_error_sigma)
       .def_readonly("time_origin_s", &Fit::time_origin_s)
       .def_readonly("arcs", &Fit::arcs)

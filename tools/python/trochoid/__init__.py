@@ -27,14 +27,14 @@ from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 import numpy as np
 
 from . import _core
-from ._core import (Arc, Bootstrap, BootstrapSpread, Error, InputError, ModelScore, NullVector,
-                    NumericalError, Parameter, Profile)
+from ._core import (Arc, Bootstrap, BootstrapSpread, BrokenDegeneracy, Error, InputError, ModelScore,
+                    NullVector, NumericalError, Parameter, Profile)
 
 __version__ = _core.__version__
 __all__ = ["track", "fit", "overlay", "simulate", "predict", "scenes", "read_track", "read_fit",
            "Scene", "Track", "TrackFile", "Trajectory", "Fit", "PredictedArc", "OverlayFrames",
-           "Parameter", "Arc", "ModelScore", "NullVector", "Profile", "Bootstrap", "BootstrapSpread",
-           "Error", "InputError", "NumericalError"]
+           "Parameter", "Arc", "ModelScore", "NullVector", "BrokenDegeneracy", "Profile", "Bootstrap",
+           "BootstrapSpread", "Error", "InputError", "NumericalError"]
 
 Path = Union[str, "os.PathLike[str]"]
 Moment = Union[None, str, float, int]
@@ -364,8 +364,8 @@ class Fit:
     ``fit["radius_m"]`` is a ``Parameter`` (value, sigma, unit, status, identifiable, note); the other
     attributes are those of the JSON file (docs/formats.md): model, converged, outcome, reason, verdict,
     verdict_words, start_path, chi2, dof, noise_scale, aicc, bic, whiteness_p, correlation_time_s, rank,
-    condition, null_vectors, integration_error_sigma, time_origin_s, arcs, comparison, recommendation,
-    profiles, bootstrap, warnings, inputs, versions, seed, scene_toml.
+    condition, null_vectors, broken_degeneracies, integration_error_sigma, time_origin_s, arcs, comparison,
+    recommendation, profiles, bootstrap, warnings, inputs, versions, seed, scene_toml.
 
     ``verdict`` is what the fit is worth: good, good_correlated, weak, doubtful, no_feature or unexplained.
     """

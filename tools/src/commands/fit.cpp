@@ -43,6 +43,8 @@ std::string_view word(data::ParameterStatus status) {
 
 void print_notes(const data::Fit& fit) {
   for (const std::string& warning : fit.warnings) fmt::print("  note: {}\n", warning);
+  for (const data::BrokenDegeneracy& broken : fit.broken_degeneracies)
+    fmt::print("  note: {}\n", broken.words);
 }
 
 void print_comparison(const std::vector<data::ModelScore>& models) {

@@ -143,6 +143,14 @@ data::Scene wanted_scene(const SimulateOptions& options) {
   return scene;
 }
 
+/// What the run follows from: a file, by its checksum, or a bundled scene.
+void add_source(const fs::path& named, data::Table& table) {
+  table.header.emplace_back("source", named.filename().string());
+  std::error_code ignored;
+  if (fs::is_regular_file(named, ignored))
+    table.header.emplace_back("sha256", data::sha256_of_file(named));
+}
+
 void simulate_scene(const SimulateOptions& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
@@ -161,6 +169,7 @@ void simulate_scene(const SimulateOptions& options) {
                                  named.string(), model::sentence(run.outcome)));
   if (options.fit.empty()) tell_idle_keys(options.scene, scene);
   data::Table table = trajectory_table(run);
+  add_source(named, table);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
   std::vector<std::string> pictures;

@@ -226,6 +226,8 @@ std::string identifiability_section(const data::Fit& fit) {
     }
     html += "</ul>";
   }
+  for (const data::BrokenDegeneracy& broken : fit.broken_degeneracies)
+    html += "<p>Degeneracy broken: " + escaped(broken.words) + ".</p>";
   return html + correlation_table(fit) + arc_table(fit) + "</section>\n";
 }
 

@@ -81,6 +81,13 @@ struct NullVector {
   std::string words;                         ///< the same for people
 };
 
+/// What only some readings tell.
+struct BrokenDegeneracy {
+  std::string readings;                 ///< tilt, precession, spin, or angles: all of these
+  std::vector<std::string> parameters;  ///< names of those not known without them
+  std::string words;                    ///< the same for people
+};
+
 /// A rung of the ladder that was tried. Figures of a model that has no fit are NaN.
 struct ModelScore {
   std::string model;  ///< in words: the law, then its losses
@@ -147,7 +154,8 @@ struct Fit {
   double correlation_time_s = 0.0;  ///< over which residuals hang together [s]; 0 if white
   int rank = 0;                     ///< directions of parameter space the data see
   double condition = 0.0;  ///< largest over least singular value of the scaled Jacobian, >= 1
-  std::vector<NullVector> null_vectors;  ///< the directions the data do not see
+  std::vector<NullVector> null_vectors;               ///< the directions the data do not see
+  std::vector<BrokenDegeneracy> broken_degeneracies;  ///< by angles seen in the recording
   double integration_error_sigma = 0.0;  ///< largest integration error in units of sigma
   double time_origin_s = 0.0;            ///< t_s the initial state refers to (first arc) [s]
   std::vector<FitArc> arcs;              ///< in the order of the tracks and of time

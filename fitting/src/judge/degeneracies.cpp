@@ -1,0 +1,96 @@
+#include "judge/degeneracies.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <set>
+#include <string>
+
+#include "judge/directions.hpp"
+#include "problem/linearise.hpp"
+
+namespace trochoid::fitting {
+namespace {
+
+using Channels = std::vector<Channel>;
+
+bool holds(const Channels& channels, Channel channel) {
+  return std::find(channels.begin(), channels.end(), channel) != channels.end();
+}
+
+const char* word_for(const Channels& channels) {
+  if (channels.size() > 1) return "angles";
+  switch (channels.front()) {
+    case Channel::theta:
+      return "tilt";
+    case Channel::phi:
+      return "precession";
+    default:
+      return "spin";
+  }
+}
+
+// The rows of all other readings, and of priors.
+Eigen::MatrixXd without(const Channels& channels, const Linearised& all,
+                        const Eigen::MatrixXd& scaled) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < scaled.rows(); ++row)
+    if (all.arc[static_cast<std::size_t>(row)] < 0 ||
+        !holds(channels, all.channel[static_cast<std::size_t>(row)]))
+      rows.push_back(row);
+  return scaled(rows, Eigen::all);
+}
+
+Channels angles_read(const Linearised& all) {
+  Channels angles;
+  for (const Channel channel : {Channel::theta, Channel::phi, Channel::psi})
+    for (std::size_t row = 0; row < all.channel.size(); ++row)
+      if (all.arc[row] >= 0 && all.channel[row] == channel) {
+        angles.push_back(channel);
+        break;
+      }
+  return angles;
+}
+
+}  // namespace
+
+std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
+                                                        const Eigen::VectorXd& u,
+                                                        const Uncertainty& error) {
+  constexpr double kClearly = 3.0;  // times less certain: else the natural size happens to be near
+  const Linearised all = linearise(problem, u);
+  const Channels angles = angles_read(all);
+  if (angles.empty()) return {};
+  const int count = static_cast<int>(problem.free.size());
+  Eigen::VectorXd size(count);
+  for (int i = 0; i < count; ++i) size[i] = natural_size(problem, i, u);
+  const Eigen::MatrixXd scaled = all.jacobian * size.asDiagonal();
+  const Eigen::VectorXd with = directions_of(scaled).sd();
+  std::vector<Channels> groups;
+  for (const Channel one : angles) groups.push_back({one});
+  if (angles.size() > 1) groups.push_back(angles);
+  std::vector<data::BrokenDegeneracy> broken;
+  std::set<int> told;
+  for (const Channels& group : groups) {
+    const Eigen::VectorXd rest = directions_of(without(group, all, scaled)).sd();
+    std::vector<std::string> names;
+    for (int i = 0; i < count; ++i) {
+      const bool own = problem.predictor->parameters()[problem.free[i].index].name == "psi_rad";
+      if (own || !error.identifiable[i] || rest[i] < std::max(1.0, kClearly * with[i]) ||
+          (group.size() > 1 && told.contains(i)))
+        continue;
+      names.push_back(problem.name(i));
+      told.insert(i);
+    }
+    if (names.empty()) continue;
+    const char* readings = word_for(group);
+    broken.push_back({readings, names,
+                      fmt::format("without the {} seen in the recording, {} would not be known",
+                                  readings, fmt::join(names, ", "))});
+  }
+  return broken;
+}
+
+}  // namespace trochoid::fitting

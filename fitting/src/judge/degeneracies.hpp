@@ -1,0 +1,20 @@
+#pragma once
+#include <vector>
+
+#include "judge/statistics.hpp"
+#include "problem/problem.hpp"
+#include "trochoid/data/fit.hpp"
+
+namespace trochoid::fitting {
+
+/// Which parameters only the tilt, the precession, the spin, or all of these angles together
+/// determine: known to their natural size (natural_size) with these readings, and not by the rest
+/// of the recording and the priors. The spin's own angle, which nothing else could show, does not
+/// count. Linear about the solution, and as if residuals were independent.
+/// @param error  the fit's: what it does not determine breaks nothing.
+/// @throws NumericalError where the model has no prediction.
+[[nodiscard]] std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
+                                                                      const Eigen::VectorXd& u,
+                                                                      const Uncertainty& error);
+
+}  // namespace trochoid::fitting
