@@ -146,6 +146,9 @@ void read_header(const CsvReader& csv, const std::string& where, TrackFile& file
       file.made_by = value;
     } else if (key == "angles") {
       file.angles_folded = value == "folded";
+    } else if (key == "smoothed") {
+      throw InputError(fmt::format(
+          "{}: holds smoothed positions, which are no measurements: give the track itself", where));
     } else if (key == "note") {
       file.notes.push_back(value);
     } else {

@@ -250,7 +250,7 @@ Choice choose(const RimJob& job, const std::string& asked, double tolerance) {
   if (asked == "taylor")
     throw InputError(
         "run.integrator = \"taylor\" needs polynomial equations; contact models take auto, dop853, "
-        "radau, cvode-adams, cvode-bdf or arkode");
+        "cvode-adams, cvode-bdf, arkode or, with regularised friction, radau");
   if (asked == "radau") {
     if (job.input.eps_v > 0.0) return {Method::radau, asked, "asked for"};
     throw InputError(

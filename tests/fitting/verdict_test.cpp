@@ -251,6 +251,18 @@ TEST(Verdict, StandsAndIsRemarkedOnWhereATrackerMayHaveMissedTheFirstFewPosition
   EXPECT_THAT(fewer.warnings, testing::IsEmpty());
 }
 
+// A run of them beside the path of the others is most often the tracker's, but not always.
+TEST(Verdict, IsRemarkedOnWhereTheFirstPositionsLieOnNoPathWithTheOthers) {
+  data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 12));
+  for (std::size_t i = 0; i < 6; ++i)
+    track.samples[i].centre_m += Eigen::Vector2d(i % 2 == 0 ? 0.03 : -0.02, 0.01);
+  const data::Fit fit = fit_of(track, top());
+  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
+  EXPECT_THAT(fit.warnings,
+              testing::Contains(testing::AllOf(testing::HasSubstr("6 of the 6 first positions"),
+                                               testing::HasSubstr("as if the tracker had erred"))));
+}
+
 // Glitches anywhere in the picture are the tracker's, however many.
 TEST(Verdict, IsGoodWhereTheTrackerTookOtherThingsForTheBody) {
   data::Track track = track_of(nutating_top(), white(kUsualSigma_m, 11));

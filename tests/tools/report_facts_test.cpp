@@ -64,7 +64,12 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   EXPECT_EQ(facts.far_off, 1);
   // The other 19 are off across the path only.
   EXPECT_NEAR(facts.rms_axis_m, 1e-6 / std::sqrt(2.0), 1e-11);
-  EXPECT_THAT(judge(facts).sentence, testing::HasSubstr("but for 1 far off"));
+  const std::string whole = judge(facts).sentence;
+  EXPECT_THAT(whole, testing::HasSubstr("but for 1 far off"));
+  EXPECT_THAT(whole, testing::StartsWith("The path of 20 positions over 0.19 s"));
+  input.fit->arcs = {{.track = 0, .object = 0, .from_s = 0.05, .to_s = 0.15, .samples = 11}};
+  EXPECT_THAT(judge(gather(input)).sentence,
+              testing::StartsWith("The path of 11 of the 20 positions, over 0.1 s"));
 }
 
 }  // namespace

@@ -122,6 +122,11 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   // A body held at a pivot that leans there is a top, one that lies on it only turns.
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
   if (open && leaves_pivot(tracks, named)) named.model.name = "top";
+  if (!named.body && named.model.name == "auto")
+    throw InputError(
+        "models can be compared for a [body] with its kind and radius_m; without one name the "
+        "model: "
+        "--model top needs none");
   free_all_terms(named.fit);
   const Ladder ladder = ladder_of(named, show_spin(tracks));
   const std::set<std::string> known = parameters_of_any(ladder);

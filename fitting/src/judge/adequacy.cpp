@@ -151,7 +151,7 @@ GivenUp given_up(const Problem& problem, const Solution& solution) {
   GivenUp all;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
     for (const Counting& position : counting(problem, arc, solution.u)) {
-      if (position.weight > kHardlyCounts) continue;
+      if (position.glitch || position.weight > kHardlyCounts) continue;
       ++all.samples;
       all.first_s = std::min(all.first_s, position.t_s);
       all.last_s = std::max(all.last_s, position.t_s);

@@ -36,9 +36,8 @@ std::vector<Counting> counting(const Problem& problem, int arc, const Eigen::Vec
     if (reading.channel != Channel::position) continue;
     const bool glitch = !std::binary_search(consistent.begin(), consistent.end(), reading.sample);
     const bool means_something = off.row(reading.sample).norm() >= nothing_m;
-    if (!glitch)
-      all.push_back(
-          {data.t_s[reading.sample], means_something ? robust_weight(problem, arc, reading) : 1.0});
+    all.push_back({data.t_s[reading.sample],
+                   means_something ? robust_weight(problem, arc, reading) : 1.0, glitch});
   }
   return all;
 }

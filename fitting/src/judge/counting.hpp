@@ -17,10 +17,10 @@ namespace trochoid::fitting {
 /// How much a position counts in a fit.
 struct Counting {
   double t_s = 0.0, weight = 1.0;
+  bool glitch = false;  ///< lies on no path with the others: as a rule the tracker's error
 };
 
-/// That of an arc's positions, in the order of their times. Of those that lie on no path with the
-/// others, a tracker's glitches, nothing is said.
+/// That of an arc's positions, in the order of their times.
 [[nodiscard]] std::vector<Counting> counting(const Problem& problem, int arc,
                                              const Eigen::VectorXd& u);
 

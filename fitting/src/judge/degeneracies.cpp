@@ -74,7 +74,9 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
   std::vector<data::BrokenDegeneracy> broken;
   std::set<int> told;
   for (const Channels& group : groups) {
-    const Eigen::VectorXd rest = directions_of(without(group, all, scaled)).sd();
+    const Eigen::MatrixXd others = without(group, all, scaled);
+    if (others.rows() == 0) continue;  // a recording of nothing else
+    const Eigen::VectorXd rest = directions_of(others).sd();
     std::vector<std::string> names;
     for (int i = 0; i < count; ++i) {
       const bool own = problem.predictor->parameters()[problem.free[i].index].name == "psi_rad";

@@ -23,10 +23,16 @@ struct MissedEnd {
   double until_s = 0.0;  // where the explained part begins or ends
 };
 
-MissedEnd missed_end(const std::vector<Counting>& from_the_end, int arc, bool beginning) {
+// Whether a run of positions beside the path of the others counts: a tracker's errors, mostly, but
+// so is a motion that few samples show.
+enum class Glitches { left_out, counted };
+
+MissedEnd missed_end(const std::vector<Counting>& from_the_end, Glitches glitches, int arc,
+                     bool beginning) {
   MissedEnd end{.arc = arc, .beginning = beginning};
   int seen = 0, out = 0;
   for (const Counting& position : from_the_end) {
+    if (position.glitch && glitches == Glitches::left_out) continue;
     ++seen;
     if (!(position.weight < 1.0)) continue;
     ++out;
@@ -36,12 +42,12 @@ MissedEnd missed_end(const std::vector<Counting>& from_the_end, int arc, bool be
 }
 
 // The end of which most stands out.
-MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u) {
+MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u, Glitches glitches) {
   MissedEnd worst;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
     std::vector<Counting> positions = counting(problem, arc, u);
     for (const bool beginning : {true, false}) {
-      const MissedEnd end = missed_end(positions, arc, beginning);
+      const MissedEnd end = missed_end(positions, glitches, arc, beginning);
       if (end.standing_out > worst.standing_out) worst = end;
       std::reverse(positions.begin(), positions.end());
     }
@@ -104,18 +110,24 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
   constexpr int kWorthWords = 3, kNoTracker = 8;
   constexpr double kIndependent = 3.0;  // one in 460 stands out by chance
   if (!passed(fit)) return;
-  const MissedEnd end = worst_missed_end(problem, u);
+  const auto too_many = [&](const MissedEnd& end) {
+    const ArcData& arc = problem.arcs[end.arc];
+    const double step_s =
+        arc.duration_s() / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
+    const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
+    return end.standing_out >= std::max<double>(kNoTracker, kIndependent * memory);
+  };
+  MissedEnd end = worst_missed_end(problem, u, Glitches::left_out);
+  const bool doubtful = too_many(end);
+  if (!doubtful) end = worst_missed_end(problem, u, Glitches::counted);
   if (end.standing_out < kWorthWords) return;
   const ArcData& arc = problem.arcs[end.arc];
-  const double step_s =
-      arc.duration_s() / std::max<double>(1.0, static_cast<double>(arc.t_s.size()) - 1.0);
-  const double memory = error.whiteness.correlation_time_s / std::max(step_s, 1e-300);
   const std::string where = fmt::format(
       "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
       end.standing_out, end.of, end.beginning ? "first" : "last", which_of_several(problem, arc),
       end.beginning ? "up to" : "from", end.until_s);
   const std::string what = what_an_end_may_be(problem, end);
-  if (end.standing_out < std::max<double>(kNoTracker, kIndependent * memory)) {
+  if (!doubtful) {
     fit.warnings.push_back(fmt::format(
         "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
     return;

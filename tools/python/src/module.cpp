@@ -125,10 +125,12 @@ py::dict simulate(const SceneValue& scene, const fs::path& output) {
 }
 
 /// The fitted model's path over each arc of the tracks.
-py::list predict(const data::Fit& fit, const py::dict& file, int fit_track) {
+py::list predict(const data::Fit& fit, const py::dict& file, std::optional<int> fit_track) {
   const data::TrackFile tracks = file_of(file);
   tools::PredictedPath path;
-  run_interruptibly([&](const Interrupt&) { path = tools::replay(fit, tracks, fit_track); });
+  run_interruptibly([&](const Interrupt&) {
+    path = tools::replay(fit, tracks, tools::place_in_fit(fit, "fit", tracks, fit_track));
+  });
   py::list arcs;
   for (const tools::PredictedArc& arc : path.arcs) {
     Eigen::MatrixXd centre_m(arc.pose.size(), 3), angles_rad(arc.pose.size(), 3);
@@ -210,7 +212,10 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
   else if (fit != nullptr)
     input.scene = tools::scene_of_fit(*fit, fit_file.empty() ? fs::path("fit") : fit_file);
   if (camera_file) input.camera = data::read_camera(*camera_file);
-  input.fit_track = options["fit_track"].cast<int>();
+  if (fit != nullptr)
+    input.fit_track =
+        tools::place_in_fit(*fit, fit_file.empty() ? "fit" : fit_file.string(), input.tracks,
+                            options["fit_track"].cast<std::optional<int>>());
   const auto track_file = options["track_file"].cast<fs::path>();
   tools::check_recording(input, track_file.empty() ? "track" : track_file.string());
   tools::OverlayOptions how{.from = options["from"].cast<std::string>(),

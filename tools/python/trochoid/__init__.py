@@ -465,7 +465,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     from_, to  first and last sample: seconds (1.5) or a frame ("f120")
     free_pivot fit the pivot's x and y (top); else it is where the scene says, or at 0, 0
     compare    try the models that make sense, fit the simplest that suffices
-    profile    profile likelihood of the body's and the table's parameters
+    profile    profile likelihoods of all parameters but places and angles at the start
     bootstrap  number of fits to resampled residuals, 0: none
     threads    at most so many, 0: all cores; the answer does not depend on it
     seed       of the draws of the bootstrap
@@ -511,10 +511,12 @@ class PredictedArc(_Record):
 
 
 def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
-            fit_track: int = 0) -> list[PredictedArc]:
-    """Replays a fit over the track it was made from; ``fit_track`` counts tracks fitted together."""
+            fit_track: Optional[int] = None) -> list[PredictedArc]:
+    """Replays a fit over the track it was made from; of a fit of several, ``fit_track`` says which of
+    them that is, counted from 0."""
     file = TrackFile(_Given(tracks).tracks)
-    arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(file), _whole("fit_track", fit_track))
+    arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(file),
+                         _optional(_whole, "fit_track", fit_track))
     return [PredictedArc(**arc) for arc in arcs]
 
 
@@ -532,7 +534,8 @@ class OverlayFrames(_Record):
 def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, Path, Fit] = None, *,
             scene: Union[None, Path, Mapping, Scene] = None, camera: Optional[Path] = None,
             output: Optional[Path] = None, still: Optional[Path] = None, from_: Moment = None,
-            to: Moment = None, slow: float = 0.0, fit_track: int = 0) -> OverlayFrames:
+            to: Moment = None, slow: float = 0.0,
+            fit_track: Optional[int] = None) -> OverlayFrames:
     """Draws observed and predicted path into the recording (``trochoid overlay``).
 
     fit     without it only the observation is drawn
@@ -551,7 +554,7 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
                "slow": float(slow),
                "fit_file": fit if isinstance(fit, (str, os.PathLike)) else "",
                "track_file": track if isinstance(track, (str, os.PathLike)) else "",
-               "fit_track": _whole("fit_track", fit_track)}
+               "fit_track": _optional(_whole, "fit_track", fit_track)}
     file = track if isinstance(track, TrackFile) else TrackFile(_Given(track).tracks)
     frames = _core.overlay(_path("video", video), _file_dict(file),
                            _fit(fit, track)._value if fit is not None else None,

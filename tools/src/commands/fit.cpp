@@ -249,7 +249,7 @@ void add_fit_command(CLI::App& app) {
   fit->add_flag("--compare", command->compare,
                 "Try the models that make sense for the scene; fit the simplest that suffices");
   fit->add_flag("--profile", command->options.profile,
-                "Also profile likelihoods of the body's and the table's parameters");
+                "Also profile likelihoods of all parameters but places and angles at the start");
   fit->add_option(
          "--bootstrap", command->options.bootstrap,
          "Number of fits to residuals resampled in blocks, for the shape of the error bars [0]")

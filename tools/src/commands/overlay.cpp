@@ -26,7 +26,7 @@ namespace {
 struct OverlayCommandOptions {
   std::string video, track, fit, scene, camera, output, still, from, to;
   double slow = 0.0;
-  int fit_track = 0;
+  std::optional<int> fit_track;
   bool json = false;
 };
 
@@ -57,7 +57,8 @@ OverlayInput read_inputs(const OverlayCommandOptions& options) {
   }
   input.camera = named_camera(options.camera, options.scene.empty() ? data::Scene{} : *input.scene,
                               options.scene);
-  input.fit_track = options.fit_track;
+  if (input.fit)
+    input.fit_track = place_in_fit(*input.fit, options.fit, input.tracks, options.fit_track);
   return input;
 }
 

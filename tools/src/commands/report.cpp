@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
@@ -9,6 +10,7 @@
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
+#include "common/validators.hpp"
 #include "report/report.hpp"
 #include "report/run_folder.hpp"
 #include "trochoid/data/error.hpp"
@@ -19,6 +21,7 @@ namespace {
 
 struct ReportOptions {
   std::string folder, track, fit, output, path_svg;
+  std::optional<int> fit_track;
   bool json = false;
 };
 
@@ -33,6 +36,7 @@ ReportInput inputs(const ReportOptions& options) {
   if (!options.fit.empty()) {
     input.fit = data::read_fit(options.fit);
     check_made_from(*input.fit, options.fit, options.track);
+    input.fit_track = place_in_fit(*input.fit, options.fit, input.tracks, options.fit_track);
     input.scene = scene_of_fit(*input.fit, options.fit);
   }
   return input;
@@ -65,6 +69,11 @@ void add_report_command(CLI::App& app) {
   command->add_option("folder", options->folder, "Folder a run has made");
   command->add_option("--track", options->track, "Track CSV, instead of a folder");
   command->add_option("--fit", options->fit, "Fit JSON made from that track")->needs("--track");
+  command
+      ->add_option("--fit-track", options->fit_track,
+                   "Place of this track among those fitted together (0 = first)")
+      ->check(whole_number())
+      ->needs("--fit");
   command->add_option("-o,--output", options->output, "Page to write, .html")->required();
   command->add_option("--path-svg", options->path_svg,
                       "Also write the path as a picture for papers (.svg)");

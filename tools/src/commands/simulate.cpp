@@ -151,6 +151,18 @@ void add_source(const fs::path& named, data::Table& table) {
     table.header.emplace_back("sha256", data::sha256_of_file(named));
 }
 
+/// A run counts time from the fit's state on, a recording from its first frame.
+void tell_origin(const SimulateOptions& options, data::Table& table) {
+  if (options.fit.empty()) return;
+  const data::Fit fit = data::read_fit(options.fit);
+  const double origin_s = options.arc == 0 || options.arc >= fit.arcs.size()
+                              ? fit.time_origin_s
+                              : fit.arcs[options.arc].from_s;
+  if (origin_s == 0.0) return;
+  table.header.emplace_back("time", fmt::format("t_s = 0 is {} s of the recording", origin_s));
+  note(fmt::format("t_s = 0 is {} s of the recording", origin_s));
+}
+
 void simulate_scene(const SimulateOptions& options) {
   const fs::path named = options.fit.empty() ? fs::path(options.scene) : options.fit;
   const std::string stem = stem_of(options);
@@ -170,6 +182,7 @@ void simulate_scene(const SimulateOptions& options) {
   if (options.fit.empty()) tell_idle_keys(options.scene, scene);
   data::Table table = trajectory_table(run);
   add_source(named, table);
+  tell_origin(options, table);
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
   std::vector<std::string> pictures;

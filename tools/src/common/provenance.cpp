@@ -51,4 +51,17 @@ void check_made_from(const data::Fit& fit, const fs::path& fit_path, const fs::p
                                  fit_path.string(), track_path.string()));
 }
 
+int place_in_fit(const data::Fit& fit, const std::string& fit_name, const data::TrackFile& file,
+                 std::optional<int> asked) {
+  if (asked) return *asked;
+  int fitted = 0;
+  for (const data::FitArc& arc : fit.arcs) fitted = std::max(fitted, arc.track + 1);
+  if (fitted > static_cast<int>(file.tracks.size()))
+    throw InputError(
+        fmt::format("{}: is of {} tracks; --fit-track (fit_track) must say which of them this is, "
+                    "from 0 to {}",
+                    fit_name, fitted, fitted - 1));
+  return 0;
+}
+
 }  // namespace trochoid::tools

@@ -1,9 +1,11 @@
 #pragma once
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "trochoid/data/fit.hpp"
+#include "trochoid/data/track.hpp"
 
 namespace trochoid::tools {
 
@@ -25,5 +27,11 @@ void add_recording(Checksums& checksums, const std::string& source, const std::s
 /// @throws InputError if the fit tells the checksums of what it read and the track is none of them.
 void check_made_from(const data::Fit& fit, const std::filesystem::path& fit_path,
                      const std::filesystem::path& track_path);
+
+/// Which of the tracks fitted together a track file is, from 0; the only one if there is no other.
+/// @param asked  what the user says.
+/// @throws InputError if the fit is of several files and nobody says.
+[[nodiscard]] int place_in_fit(const data::Fit& fit, const std::string& fit_name,
+                               const data::TrackFile& file, std::optional<int> asked);
 
 }  // namespace trochoid::tools

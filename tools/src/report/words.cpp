@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "report/parts.hpp"
 
@@ -20,6 +22,27 @@ std::string tracked_words(const ReportFacts& facts) {
                      bodies == 1 ? "The path" : fmt::format("{} paths", bodies), facts.samples,
                      facts.prediction.angles_alone() ? "samples" : "positions",
                      facts.last_s - facts.first_s);
+}
+
+// The same of what a fit was made from, which may be some bodies, arcs or a stretch of the track.
+std::string fitted_words(const ReportFacts& facts, const data::Fit& fit) {
+  const int first = facts.input.fit_track;
+  const int end = first + static_cast<int>(facts.input.tracks.tracks.size());
+  std::set<int> bodies;
+  int samples = 0;
+  double from_s = facts.last_s, to_s = facts.first_s;
+  for (const data::FitArc& arc : fit.arcs) {
+    if (arc.track < first || arc.track >= end) continue;
+    bodies.insert(arc.track);
+    samples += arc.samples;
+    from_s = std::min(from_s, arc.from_s);
+    to_s = std::max(to_s, arc.to_s);
+  }
+  if (samples == 0 || samples >= facts.samples) return tracked_words(facts);
+  return fmt::format("{} of {} of the {} {}, over {:.3g} s",
+                     bodies.size() == 1 ? "The path" : fmt::format("{} paths", bodies.size()),
+                     samples, facts.samples,
+                     facts.prediction.angles_alone() ? "samples" : "positions", to_s - from_s);
 }
 
 // Does the model describe the points, and is the scatter what the tracker expects?
@@ -52,7 +75,8 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
   verdict = {
       weak || followed || wide ? "fair" : "good",
       word,
-      fmt::format("{}: the model “{}” follows them{} with {}: {}.", tracked_words(facts), fit.model,
+      fmt::format("{}: the model “{}” follows them{} with {}: {}.", fitted_words(facts, fit),
+                  fit.model,
                   facts.far_off > 0 ? fmt::format(", but for {} far off,", facts.far_off) : "",
                   scatter, fit.verdict_words),
       {}};
