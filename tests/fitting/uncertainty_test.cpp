@@ -330,6 +330,17 @@ TEST(BrokenDegeneracies, AreThoseOfLengthAndTiltOfACircleWhoseTiltIsSeen) {
   EXPECT_THAT(broken.words, testing::HasSubstr("without the tilt"));
 }
 
+// No nutation tells a and b, whatever a mark shows of the spin.
+TEST(BrokenDegeneracies, AreNotThoseOfWhatACircleHides) {
+  data::Track track = circling_track(false);
+  for (data::TrackSample& sample : track.samples)
+    sample.psi = data::MeasuredAngle{30.0 * sample.t_s, 0.01};
+  const data::Fit fit = fit_top(track, {});
+  for (const data::BrokenDegeneracy& broken : fit.broken_degeneracies)
+    for (const std::string& name : broken.parameters)
+      EXPECT_TRUE(fit.find(name)->identifiable) << broken.words;
+}
+
 TEST(BrokenDegeneracies, AreNoneWhereThePathTellsAsMuch) {
   data::Track track = thesis_track(25.0, 2e-4, 1);
   const Eigen::VectorXd tilt = thesis_motion(25.0, {model::Observable::theta_rad});

@@ -26,6 +26,10 @@ TEST(Provenance, OfAFitOfSeveralRecordingsTheUserSaysWhichOneIsMeant) {
   both.tracks.resize(2);
   EXPECT_EQ(place_in_fit(fit, "both.fit.json", both, std::nullopt), 0) << "two bodies of one file";
   EXPECT_EQ(place_in_fit(fit, "both.fit.json", one, 1), 1);
+  fit.arcs.back().track = 2;
+  EXPECT_THROW(static_cast<void>(place_in_fit(fit, "three.fit.json", both, std::nullopt)),
+               InputError);
+  fit.arcs.back().track = 1;
   try {
     static_cast<void>(place_in_fit(fit, "both.fit.json", one, std::nullopt));
     FAIL() << "a track was picked";

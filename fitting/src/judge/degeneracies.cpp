@@ -7,8 +7,10 @@
 #include <cstddef>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "judge/directions.hpp"
+#include "judge/statistics.hpp"
 #include "problem/linearise.hpp"
 
 namespace trochoid::fitting {
@@ -32,14 +34,18 @@ const char* word_for(const Channels& channels) {
   }
 }
 
-// The rows of all other readings, and of priors.
+// The rows of all other readings, and of priors; none where there are no other readings.
 Eigen::MatrixXd without(const Channels& channels, const Linearised& all,
                         const Eigen::MatrixXd& scaled) {
   std::vector<Eigen::Index> rows;
-  for (Eigen::Index row = 0; row < scaled.rows(); ++row)
-    if (all.arc[static_cast<std::size_t>(row)] < 0 ||
-        !holds(channels, all.channel[static_cast<std::size_t>(row)]))
-      rows.push_back(row);
+  bool readings = false;
+  for (Eigen::Index row = 0; row < scaled.rows(); ++row) {
+    const bool prior = all.arc[static_cast<std::size_t>(row)] < 0;
+    if (!prior && holds(channels, all.channel[static_cast<std::size_t>(row)])) continue;
+    rows.push_back(row);
+    readings = readings || !prior;
+  }
+  if (!readings) rows.clear();
   return scaled(rows, Eigen::all);
 }
 
@@ -58,7 +64,7 @@ Channels angles_read(const Linearised& all) {
 
 std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                         const Eigen::VectorXd& u,
-                                                        const Uncertainty& error) {
+                                                        const data::Fit& fit) {
   constexpr double kClearly = 3.0;  // times less certain: else the natural size happens to be near
   const Linearised all = linearise(problem, u);
   const Channels angles = angles_read(all);
@@ -80,7 +86,9 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
     std::vector<std::string> names;
     for (int i = 0; i < count; ++i) {
       const bool own = problem.predictor->parameters()[problem.free[i].index].name == "psi_rad";
-      if (own || !error.identifiable[i] || rest[i] < std::max(1.0, kClearly * with[i]) ||
+      const data::FitParameter* parameter = fit.find(problem.name(i));
+      const bool known = parameter != nullptr && parameter->identifiable;
+      if (own || !known || rest[i] < std::max(1.0, kClearly * with[i]) ||
           (group.size() > 1 && told.contains(i)))
         continue;
       names.push_back(problem.name(i));

@@ -1,7 +1,6 @@
 #pragma once
 #include <vector>
 
-#include "judge/statistics.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/fit.hpp"
 
@@ -11,10 +10,10 @@ namespace trochoid::fitting {
 /// determine: known to their natural size (natural_size) with these readings, and not by the rest
 /// of the recording and the priors. The spin's own angle, which nothing else could show, does not
 /// count. Linear about the solution, and as if residuals were independent.
-/// @param error  the fit's: what it does not determine breaks nothing.
+/// @param fit  says which parameters are determined at all.
 /// @throws NumericalError where the model has no prediction.
 [[nodiscard]] std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                                       const Eigen::VectorXd& u,
-                                                                      const Uncertainty& error);
+                                                                      const data::Fit& fit);
 
 }  // namespace trochoid::fitting

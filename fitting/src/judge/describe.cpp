@@ -157,7 +157,6 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
   fit.rank = error.rank;
   fit.condition = error.condition;
   fit.null_vectors = error.null_vectors;
-  fit.broken_degeneracies = broken_degeneracies(problem, u, error);
 }
 
 }  // namespace
@@ -179,10 +178,12 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   warn_short_rim(problem, solution.u, fit);
   warn_thick_air(scene, fit);
   add_derived_velocity(problem, solution.u, error.covariance, fit);
-  if (!fit.model.starts_with("top")) return;
-  add_derived_top(problem, solution.u, error.covariance, scene, fit);
-  warn_short_top(problem, fit);
-  admit_steady_precession(problem, solution.u, fit);
+  if (fit.model.starts_with("top")) {
+    add_derived_top(problem, solution.u, error.covariance, scene, fit);
+    warn_short_top(problem, fit);
+    admit_steady_precession(problem, solution.u, fit);
+  }
+  fit.broken_degeneracies = broken_degeneracies(problem, solution.u, fit);
 }
 
 }  // namespace trochoid::fitting

@@ -145,22 +145,22 @@ data::Scene wanted_scene(const SimulateOptions& options) {
 
 /// What the run follows from: a file, by its checksum, or a bundled scene.
 void add_source(const fs::path& named, data::Table& table) {
-  table.header.emplace_back("source", named.filename().string());
+  table.header.emplace_back("made from", named.filename().string());
   std::error_code ignored;
   if (fs::is_regular_file(named, ignored))
-    table.header.emplace_back("sha256", data::sha256_of_file(named));
+    table.header.emplace_back("made from sha256", data::sha256_of_file(named));
 }
 
 /// A run counts time from the fit's state on, a recording from its first frame.
 void tell_origin(const SimulateOptions& options, data::Table& table) {
   if (options.fit.empty()) return;
   const data::Fit fit = data::read_fit(options.fit);
-  const double origin_s = options.arc == 0 || options.arc >= fit.arcs.size()
-                              ? fit.time_origin_s
-                              : fit.arcs[options.arc].from_s;
-  if (origin_s == 0.0) return;
-  table.header.emplace_back("time", fmt::format("t_s = 0 is {} s of the recording", origin_s));
-  note(fmt::format("t_s = 0 is {} s of the recording", origin_s));
+  const double origin_s = arc_start_s(fit, options.arc), factor = time_factor(fit);
+  if (origin_s == 0.0 && factor == 1.0) return;
+  std::string words = fmt::format("t_s = 0 is {} s of the recording", origin_s);
+  if (factor != 1.0) words += fmt::format(", whose clock runs {:.6g} times as fast", 1.0 / factor);
+  table.header.emplace_back("time", words);
+  note(words);
 }
 
 void simulate_scene(const SimulateOptions& options) {

@@ -56,11 +56,12 @@ int place_in_fit(const data::Fit& fit, const std::string& fit_name, const data::
   if (asked) return *asked;
   int fitted = 0;
   for (const data::FitArc& arc : fit.arcs) fitted = std::max(fitted, arc.track + 1);
-  if (fitted > static_cast<int>(file.tracks.size()))
+  const int others = fitted - static_cast<int>(file.tracks.size());
+  if (others > 0)
     throw InputError(
         fmt::format("{}: is of {} tracks; --fit-track (fit_track) must say which of them this is, "
                     "from 0 to {}",
-                    fit_name, fitted, fitted - 1));
+                    fit_name, fitted, others));
   return 0;
 }
 
