@@ -94,54 +94,6 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
   EXPECT_LT(friction->sigma, 0.01 * kFriction);
 }
 
-// A narrow ring of contact that spins as it slides: nearly as its rim goes faster, friction against
-// sliding grows while both die out, in small steps of a plain midpoint rule.
-data::Track spinning_ring(double sigma_m) {
-  constexpr int kSteps = 200, kSamples = 60, kPoints = 64;
-  constexpr double kRadius_m = 0.0155, kSpin_rad_s = 40.0;
-  struct State {
-    double x = 0.0, v = 0.8, w = kSpin_rad_s;
-  } at;
-  // Mean over the ring of the direction in which its points slide, and its moment about the middle.
-  const auto rates = [](const State& s) {
-    double along = 0.0, about = 0.0;
-    for (int k = 0; k < kPoints; ++k) {
-      const double angle = 2.0 * M_PI * (k + 0.5) / kPoints;
-      const double vx = s.v - s.w * kRadius_m * std::sin(angle),
-                   vy = s.w * kRadius_m * std::cos(angle);
-      const double size = std::max(1e-12, std::hypot(vx, vy));
-      along += vx / size / kPoints;
-      about += (vy * std::cos(angle) - vx * std::sin(angle)) / size / kPoints;
-    }
-    constexpr double kDeceleration = kFriction * kGravity_m_s2;
-    return std::pair(-kDeceleration * along, -kDeceleration * about / kRadius_m);
-  };
-  std::mt19937_64 generator(4);
-  std::normal_distribution<double> normal(0.0, sigma_m);
-  data::Track track;
-  for (int i = 0; i < kSamples; ++i) {
-    data::TrackSample sample;
-    sample.t_s = kPuckFrame_s * i;
-    sample.centre_m = {at.x + normal(generator), normal(generator)};
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma_m * sigma_m;
-    track.samples.push_back(sample);
-    constexpr double kStep_s = kPuckFrame_s / kSteps;
-    for (int step = 0; step < kSteps; ++step) {
-      const auto [a, b] = rates(at);
-      const State half{at.x, at.v + 0.5 * kStep_s * a, at.w + 0.5 * kStep_s * b};
-      const auto [c, d] = rates(half);
-      at = {at.x + kStep_s * half.v, at.v + kStep_s * c, at.w + kStep_s * d};
-    }
-  }
-  return track;
-}
-
-TEST(PuckFit, FindsNoImpactWhereASpinChangesTheFriction) {
-  const data::Track track = spinning_ring(2e-6);
-  const data::Fit fit = fitting::fit(std::span(&track, 1), puck_scene());
-  EXPECT_EQ(fit.arcs.size(), 1U);
-}
-
 // "The last positions of track 1" were those before an impact in its middle.
 TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
   Throw thrown(1);
