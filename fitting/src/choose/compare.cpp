@@ -125,8 +125,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   if (!named.body && named.model.name == "auto")
     throw InputError(
         "models can be compared for a [body] with its kind and radius_m; without one name the "
-        "model: "
-        "--model top needs none");
+        "model: --model top needs none");
   free_all_terms(named.fit);
   const Ladder ladder = ladder_of(named, show_spin(tracks));
   const std::set<std::string> known = parameters_of_any(ladder);

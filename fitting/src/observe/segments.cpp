@@ -138,7 +138,8 @@ void join_smooth(const Path& path, std::vector<int>& cuts) {
     const int first = cuts[c - 1], last = cuts[c + 1];
     const double apart =
         unit * (residual_of<3>(path, first, cuts[c]) + residual_of<3>(path, cuts[c], last));
-    // Two cubics and a cut against one of this degree: 17 numbers and 14.
+    // By BIC the three numbers it lacks beside two cubics and a cut would be worth three times as
+    // much; a tracker's errors hang together, and a weak impact must not drown in them.
     if (unit * residual_of<kDegree>(path, first, last) < apart + price)
       cuts.erase(cuts.begin() + static_cast<std::ptrdiff_t>(c));
     else

@@ -137,8 +137,7 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
       "\n[camera]                   # without file or scale the radius gives the scale\n";
   text +=
       "# file = \"camera.json\"     # from trochoid calibrate; without it a body that tilts is not "
-      "quite "
-      "where it seems\n";
+      "quite where it seems\n";
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
   const auto captured = seen.video.capture_rate_hz;
   if (rate_hz)
