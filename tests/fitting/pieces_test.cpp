@@ -54,6 +54,35 @@ TEST(Pieces, ABoundBeyondTheTrackIsRefusedWithWhatTheTrackHas) {
   EXPECT_THAT(refusal(track, "late", ""), testing::HasSubstr("from = 'late': give seconds"));
 }
 
+// A puck that slides along x, seen every kStep_s to a few micrometres.
+template <class Place>
+std::vector<SampleRange> slides_of(Place&& x_m) {
+  constexpr int kSamples = 60;
+  constexpr double kSigma_m = 2e-6;
+  data::Track track;
+  for (int i = 0; i < kSamples; ++i) {
+    data::TrackSample sample;
+    sample.t_s = kStep_s * i;
+    const double share = i / (kSamples - 1.0), scatter_m = i % 2 == 0 ? kSigma_m : -kSigma_m;
+    sample.centre_m = Eigen::Vector2d(x_m(share) + scatter_m, scatter_m);
+    sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
+    track.samples.push_back(sample);
+  }
+  return sliding_ranges(track, {0, kSamples});
+}
+
+// Of the term of fifth degree a cubic leaves 10 / 512 (Chebyshev), 0.08 mm or 40 times the noise.
+TEST(Pieces, ASlideIsOneHoweverItsFrictionChangesAndTwoWhereItIsHit) {
+  const auto slowed_ever_more = [](double u) {
+    return 0.1 * u - 0.03 * u * u - 0.004 * std::pow(u, 5);
+  };
+  EXPECT_EQ(slides_of(slowed_ever_more).size(), 1U);
+  const auto hit_in_the_middle = [&](double u) {
+    return slowed_ever_more(u) - 0.02 * std::max(0.0, u - 0.5);
+  };
+  EXPECT_EQ(slides_of(hit_in_the_middle).size(), 2U);
+}
+
 // Held for a second, pushed for half a second to 20 rad/s, then free.
 TEST(Pieces, ASpinIsLetGoWhenThePushEnds) {
   constexpr double kHeld_s = 1.0, kPush_s = 0.5, kSpin_rad_s = 20.0, kSpeedWindow_s = 8 * kStep_s;

@@ -9,7 +9,8 @@ namespace trochoid::fitting {
 /// (with a wall, another puck, a hand) and rest.
 ///
 /// The path is cut where cubics in time, one to each piece, explain it at the least chi-square plus
-/// a price for every piece (dynamic programming, so no threshold on noisy velocities). Pieces at
+/// a price for every piece (dynamic programming, so no threshold on noisy velocities); pieces that
+/// one polynomial of degree 6 explains as well are joined again, as no impact parts them. Pieces at
 /// rest or gaining speed (something pushes) are left out, and so is the sample on either side of a
 /// cut, whose exposure may hold the impact.
 /// @returns ranges into track.samples, in time order; empty if the body never slides freely.
