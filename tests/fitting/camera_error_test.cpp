@@ -76,7 +76,7 @@ class FilmedByAnUncertainCamera : public testing::Test {
       const double height_m = kTruth.at("l_m") * std::cos(at[2]);
       sample.centre_px = truth.image_from_table<double>({at[0], at[1], height_m});
       sample.centre_m = camera_.table_from_image(sample.centre_px, height_m).head<2>();
-      sample.centre_m += kNoise_m * Eigen::Vector2d(normal(generator), normal(generator));
+      sample.centre_m += kNoise_m * Eigen::Vector2d{normal(generator), normal(generator)};
       sample.covariance_m2 = kNoise_m * kNoise_m * Eigen::Matrix2d::Identity();
       if (with_axis) {
         const Eigen::Vector3d axis(std::sin(at[2]) * std::sin(at[3]),

@@ -295,7 +295,7 @@ TEST(Compare, FindsThatAFloorHasNoFrictionAtAll) {
     data::TrackSample sample;
     sample.t_s = at("t");
     sample.centre_m = Eigen::Vector2d(at("x"), at("y")) +
-                      kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+                      kSigma_m * Eigen::Vector2d{normal(generator), normal(generator)};
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
     sample.theta = data::MeasuredAngle{at("theta") + kSigma_rad * normal(generator), kSigma_rad};
     sample.phi = data::MeasuredAngle{at("phi") + kSigma_rad * normal(generator), kSigma_rad};

@@ -156,7 +156,7 @@ class NearlyFlatCoin : public testing::Test {
       data::TrackSample sample;
       sample.t_s = t_s[static_cast<std::size_t>(i)];
       sample.centre_m =
-          at.head<2>() + kSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+          at.head<2>() + kSigma_m * Eigen::Vector2d{normal(generator), normal(generator)};
       sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
       const bool fooled = at[2] < 0.2;
       const double tilt = fooled ? 0.25 : at[2];
@@ -211,9 +211,7 @@ TEST_F(NearlyFlatCoin, TakenToLieThroughoutIsNotThoughtPreciseAcrossItsAxis) {
   Problem problem = prepare(std::span(&rolls, 1), *predictor, scene_, options);
   problem.base[0] = values_with(*predictor, options.start);
   reweight(problem, problem.start(), true);
-  const auto scale = [&](Channel channel) {
-    return problem.noise_scale[static_cast<std::size_t>(channel)];
-  };
+  const auto scale = [&](Channel channel) { return noise_scale(problem.arcs[0], channel); };
   EXPECT_GT(scale(Channel::theta), 1.0);
   EXPECT_GT(scale(Channel::phi), kLeast * scale(Channel::theta));
 }

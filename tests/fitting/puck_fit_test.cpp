@@ -67,7 +67,7 @@ class Throw {
   void add() {
     data::TrackSample sample;
     sample.t_s = kPuckFrame_s * static_cast<double>(track_.samples.size());
-    sample.centre_m = at_ + Eigen::Vector2d(normal_(generator_), normal_(generator_));
+    sample.centre_m = at_ + Eigen::Vector2d{normal_(generator_), normal_(generator_)};
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPuckSigma_m * kPuckSigma_m;
     track_.samples.push_back(sample);
   }
@@ -96,7 +96,7 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
 
 // "The last positions of track 1" were those before an impact in its middle.
 TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
-  Throw thrown(1);
+  Throw thrown(4);
   thrown.slide({0.0, 0.0}, 0.2).slide({1.0, 0.3}, 0.3).slide({-0.2, 0.5}, 0.6);
   data::Track track = thrown.track();
   constexpr double kOff = 5.0;  // sigma; of more of them, or farther ones, another stretch is made
@@ -215,7 +215,7 @@ struct Turning {
       data::TrackSample sample;
       sample.t_s = kPuckFrame_s * static_cast<double>(track.samples.size());
       sample.centre_m =
-          at.head<2>() + kPuckSigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+          at.head<2>() + kPuckSigma_m * Eigen::Vector2d{normal(generator), normal(generator)};
       sample.covariance_m2 = Eigen::Matrix2d::Identity() * kPuckSigma_m * kPuckSigma_m;
       sample.psi = data::MeasuredAngle{at[2] + 0.02 * normal(generator), 0.02};
       track.samples.push_back(sample);

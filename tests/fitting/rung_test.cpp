@@ -45,7 +45,7 @@ data::Track track_of_a_top() {
     data::TrackSample sample;
     sample.t_s = t_s[i];
     sample.centre_m = path.segment<2>(2 * static_cast<Eigen::Index>(i)) +
-                      Eigen::Vector2d(normal(generator), normal(generator));
+                      Eigen::Vector2d{normal(generator), normal(generator)};
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * kSigma_m * kSigma_m;
     track.samples.push_back(sample);
   }
@@ -249,7 +249,7 @@ TEST_F(SlidesLater, SlipsAtFirstWhereThatIsSeen) {
     data::TrackSample& sample = track.samples[i];
     const double sigma_m = std::sqrt(sample.covariance_m2(0, 0));
     sample.centre_m =
-        at.head<2>() + sigma_m * Eigen::Vector2d(normal(generator), normal(generator));
+        at.head<2>() + sigma_m * Eigen::Vector2d{normal(generator), normal(generator)};
     sample.theta->value_rad = at[2] + sample.theta->sigma_rad * normal(generator);
     sample.phi->value_rad = at[3] + sample.phi->sigma_rad * normal(generator);
   }

@@ -276,7 +276,7 @@ TEST(Calibration, LeavesNoViewOutThatIsAsGoodAsTheOthers) {
     std::normal_distribution<double> noise_px(0.0, kNoise_px);
     for (BoardView& view : views)
       for (Eigen::Vector2d& p : view.image_px)
-        p += Eigen::Vector2d(noise_px(random), noise_px(random));
+        p += Eigen::Vector2d{noise_px(random), noise_px(random)};
     EXPECT_TRUE(calibrate(views, {640, 480}).left_out.empty()) << seed;
   }
 }
@@ -295,7 +295,7 @@ std::vector<BoardView> noisy_views(std::mt19937_64& generator) {
                                 kSquare_m * (i / kColumns - 0.5 * (kRows - 1)));
       const Eigen::Vector2d& at = view.board_m.back();
       view.image_px.push_back(camera.image_from_table<double>({at.x(), at.y(), 0.0}) +
-                              Eigen::Vector2d(normal(generator), normal(generator)));
+                              Eigen::Vector2d{normal(generator), normal(generator)});
     }
     views.push_back(std::move(view));
   }
@@ -310,7 +310,7 @@ std::vector<Eigen::Vector2d> noisy_images(const data::Camera& truth,
   std::vector<Eigen::Vector2d> out;
   for (const Eigen::Vector3d& at : points_m)
     out.push_back(truth.image_from_table<double>(at) +
-                  Eigen::Vector2d(normal(generator), normal(generator)));
+                  Eigen::Vector2d{normal(generator), normal(generator)});
   return out;
 }
 

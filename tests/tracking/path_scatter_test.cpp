@@ -17,7 +17,7 @@ data::Track circling(double rad_per_frame, double noise_m, double claimed_m, boo
   data::Track track;
   for (int i = 0; i < 300; ++i) {
     const double angle = rad_per_frame * i;
-    const Eigen::Vector2d noise(normal(random), normal(random));
+    const Eigen::Vector2d noise{normal(random), normal(random)};
     if (gaps && i % 10 == 9) continue;
     data::TrackSample sample;
     sample.frame = i;

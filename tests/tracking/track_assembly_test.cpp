@@ -62,7 +62,7 @@ TEST(TrackAssembly, WhatAllFramesMayBeOffByDoesNotHideHowFarTheyScatter) {
     BodyPath::At& at = path.frames[i];
     at.t_s = 0.01 * i;
     at.seen.pose->pose.centre_m.head<2>() =
-        2.0 * kClaimed_m * Eigen::Vector2d(normal(random), normal(random));
+        2.0 * kClaimed_m * Eigen::Vector2d{normal(random), normal(random)};
     at.seen.pose->covariance_m2 = kClaimed_m * kClaimed_m * Eigen::Matrix2d::Identity();
     at.seen.other_readings[0].m2 = kOff_m * kOff_m * Eigen::Matrix2d::Identity();
   }

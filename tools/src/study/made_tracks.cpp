@@ -36,7 +36,7 @@ double either_sign(Generator& generator) {
 void add_noise(MadeTrack& made, double sigma_m, Generator& generator) {
   std::normal_distribution<double> normal;
   for (data::TrackSample& sample : made.track.samples) {
-    const Eigen::Vector2d noise(normal(generator), normal(generator));
+    const Eigen::Vector2d noise{normal(generator), normal(generator)};
     sample.centre_m += sigma_m * noise;
     made.chi2_of_truth += noise.squaredNorm();
     sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma_m * sigma_m;
