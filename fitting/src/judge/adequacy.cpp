@@ -77,11 +77,12 @@ bool seen(const Problem& problem, Channel channel) {
   });
 }
 
-double typical_sigma(const Problem& problem, Channel channel) {
+double typical_noise(const Problem& problem, Channel channel) {
   std::vector<double> sigmas;
   for (const ArcData& arc : problem.arcs)
     for (const Reading& reading : arc.readings)
-      if (reading.channel == channel) sigmas.push_back(1.0 / reading.whitener(0, 0));
+      if (reading.channel == channel)
+        sigmas.push_back(noise_scale(arc, channel) / reading.whitener(0, 0));
   return median(std::move(sigmas));
 }
 
@@ -103,15 +104,16 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
-    double scatter = 1.0;
-    for (const ArcData& arc : problem.arcs)
-      if (problem.noise_scale[c] > kFine) scatter = std::max(scatter, excess_scatter(arc, channel));
-    double times = problem.noise_scale[c] / scatter;
+    double noise = 0.0, scatter = 1.0;
+    for (const ArcData& arc : problem.arcs) {
+      noise = std::max(noise, arc.noise_scale[c]);
+      if (arc.noise_scale[c] > kFine) scatter = std::max(scatter, excess_scatter(arc, channel));
+    }
+    double times = noise / scatter;
     if (channel == Channel::position && path_followed) times = std::min(times, kHopeless);
     // Where the angle is all there is, being followed is not enough.
     const bool whole = problem.predictor->model_name() == "pivot" && times >= kAnyTracker;
-    if (channel != Channel::position && !whole &&
-        problem.noise_scale[c] * typical_sigma(problem, channel) < kFollowed_rad)
+    if (channel != Channel::position && !whole && typical_noise(problem, channel) < kFollowed_rad)
       continue;
     if (seen(problem, channel) && times > worst.times) worst = {times, channel};
   }
@@ -172,7 +174,8 @@ double polynomial_chi2(const Problem& problem, int arc, int degree) {
   Eigen::VectorXd right(2 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Reading& reading = *readings[i];
-    const double weight = robust_weight(problem, arc, reading) / problem.noise_scale[0];
+    const double weight =
+        robust_weight(problem, arc, reading) / noise_scale(data, Channel::position);
     const Eigen::Matrix2d wt = weight * reading.whitener.transpose();
     const double t = 2.0 * (data.t_s[reading.sample] - data.t_s.front()) / duration_s - 1.0;
     double power = 1.0;

@@ -110,9 +110,10 @@ data::Bootstrap bootstrap(const Problem& problem, const Solution& solution,
     std::seed_seq sequence{seed & 0xffffffffU, seed >> 32U, static_cast<std::uint64_t>(draw)};
     std::mt19937_64 generator(sequence);
     Problem drawn = plain;
-    drawn.noise_scale = problem.noise_scale;
-    for (int arc = 0; arc < arcs; ++arc)
+    for (int arc = 0; arc < arcs; ++arc) {
+      drawn.arcs[arc].noise_scale = problem.arcs[arc].noise_scale;
       resample(drawn.arcs[arc], series[arc], residuals[arc], stretch, generator);
+    }
     values[draw] = fit_again(std::move(drawn), solution);
   });
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {

@@ -62,6 +62,13 @@ Channels angles_read(const Linearised& all) {
 
 }  // namespace
 
+data::BrokenDegeneracy broken_by(const std::string& readings,
+                                 const std::vector<std::string>& names) {
+  return {readings, names,
+          fmt::format("without the {} seen in the recording, {} would not be known", readings,
+                      fmt::join(names, ", "))};
+}
+
 std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                         const Eigen::VectorXd& u,
                                                         const data::Fit& fit) {
@@ -95,10 +102,7 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
       told.insert(i);
     }
     if (names.empty()) continue;
-    const char* readings = word_for(group);
-    broken.push_back({readings, names,
-                      fmt::format("without the {} seen in the recording, {} would not be known",
-                                  readings, fmt::join(names, ", "))});
+    broken.push_back(broken_by(word_for(group), names));
   }
   return broken;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "problem/problem.hpp"
@@ -15,5 +16,9 @@ namespace trochoid::fitting {
 [[nodiscard]] std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                                       const Eigen::VectorXd& u,
                                                                       const data::Fit& fit);
+
+/// What is said of parameters that only these readings determine.
+[[nodiscard]] data::BrokenDegeneracy broken_by(const std::string& readings,
+                                               const std::vector<std::string>& names);
 
 }  // namespace trochoid::fitting

@@ -116,84 +116,131 @@ bool is_free(const Problem& problem, const char* name) {
   return false;
 }
 
-}  // namespace
+// What a top's a, b and l become with what else is known of it. Its moments are given about the
+// pivot, those of a shape about its centre, m l^2 less.
+class DerivedTop {
+ public:
+  DerivedTop(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance,
+             const data::Scene& scene, data::Fit& fit)
+      : propagate_(problem, u, covariance),
+        fit_(fit),
+        body_(scene.body.value_or(data::Body{})),
+        shaped_(scene.body && body_.kind != data::BodyKind::top && body_.radius_m > 0.0),
+        sees_spin_(is_free(problem, "omega_s_rad_s")),
+        a_(problem.predictor->index_of("a_1_s2")),
+        b_(problem.predictor->index_of("b_1_s")),
+        l_(problem.predictor->index_of("l_m")),
+        omega_(problem.predictor->index_of("omega_s_rad_s")),
+        moment_(given(scene, "I_kg_m2", body_.I_kg_m2)),
+        axial_(given(scene, "Is_kg_m2", body_.Is_kg_m2)),
+        mass_(given(scene, "mass_kg", body_.mass_kg)),
+        gravity_(given(scene, "gravity_m_s2", scene.model.gravity_m_s2)),
+        spin_(given(scene, "omega_s_rad_s", std::nullopt)) {}
 
-void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
-                     const Eigen::MatrixXd& covariance, const data::Scene& scene, data::Fit& fit) {
-  const Propagation propagate(problem, u, covariance);
-  const int a = problem.predictor->index_of("a_1_s2"), b = problem.predictor->index_of("b_1_s");
-  const int l = problem.predictor->index_of("l_m");
-  const int omega = problem.predictor->index_of("omega_s_rad_s");
-  const data::Body body = scene.body.value_or(data::Body{});
-  const bool shaped = scene.body && body.kind != data::BodyKind::top && body.radius_m > 0.0;
-  const Given I = given(scene, "I_kg_m2", body.I_kg_m2),
-              Is = given(scene, "Is_kg_m2", body.Is_kg_m2);
-  const Given mass = given(scene, "mass_kg", body.mass_kg);
-  const Given spin = given(scene, "omega_s_rad_s", std::nullopt);
-  const Given gravity = given(scene, "gravity_m_s2", scene.model.gravity_m_s2);
-  // Of a top's moments: I is given about the pivot, of a shape about its centre, m l^2 less. With
-  // a = m g l / I about the pivot either tells the mass. Of the givens I, Is, mass and gravity.
+  void add_ratio_and_spin() const {
+    if (sees_spin_)
+      by_mark();
+    else if (moment_.known && axial_.known)
+      by_moments();
+    else if (spin_.known)
+      by_spin();
+    else if (shaped_)
+      by_shape();
+  }
+  // With a = m g l / I about the pivot either of I and m tells the other.
+  void add_mass() const {
+    if (!moment_.known) return;
+    if (mass_.known)
+      contradict(moment_, of([=, this](const Values& v, const Givens& g) {
+                   return g[kMass] * v[l_] * (g[kGravity] / v[a_] - (shaped_ ? v[l_] : 0.0));
+                 }),
+                 "I_kg_m2 and what mass_kg and the fitted a and l make of it", fit_);
+    else
+      add(fit_, "mass_kg", "kg",
+          of([=, this](const Values& v, const Givens& g) { return mass_of_moment(v, g); }),
+          "from a and l with the given I and gravity");
+  }
+
+ private:
   using Values = Eigen::VectorXd;
   using Givens = std::vector<double>;
-  const std::vector<Given> givens{I, Is, mass, gravity};
-  const auto mass_of_I = [=](const Values& v, const Givens& g) {
-    return v[a] * g[0] / (v[l] * (g[3] - (shaped ? v[a] * v[l] : 0.0)));
-  };
-  const auto I_at_pivot = [=, weighed = mass.known](const Values& v, const Givens& g) {
-    return shaped ? g[0] + (weighed ? g[2] : mass_of_I(v, g)) * v[l] * v[l] : g[0];
-  };
-  const auto ratio = [=](const Values& v, const Givens& g) { return I_at_pivot(v, g) / g[1]; };
+  enum : std::size_t { kMoment, kAxial, kMass, kGravity, kSpin };
 
-  if (omega >= 0 && is_free(problem, "omega_s_rad_s")) {
-    const Given seen =
-        propagate([=](const Values& v, const Givens&) { return v[omega] / v[b]; }, {});
-    add(fit, "I_over_Is", "1", seen, "omega_s / b, the spin from the mark");
-    if (I.known && Is.known)
-      contradict(propagate(ratio, givens), seen, "the given I / Is and omega_s / b by the mark",
-                 fit);
-  } else if (I.known && Is.known) {
-    add(fit, "I_over_Is", "1", propagate(ratio, givens), "from the given I and Is");
+  [[nodiscard]] Given of(const Propagation::Function& f) const {
+    return propagate_(f, {moment_, axial_, mass_, gravity_, spin_});
+  }
+  [[nodiscard]] double mass_of_moment(const Values& v, const Givens& g) const {
+    return v[a_] * g[kMoment] / (v[l_] * (g[kGravity] - (shaped_ ? v[a_] * v[l_] : 0.0)));
+  }
+  [[nodiscard]] double ratio(const Values& v, const Givens& g) const {
+    if (!shaped_) return g[kMoment] / g[kAxial];
+    const double mass_kg = mass_.known ? g[kMass] : mass_of_moment(v, g);
+    return (g[kMoment] + mass_kg * v[l_] * v[l_]) / g[kAxial];
+  }
+  [[nodiscard]] Given given_ratio() const {
+    return of([=, this](const Values& v, const Givens& g) { return ratio(v, g); });
+  }
+  void add_ratio(const Given& value, const char* note) const {
+    add(fit_, "I_over_Is", "1", value, note);
+  }
+  void add_spin(const Given& value, const char* note) const {
+    add(fit_, "omega_s_rad_s", "rad/s", value, note);
+  }
+
+  void by_mark() const {
+    const Given seen = of([=, this](const Values& v, const Givens&) { return v[omega_] / v[b_]; });
+    add_ratio(seen, "omega_s / b, the spin from the mark");
+    if (moment_.known && axial_.known)
+      contradict(given_ratio(), seen, "the given I / Is and omega_s / b by the mark", fit_);
+  }
+  void by_moments() const {
+    add_ratio(given_ratio(), "from the given I and Is");
     const Given turned =
-        propagate([=](const Values& v, const Givens& g) { return v[b] * ratio(v, g); }, givens);
+        of([=, this](const Values& v, const Givens& g) { return v[b_] * ratio(v, g); });
     const bool both =
-        spin.known && !contradict(turned, spin, "b I / Is and the spin as [fit] prior has it", fit);
-    add(fit, "omega_s_rad_s", "rad/s", both ? combined(turned, spin) : turned,
-        both ? "b I / Is with the given I and Is, and the spin as [fit] prior has it"
-             : "b I / Is with the given I and Is");
-  } else if (spin.known) {
-    add(fit, "I_over_Is", "1",
-        propagate(
-            [=](const Eigen::VectorXd& v, const std::vector<double>& g) { return g[0] / v[b]; },
-            {spin}),
-        "omega_s / b, the spin as [fit] prior has it");
-  } else if (shaped) {
-    // Per unit mass; about the pivot I = A + m l^2 with the fitted l.
-    data::Body unit = body;
+        spin_.known &&
+        !contradict(turned, spin_, "b I / Is and the spin as [fit] prior has it", fit_);
+    if (both)
+      add_spin(combined(turned, spin_),
+               "b I / Is with the given I and Is, and the spin as [fit] prior has it");
+    else
+      add_spin(turned, "b I / Is with the given I and Is");
+  }
+  void by_spin() const {
+    add_ratio(of([=, this](const Values& v, const Givens& g) { return g[kSpin] / v[b_]; }),
+              "omega_s / b, the spin as [fit] prior has it");
+  }
+  // Per unit mass; about the pivot I = A + m l^2 with the fitted l.
+  void by_shape() const {
+    data::Body unit = body_;
     unit.mass_kg = 1.0;
     unit.I_kg_m2.reset();
     unit.Is_kg_m2.reset();
     const model::CentralInertia inertia = model::central_inertia(unit);
-    const auto by_shape = [=](const Values& v) {
-      return (inertia.transverse_kg_m2 + v[l] * v[l]) / inertia.axial_kg_m2;
+    const auto of_shape = [=, this](const Values& v) {
+      return (inertia.transverse_kg_m2 + v[l_] * v[l_]) / inertia.axial_kg_m2;
     };
-    add(fit, "I_over_Is", "1",
-        propagate([=](const Values& v, const Givens&) { return by_shape(v); }, {}),
-        "from the body's shape and the fitted l");
-    add(fit, "omega_s_rad_s", "rad/s",
-        propagate([=](const Values& v, const Givens&) { return v[b] * by_shape(v); }, {}),
-        "b I / Is, I / Is from the body's shape and the fitted l");
+    add_ratio(of([=](const Values& v, const Givens&) { return of_shape(v); }),
+              "from the body's shape and the fitted l");
+    add_spin(of([=, this](const Values& v, const Givens&) { return v[b_] * of_shape(v); }),
+             "b I / Is, I / Is from the body's shape and the fitted l");
   }
-  if (I.known && mass.known)
-    contradict(I,
-               propagate(
-                   [=](const Values& v, const Givens& g) {
-                     return g[2] * v[l] * (g[3] / v[a] - (shaped ? v[l] : 0.0));
-                   },
-                   givens),
-               "I_kg_m2 and what mass_kg and the fitted a and l make of it", fit);
-  if (I.known && !mass.known)
-    add(fit, "mass_kg", "kg", propagate(mass_of_I, givens),
-        "from a and l with the given I and gravity");
+
+  Propagation propagate_;
+  data::Fit& fit_;
+  data::Body body_;
+  bool shaped_, sees_spin_;
+  int a_, b_, l_, omega_;  // places among the parameters
+  Given moment_, axial_, mass_, gravity_, spin_;
+};
+
+}  // namespace
+
+void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
+                     const Eigen::MatrixXd& covariance, const data::Scene& scene, data::Fit& fit) {
+  const DerivedTop top(problem, u, covariance, scene, fit);
+  top.add_ratio_and_spin();
+  top.add_mass();
 }
 
 void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,

@@ -68,13 +68,22 @@ void report_parameters(const Problem& problem, const Uncertainty& error,
   }
 }
 
+// Each recording once; its whiteners are all alike, of one guess.
+void tell_unknown_noise(const Problem& problem, data::Fit& fit) {
+  int told = -1;
+  for (const ArcData& arc : problem.arcs) {
+    if (!arc.sigma_unknown || arc.track == told) continue;
+    told = arc.track;
+    fit.warnings.push_back(fmt::format(
+        "track {} has no covariances: the noise of its positions, {:.2g} m, is "
+        "estimated from the residuals",
+        arc.track + 1, noise_scale(arc, Channel::position) / arc.readings.front().whitener(0, 0)));
+  }
+}
+
 void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   for (const data::NullVector& vector : fit.null_vectors) fit.warnings.push_back(vector.words);
-  for (const ArcData& arc : problem.arcs)
-    if (arc.sigma_unknown) {
-      fit.warnings.push_back("the track has no covariances: sigma is estimated from the residuals");
-      break;
-    }
+  tell_unknown_noise(problem, fit);
   for (const ArcData& arc : problem.arcs)
     if (arc.held)
       fit.warnings.push_back(fmt::format(
@@ -150,8 +159,9 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
   fit.dof = score.rows - static_cast<int>(problem.free.size());
   fit.aicc = score.aicc;
   fit.bic = score.bic;
-  const bool positions = problem.arcs[0].observables[0] == model::Observable::x_m;
-  fit.noise_scale = problem.noise_scale[positions ? 0 : 3];
+  const ArcData& first = problem.arcs[0];
+  const bool positions = first.observables[0] == model::Observable::x_m;
+  fit.noise_scale = noise_scale(first, positions ? Channel::position : Channel::psi);
   fit.whiteness_p = error.whiteness.p_value;
   fit.correlation_time_s = error.whiteness.correlation_time_s;
   fit.rank = error.rank;
@@ -183,7 +193,11 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
     warn_short_top(problem, fit);
     admit_steady_precession(problem, solution.u, fit);
   }
-  fit.broken_degeneracies = broken_degeneracies(problem, solution.u, fit);
+  for (data::BrokenDegeneracy& broken : broken_degeneracies(problem, solution.u, fit))
+    if (std::none_of(
+            fit.broken_degeneracies.begin(), fit.broken_degeneracies.end(),
+            [&](const data::BrokenDegeneracy& told) { return told.readings == broken.readings; }))
+      fit.broken_degeneracies.push_back(std::move(broken));
 }
 
 }  // namespace trochoid::fitting

@@ -266,7 +266,9 @@ class OneFit {
   /// To be called before find().
   void start_as(const Settled& near);
   /// @pre find()
-  [[nodiscard]] Settled settled() const { return {problem_.tolerance, problem_.noise_scale}; }
+  [[nodiscard]] Settled settled() const {
+    return {problem_.tolerance, problem_.arcs[0].noise_scale};
+  }
   /// @pre find()
   [[nodiscard]] data::Fit described(Bars bars);
 
@@ -291,7 +293,7 @@ void OneFit::start_as(const Settled& near) {
   constexpr double kMost = 1.5;
   if (std::all_of(near.noise_scale.begin(), near.noise_scale.end(),
                   [](double scale) { return scale < kMost; }))
-    problem_.noise_scale = near.noise_scale;
+    problem_.arcs[0].noise_scale = near.noise_scale;
 }
 
 void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part) {

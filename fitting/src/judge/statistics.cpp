@@ -76,26 +76,27 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
                               const Ways& ways) {
   constexpr double kOfScatter = 0.5, kOfStated = 0.25;
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(all.jacobian.rows());
-  std::vector<double> sizes;
+  std::vector<double> sizes, scales;
   int first = 0;
   for (int a = 0; a < static_cast<int>(problem.arcs.size()); ++a) {
     const ArcData& arc = problem.arcs[static_cast<std::size_t>(a)];
     const std::vector<Eigen::Vector2d> way = ways(arc);
     const int width = rows_of(channel);
+    const double scale = noise_scale(arc, channel);
     for (const Reading& reading : arc.readings) {
       if (reading.channel != channel || !arc.filmed) continue;
       const Eigen::Vector2d row =
-          reading.whitener.transpose() * way[static_cast<std::size_t>(reading.sample)];
+          reading.whitener.transpose() * way[static_cast<std::size_t>(reading.sample)] / scale;
       rows.segment(first + reading.row, width) =
           robust_weight(problem, a, reading) * row.head(width);
+      scales.push_back(scale);
       if (!row.isZero()) sizes.push_back(row.head(width).norm());
     }
     first += arc.rows;
   }
   const double typical = median(std::move(sizes));
-  const double scale = problem.noise_scale[static_cast<std::size_t>(channel)];
-  const double size = std::max(kOfScatter, kOfStated / scale);
-  return typical > 0.0 ? Eigen::VectorXd(size / typical * rows) : rows;
+  if (!(typical > 0.0)) return rows;
+  return std::max(kOfScatter, kOfStated / median(std::move(scales))) / typical * rows;
 }
 
 // What the camera's likely deviations do to the residuals of all channels, one each.
@@ -109,8 +110,7 @@ std::vector<Eigen::VectorXd> camera_offsets(const Problem& problem, const Linear
       Eigen::VectorXd rows = whitened(arc, arc.camera_shifts[k]);
       for (const Reading& reading : arc.readings)
         rows.segment(reading.row, rows_of(reading.channel)) *=
-            robust_weight(problem, a, reading) /
-            problem.noise_scale[static_cast<std::size_t>(reading.channel)];
+            robust_weight(problem, a, reading) / noise_scale(arc, reading.channel);
       out[k].segment(first, arc.rows) = rows;
     }
     first += arc.rows;
@@ -166,6 +166,18 @@ void judge_directions(const Problem& problem, const Directions& seen, Uncertaint
       std::max(seen.singular.maxCoeff(), 1e-300) / std::max(seen.singular.minCoeff(), 1e-300);
 }
 
+// What the scales of a channel's noise add to twice the negative logarithm of the likelihood.
+double log_determinant_of_scales(const Problem& problem, Channel channel) {
+  double sum = 0.0;
+  for (const ArcData& arc : problem.arcs) {
+    const auto read = static_cast<double>(
+        std::count_if(arc.readings.begin(), arc.readings.end(),
+                      [&](const Reading& reading) { return reading.channel == channel; }));
+    sum += 2.0 * rows_of(channel) * read * std::log(noise_scale(arc, channel));
+  }
+  return sum;
+}
+
 // Noise of all channels, and the offsets that may be common to a whole record: the tracker's, and
 // what the camera's calibration allows for.
 struct Noise {
@@ -182,13 +194,11 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
   result.minus2_log_likelihood = 0.0;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
-    const auto rows = static_cast<double>(
-        std::count(all.channel.begin(), all.channel.begin() + problem.rows(), channel));
-    if (rows == 0.0) continue;
+    if (std::find(all.channel.begin(), all.channel.end(), channel) == all.channel.end()) continue;
     found.channels.push_back(channel_noise(problem, all, channel, scaled, unit_steps));
     const Whiteness& one = found.channels.back().whiteness;
     result.minus2_log_likelihood += found.channels.back().minus2_log_likelihood +
-                                    2.0 * rows * std::log(problem.noise_scale[c]) +
+                                    log_determinant_of_scales(problem, channel) +
                                     cost_of_standing_out(problem, channel);
     found.offsets.push_back(common_offset(problem, all, channel, along(0)));
     if (channel == Channel::position) {

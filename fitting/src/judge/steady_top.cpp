@@ -4,19 +4,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
+#include <string>
+#include <vector>
 
+#include "judge/degeneracies.hpp"
 #include "observe/angles.hpp"
 #include "observe/decompositions.hpp"
 
 namespace trochoid::fitting {
 namespace {
 
-// A path about the pivot without nutation: distance and azimuth as polynomials in time since the
-// start, constant and linear without drag; with drag the axis sinks or rises and the rate drifts.
-struct Circle {
-  Eigen::VectorXd distance_m, azimuth_rad;
+// A motion about the pivot without nutation: distance, azimuth and, where it is seen, tilt as
+// polynomials in time since the start, constant but for the linear azimuth without drag; with drag
+// the axis sinks or rises and the rate drifts.
+struct Steady {
+  Eigen::VectorXd distance_m, azimuth_rad, tilt_rad;
 };
 
 double at(const Eigen::VectorXd& coefficients, double t) {
@@ -25,31 +28,70 @@ double at(const Eigen::VectorXd& coefficients, double t) {
   return value;
 }
 
-Circle circle_through(const ArcData& arc, const Eigen::Vector2d& pivot_m, bool drag) {
-  const Eigen::MatrixX2d xy = arc.positions_m().rowwise() - pivot_m.transpose();
-  const Eigen::Index n = xy.rows();
-  const int highest = drag ? 3 : 1;
-  const Eigen::VectorXd azimuth = precessions(xy);
-  Eigen::MatrixXd powers(n, highest + 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double t = arc.t_s[static_cast<std::size_t>(i)] - arc.start_s;
-    for (int k = 0; k <= highest; ++k) powers(i, k) = std::pow(t, k);
-  }
-  return {LeastSquares(powers.leftCols(highest)).solve(xy.rowwise().norm()),
-          LeastSquares(powers).solve(azimuth)};
+Eigen::MatrixXd powers_of(const std::vector<double>& t_s, double start_s, int highest) {
+  Eigen::MatrixXd powers(static_cast<Eigen::Index>(t_s.size()), highest + 1);
+  for (Eigen::Index i = 0; i < powers.rows(); ++i)
+    for (int k = 0; k <= highest; ++k)
+      powers(i, k) = std::pow(t_s[static_cast<std::size_t>(i)] - start_s, k);
+  return powers;
 }
 
-double chi2_of(const Problem& problem, const Circle& circle, const Eigen::Vector2d& pivot_m) {
+Steady steady_through(const ArcData& arc, const Eigen::Vector2d& pivot_m, bool drag) {
+  const Eigen::MatrixX2d xy = arc.positions_m().rowwise() - pivot_m.transpose();
+  const int highest = drag ? 3 : 1;
+  const Eigen::MatrixXd powers = powers_of(arc.t_s, arc.start_s, highest);
+  Steady steady{LeastSquares(powers.leftCols(highest)).solve(xy.rowwise().norm()),
+                LeastSquares(powers).solve(precessions(xy)),
+                {}};
+  if (const AngleSeries tilt = angle_series(arc, Channel::theta); !tilt.t_s.empty())
+    steady.tilt_rad =
+        LeastSquares(powers_of(tilt.t_s, arc.start_s, highest - 1)).solve(tilt.angles());
+  return steady;
+}
+
+// What a model would predict that moves so.
+Eigen::VectorXd values_of(const Steady& steady, const ArcData& arc,
+                          const Eigen::Vector2d& pivot_m) {
+  using model::Observable;
+  std::vector<double> values;
+  for (const double t_s : arc.t_s) {
+    const double t = t_s - arc.start_s, phi = at(steady.azimuth_rad, t);
+    const double distance_m = at(steady.distance_m, t);
+    for (const Observable observable : arc.observables)
+      values.push_back(observable == Observable::x_m   ? pivot_m.x() + distance_m * std::sin(phi)
+                       : observable == Observable::y_m ? pivot_m.y() - distance_m * std::cos(phi)
+                       : observable == Observable::phi_rad ? phi
+                                                           : at(steady.tilt_rad, t));
+  }
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+// The spin's readings left out, the others weighted as before.
+Problem without_spin(const Problem& problem) {
+  Problem path = problem;
   const ArcData& arc = problem.arcs[0];
+  path.arcs[0] = arc.without(Channel::psi);
+  if (problem.row_weights[0].size() == 0) return path;
+  std::vector<double> weights;
+  for (const Reading& reading : arc.readings)
+    if (reading.channel != Channel::psi)
+      weights.insert(weights.end(), static_cast<std::size_t>(rows_of(reading.channel)),
+                     robust_weight(problem, 0, reading));
+  path.row_weights[0] =
+      Eigen::Map<const Eigen::VectorXd>(weights.data(), static_cast<Eigen::Index>(weights.size()));
+  return path;
+}
+
+// Weighted as in the fit. @pre problem's only arc has no spin.
+double chi2_of(const Problem& problem, const Steady& steady, const Eigen::Vector2d& pivot_m) {
+  const ArcData& arc = problem.arcs[0];
+  Eigen::VectorXd residuals;
+  whiten(arc, values_of(steady, arc, pivot_m), {}, residuals, nullptr);
   double chi2 = 0.0;
   for (const Reading& reading : arc.readings) {
-    if (reading.channel != Channel::position) continue;
-    const double t = arc.t_s[static_cast<std::size_t>(reading.sample)] - arc.start_s;
-    const double phi = at(circle.azimuth_rad, t);
-    const Eigen::Vector2d place =
-        pivot_m + at(circle.distance_m, t) * Eigen::Vector2d(std::sin(phi), -std::cos(phi));
-    const double weight = robust_weight(problem, 0, reading) / problem.noise_scale[0];
-    chi2 += (weight * (reading.whitener.transpose() * (place - reading.value))).squaredNorm();
+    const double weight = robust_weight(problem, 0, reading) / noise_scale(arc, reading.channel);
+    chi2 +=
+        weight * weight * residuals.segment(reading.row, rows_of(reading.channel)).squaredNorm();
   }
   return chi2;
 }
@@ -62,35 +104,40 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   const bool drag = std::any_of(fit.parameters.begin(), fit.parameters.end(),
                                 [](const auto& one) { return one.name.starts_with("gamma"); });
   const ArcData& arc = problem.arcs[0];
-  if (arc.observable_index(Observable::x_m) < 0 || arc.observable_index(Observable::theta_rad) >= 0)
-    return;
+  if (arc.observable_index(Observable::x_m) < 0) return;
+  const bool tilt_seen = arc.observable_index(Observable::theta_rad) >= 0;
   const Eigen::VectorXd values = problem.values(0, u);
   const int px = problem.predictor->index_of("pivot_x_m");
   const int py = problem.predictor->index_of("pivot_y_m");
   const Eigen::Vector2d pivot_m(px >= 0 ? values[px] : 0.0, py >= 0 ? values[py] : 0.0);
-  Problem path = problem;
-  path.arcs[0] = arc.without(Channel::psi);
-  if (path.row_weights[0].size() > 0 && path.arcs[0].rows != arc.rows) return;
+  const Problem path = without_spin(problem);
   Eigen::VectorXd residuals;
   if (!evaluate(path, 0, u, residuals, nullptr)) return;
-  const Circle circle = circle_through(arc, pivot_m, drag);
-  // Four more parameters lower chi-square by 4 +- 2.8 when they mean nothing, 3 sigma; and of as
-  // many frequencies as there are samples nutation may take that of the noise's strongest line.
-  const double bought_by_chance = 4.0 + 3.0 * 2.83 + 2.0 * std::log(arc.t_s.size());
-  if (chi2_of(problem, circle, pivot_m) - residuals.squaredNorm() > bought_by_chance) return;
-  constexpr const char* kHidden[] = {"a_1_s2", "b_1_s", "l_m", "theta_rad"};
+  const Steady steady = steady_through(path.arcs[0], pivot_m, drag);
+  // Parameters that mean nothing lower chi-square by their number +- sqrt(2) times its root, 3
+  // sigma; and of as many frequencies as there are samples nutation may take that of the noise's
+  // strongest line. Of a, b, l, tilt and its rate a circle has its radius, and its tilt where seen.
+  const double more = tilt_seen ? 3.0 : 4.0;
+  const double bought_by_chance =
+      more + 3.0 * std::sqrt(2.0 * more) + 2.0 * std::log(arc.t_s.size());
+  if (chi2_of(path, steady, pivot_m) - residuals.squaredNorm() > bought_by_chance) return;
+  std::vector<std::string> hidden{"a_1_s2", "b_1_s"};
+  const std::vector<std::string> by_tilt{"l_m", "theta_rad"};
+  if (!tilt_seen) hidden.insert(hidden.end(), by_tilt.begin(), by_tilt.end());
   for (data::FitParameter& parameter : fit.parameters) {
-    const bool hidden = std::any_of(std::begin(kHidden), std::end(kHidden),
-                                    [&](const char* name) { return parameter.name == name; });
-    if (!hidden && parameter.status != data::ParameterStatus::derived) continue;
+    if (std::find(hidden.begin(), hidden.end(), parameter.name) == hidden.end() &&
+        parameter.status != data::ParameterStatus::derived)
+      continue;
     parameter.identifiable = false;
     parameter.sigma = std::numeric_limits<double>::infinity();
     parameter.note += "; no nutation is seen";
   }
+  if (tilt_seen) fit.broken_degeneracies.push_back(broken_by("tilt", by_tilt));
   fit.warnings.push_back(fmt::format(
-      "no nutation is seen: steady precession determines l sin(theta) = {:.6g} m, the rate W = "
-      "{:.6g} rad/s, and a + W^2 cos(theta) = b W; not a, b and l",
-      circle.distance_m[0], circle.azimuth_rad[1]));
+      "no nutation is seen: steady precession determines {}l sin(theta) = {:.6g} m, the rate W = "
+      "{:.6g} rad/s, and a + W^2 cos(theta) = b W; not {}",
+      tilt_seen ? "the tilt, " : "", steady.distance_m[0], steady.azimuth_rad[1],
+      tilt_seen ? "a and b" : "a, b and l"));
 }
 
 }  // namespace trochoid::fitting

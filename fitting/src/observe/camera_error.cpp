@@ -11,6 +11,7 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/data/pose.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
@@ -83,9 +84,9 @@ void set_heights(const data::Scene& scene, std::vector<Seen>& seen) {
       each.place_m.z() = pivot_m.z() + arm * std::cos(each.theta.value_or(0.0));
   } else if (scene.body) {
     for (Seen& each : seen) {
-      const double theta = each.theta.value_or(0.0);
-      each.place_m.z() = scene.body->radius_m * std::abs(std::sin(theta)) +
-                         scene.body->half_thickness_m() * std::abs(std::cos(theta));
+      const double theta = std::abs(each.theta.value_or(0.0));
+      each.place_m.z() =
+          data::height_on_floor_m(theta, scene.body->radius_m, scene.body->half_thickness_m());
     }
   }
 }

@@ -47,6 +47,8 @@ struct ArcData {
   std::vector<CameraShifts> camera_shifts;  ///< of the deviations that matter (camera_error.hpp)
   bool held = false;           ///< samples before these were left out: the body was held or pushed
   bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
+  /// By which the noise differs from what the whiteners state, for each channel.
+  std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
 
   [[nodiscard]] int observable_index(model::Observable observable) const;  ///< -1 if absent
   [[nodiscard]] double duration_s() const { return t_s.empty() ? 0.0 : t_s.back() - t_s.front(); }
@@ -59,6 +61,10 @@ struct ArcData {
   /// The same arc without the readings of one channel.
   [[nodiscard]] ArcData without(Channel channel) const;
 };
+
+[[nodiscard]] inline double noise_scale(const ArcData& arc, Channel channel) {
+  return arc.noise_scale[static_cast<std::size_t>(channel)];
+}
 
 /// Which measurements a model can use.
 struct ChannelChoice {

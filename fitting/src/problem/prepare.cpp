@@ -248,12 +248,13 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
   problem.shortfalls = std::make_shared<Shortfalls>();
   if (const auto camera = uncertain_camera(scene)) note_camera_shifts(*camera, scene, problem.arcs);
+  std::array<double, kChannels> scatter = problem.arcs.front().noise_scale;
   for (const ArcData& whole : problem.arcs) {
     const ArcData arc = whole.keep(consistent_samples(whole));
     for (int c = 0; c < kChannels; ++c)
-      problem.noise_scale[c] =
-          std::max(problem.noise_scale[c], excess_scatter(arc, static_cast<Channel>(c)));
+      scatter[c] = std::max(scatter[c], excess_scatter(arc, static_cast<Channel>(c)));
   }
+  for (ArcData& arc : problem.arcs) arc.noise_scale = scatter;
   suit_to_data(problem, scene);
   if (options.rolls_at_first) tie_to_spin(scene, problem);
   if (problem.free.empty())

@@ -181,7 +181,7 @@ std::string Shortfalls::words() const {
 }
 
 Problem in_stated_sigmas(Problem problem, Weights weights) {
-  problem.noise_scale.fill(1.0);
+  for (ArcData& arc : problem.arcs) arc.noise_scale.fill(1.0);
   if (weights == Weights::dropped)
     for (Eigen::VectorXd& of_arc : problem.row_weights) of_arc.resize(0);
   return problem;
@@ -494,8 +494,7 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
   }
   for (const Reading& reading : data.readings) {
     const int width = rows_of(reading.channel);
-    const double weight = robust_weight(problem, arc, reading) /
-                          problem.noise_scale[static_cast<int>(reading.channel)];
+    const double weight = robust_weight(problem, arc, reading) / noise_scale(data, reading.channel);
     if (weight == 1.0) continue;
     residuals.segment(reading.row, width) *= weight;
     if (jacobian != nullptr) jacobian->middleRows(reading.row, width) *= weight;

@@ -90,7 +90,6 @@ struct Problem {
   std::vector<FreeParameter> free;
   std::vector<Eigen::VectorXd> base;  ///< per arc, all predictor parameters; free ones are starts
   std::vector<Eigen::VectorXd> row_weights;  ///< per arc, sqrt of the robust weights; empty = 1
-  std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
   double tolerance = 1e-8;
   Timing timing;
   bool rolls_at_first = false;  ///< of a sliding body, whose velocity is not free then
@@ -204,8 +203,9 @@ struct SolveOptions {
 /// Readings within so many scaled sigmas count in full: clean Gaussian data are left alone.
 inline constexpr double kInlier = 3.5;
 
-/// Sets noise_scale (per channel, if `rescale`) and robust weights from the residuals at u: a
-/// reading d > kInlier scaled sigmas off is multiplied by (kInlier/d)^2.
+/// Sets the arcs' noise_scale (if `rescale`) and robust weights from the residuals at u: a reading
+/// d > kInlier scaled sigmas off is multiplied by (kInlier/d)^2. All recordings share the scale of
+/// a channel, but for positions that came without covariance: of these each recording has its own.
 /// @returns the largest change of any weight or scale.
 double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale);
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -34,16 +35,30 @@ double length(const Reading& reading, const Eigen::VectorXd& residuals) {
                                               : std::abs(residuals[reading.row]);
 }
 
-// Scale of a channel from the weighted squares of its inliers, nothing where too few are read;
-// robust start from the median.
-std::optional<double> channel_scale(const Problem& problem, const RawResiduals& raw,
-                                    Channel channel) {
+// What a channel's scale is shared with: trackers misjudge their noise alike in all recordings, a
+// first guess is wrong for each by itself.
+constexpr int kAll = -1;
+int sharing(const ArcData& arc, Channel channel) {
+  return arc.sigma_unknown && channel == Channel::position ? arc.track : kAll;
+}
+
+// Lengths of a channel's residuals in the recordings that share its scale.
+std::vector<double> lengths_of(const Problem& problem, const RawResiduals& raw, Channel channel,
+                               int shared_by) {
   std::vector<double> lengths;
-  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
+  for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    if (sharing(problem.arcs[arc], channel) != shared_by) continue;
     for (const Reading& reading : problem.arcs[arc].readings)
       if (reading.channel == channel) lengths.push_back(length(reading, raw.per_arc[arc]));
+  }
+  return lengths;
+}
+
+// Scale from the weighted squares of the inliers, nothing where too few are read; robust start from
+// the median.
+std::optional<double> scale_of(const Problem& problem, const std::vector<double>& lengths,
+                               bool planar) {
   if (lengths.size() < 5) return std::nullopt;
-  const bool planar = channel == Channel::position;
   // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
   double scale = median(lengths) / (planar ? 1.1774 : 0.6745);
   for (int round = 0; round < 5; ++round) {
@@ -69,20 +84,32 @@ std::optional<double> channel_scale(const Problem& problem, const RawResiduals& 
   return std::max(scale * std::sqrt(rows / std::max(1.0, rows - used)), 1e-12);
 }
 
-// Scales of all channels. A motion that is wrong may leave nothing in one of them, as a body that
-// is taken to lie leaves nothing across its axis: what the others know of the noise bounds that, up
-// to what is stated.
-std::array<double, kChannels> channel_scales(const Problem& problem, const RawResiduals& raw) {
+// Scales of all arcs' channels. A motion that is wrong may leave nothing in one of them, as a body
+// that is taken to lie leaves nothing across its axis: what the arc's others know of the noise
+// bounds that, up to what is stated.
+std::vector<std::array<double, kChannels>> noise_scales(const Problem& problem,
+                                                        const RawResiduals& raw) {
   constexpr double kLeastBesideOthers = 0.01;  // what trackers state differs by ten times at most
-  std::array<std::optional<double>, kChannels> known;
-  double most = 0.0;
-  for (int c = 0; c < kChannels; ++c) {
-    known[c] = channel_scale(problem, raw, static_cast<Channel>(c));
-    most = std::max(most, known[c].value_or(0.0));
+  std::map<std::pair<int, int>, std::optional<double>> known;  // by channel and who shares it
+  std::vector<std::array<double, kChannels>> scales;
+  for (const ArcData& arc : problem.arcs) {
+    std::array<std::optional<double>, kChannels> of_arc;
+    double most = 0.0;
+    for (int c = 0; c < kChannels; ++c) {
+      const auto channel = static_cast<Channel>(c);
+      const int shared_by = sharing(arc, channel);
+      const auto [at, is_new] = known.try_emplace({c, shared_by});
+      if (is_new)
+        at->second = scale_of(problem, lengths_of(problem, raw, channel, shared_by),
+                              channel == Channel::position);
+      of_arc[c] = at->second;
+      most = std::max(most, of_arc[c].value_or(0.0));
+    }
+    const double least = std::min(1.0, kLeastBesideOthers * most);
+    scales.emplace_back();
+    for (int c = 0; c < kChannels; ++c)
+      scales.back()[c] = of_arc[c] ? std::max(*of_arc[c], least) : 1.0;
   }
-  const double least = std::min(1.0, kLeastBesideOthers * most);
-  std::array<double, kChannels> scales{};
-  for (int c = 0; c < kChannels; ++c) scales[c] = known[c] ? std::max(*known[c], least) : 1.0;
   return scales;
 }
 
@@ -92,13 +119,15 @@ double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale) {
   const RawResiduals raw = raw_residuals(problem, u);
   if (!raw.ok) return 0.0;
   double change = 0.0;
-  const std::array<double, kChannels> spread = channel_scales(problem, raw);
-  if (rescale) {
-    for (int c = 0; c < kChannels; ++c)
-      change = std::max(change, std::abs(std::log(spread[c] / problem.noise_scale[c])));
-    problem.noise_scale = spread;
-  }
+  const std::vector<std::array<double, kChannels>> scales = noise_scales(problem, raw);
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
+    const std::array<double, kChannels>& spread = scales[arc];
+    if (rescale) {
+      std::array<double, kChannels>& before = problem.arcs[arc].noise_scale;
+      for (int c = 0; c < kChannels; ++c)
+        change = std::max(change, std::abs(std::log(spread[c] / before[c])));
+      before = spread;
+    }
     Eigen::VectorXd weights = Eigen::VectorXd::Ones(problem.arcs[arc].rows);
     for (const Reading& reading : problem.arcs[arc].readings) {
       const double d =
