@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "factories.hpp"
 #include "solve.hpp"
@@ -179,6 +180,7 @@ Trajectory simulate_free(const data::Scene& scene) {
   trajectory.integrator = choice.name;
   trajectory.integrator_reason = choice.reason;
   trajectory.columns = columns();
+  trajectory.error_estimate_m = std::numeric_limits<double>::quiet_NaN();
   const Eigen::Index rows = (solution.states.rows() + parts - 1) / parts;
   trajectory.values.resize(rows, static_cast<Eigen::Index>(trajectory.columns.size()));
   Angles angles(free.phi_rad, free.psi_rad);

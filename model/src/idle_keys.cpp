@@ -1,6 +1,7 @@
 #include "trochoid/model/idle_keys.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 
 #include "factories.hpp"
@@ -22,6 +23,7 @@ const std::vector<Readers>& readers() {
   const std::vector<std::string_view> leaning{"rolling", "smooth",    "sliding",
                                               "top",     "top-euler", "free"};
   static const std::vector<Readers> list{
+      {"model.gravity_m_s2", {"rolling", "smooth", "sliding", "top", "top-euler", "puck"}},
       {"model.air_linear_N_m_s", rim},
       {"model.air_quadratic_N_m_s2", rim},
       {"model.air_force_N_s_m", {"rolling", "smooth", "sliding", "puck"}},
@@ -60,12 +62,22 @@ const std::vector<Readers>& readers() {
   return list;
 }
 
+/// A body in flight whose three rates are given together looks at no other rate.
+bool passed_over(const data::Scene& scene, const std::string& law, std::string_view key) {
+  constexpr std::array<std::string_view, 7> kRates{
+      "start.w1_rad_s",   "start.w2_rad_s",   "start.w3_rad_s",     "start.dtheta_rad_s",
+      "start.dphi_rad_s", "start.dpsi_rad_s", "start.omega_s_rad_s"};
+  return law == "free" && scene.start.w_body_rad_s &&
+         std::find(kRates.begin(), kRates.end(), key) != kRates.end();
+}
+
 }  // namespace
 
 std::vector<std::string> idle_keys(const data::Scene& scene) {
   std::vector<std::string> idle = data::given_keys(scene);
   const std::string law = law_of(scene);
   std::erase_if(idle, [&](const std::string& key) {
+    if (passed_over(scene, law, key)) return false;
     const auto found = std::find_if(readers().begin(), readers().end(),
                                     [&](const Readers& known) { return known.key == key; });
     return found == readers().end() ||

@@ -260,6 +260,7 @@ Trajectory simulate_pivot(const data::Scene& scene) {
   run.model = "pivot";
   run.integrator = "dop853";
   run.integrator_reason = "smooth up to the instant of rest";
+  run.error_estimate_m = std::numeric_limits<double>::quiet_NaN();
   run.columns = euler_columns();
   if (!weighed) run.columns.pop_back();
   run.columns.emplace_back("w3_rad_s");

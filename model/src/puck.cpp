@@ -304,10 +304,12 @@ Trajectory simulate_puck(const data::Scene& scene) {
     }
     run.values.row(static_cast<Eigen::Index>(n)) =
         Eigen::Map<const Eigen::RowVectorXd>(row.data(), static_cast<Eigen::Index>(row.size()));
-    if (n < check.rows.size())
-      run.error_estimate_m =
-          std::max(run.error_estimate_m,
-                   std::hypot(s[P::x] - check.rows[n][P::x], s[P::y] - check.rows[n][P::y]));
+    if (n >= check.rows.size()) continue;
+    const auto& finer_s = check.rows[n];
+    run.error_estimate_m = std::max(run.error_estimate_m,
+                                    std::hypot(s[P::x] - finer_s[P::x], s[P::y] - finer_s[P::y]));
+    run.error_estimate_rad =
+        std::max(run.error_estimate_rad, std::abs(s[P::psi] - finer_s[P::psi]));
   }
   run.statistics = path.statistics;
   run.end_s = path.rows.empty() ? 0.0 : t_s[path.rows.size() - 1];

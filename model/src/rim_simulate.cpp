@@ -248,19 +248,19 @@ Choice choose(const RimJob& job, const std::string& asked, double tolerance) {
                 : "no friction law that could be stiff, smooth between events"};
   }
   if (asked == "taylor")
-    throw InputError(
+    throw NotOffered(
         "run.integrator = \"taylor\" needs polynomial equations; contact models take auto, dop853, "
         "cvode-adams, cvode-bdf, arkode or, with regularised friction, radau");
   if (asked == "radau") {
     if (job.input.eps_v > 0.0) return {Method::radau, asked, "asked for"};
-    throw InputError(
+    throw NotOffered(
         "run.integrator = \"radau\" is for friction that sets in softly (model.friction above 0, "
         "with model.slip_regularisation_m_s); other contact models take auto, dop853, cvode-adams, "
         "cvode-bdf or arkode");
   }
   const Choice choice = choose_integrator(asked);
   if (choice.method != Method::dop853 && (exact || job.impact))
-    throw InputError(fmt::format(
+    throw NotOffered(fmt::format(
         "run.integrator = \"{}\" cannot change regimes at events; the exact Coulomb law and rim "
         "impacts take auto or dop853",
         asked));

@@ -57,7 +57,7 @@ namespace {
 void check_integrator(const std::string& asked, const std::string& law) {
   const bool has_one = law == "top-euler" || law == "puck" || law == "pivot";
   if (has_one && asked != "auto" && asked != "dop853")
-    throw InputError(fmt::format(
+    throw NotOffered(fmt::format(
         "run.integrator = \"{}\": model \"{}\" runs with auto or dop853 alone", asked, law));
 }
 

@@ -19,7 +19,7 @@ Choice choose_integrator(const std::string& asked) {
   if (asked == "cvode-bdf") return {Method::cvode_bdf, asked, "asked for"};
   if (asked == "arkode") return {Method::arkode, asked, "asked for"};
   if (asked == "radau")
-    throw InputError(
+    throw NotOffered(
         "run.integrator = \"radau\" is for friction that sets in softly (model.friction above 0, "
         "with model.slip_regularisation_m_s); other models take auto, taylor, dop853, cvode-adams, "
         "cvode-bdf or arkode");

@@ -88,7 +88,7 @@ struct DualTop : WithSpinAngle<TopWithDrag<Dual<8>>> {
 TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, double tolerance,
                         Method method) {
   if (top.dry_drag || top.quadratic_drag)
-    throw InputError(
+    throw NotOffered(
         "SUNDIALS runs a top with linear drag only; drag_spin_dry_N_m and "
         "drag_spin_quadratic_N_m_s2 take run.integrator = \"auto\", \"taylor\" or \"dop853\"");
   TopColumns columns(t_s);

@@ -78,6 +78,9 @@ TEST_P(IdleKeys, AreThoseThatChangeNothing) {
   Keys changes{{"model.air_linear_N_m_s", "[1e-6, 1e-6, 1e-6]"},
                {"model.air_quadratic_N_m_s2", "[1e-6, 1e-6, 1e-6]"},
                {"model.couple_regularisation_rad_s", "0.1"},
+               {"model.gravity_m_s2", "3.7"},
+               {"model.spin_down_weakening_s_rad", "0.1"},
+               {"start.moments_kg_m2", "[1e-5, 2e-5, 2.5e-5]"},
                {"start.x_m", "0.01"},
                {"start.y_m", "0.01"},
                {"start.vx_m_s", "0.2"},
@@ -117,6 +120,14 @@ INSTANTIATE_TEST_SUITE_P(Models, IdleKeys,
                                          Motion{"top-euler", top}, Motion{"puck", disc_on_its_face},
                                          Motion{"pivot", disc_on_a_pin},
                                          Motion{"free", disc_in_flight}));
+
+TEST(IdleKeys, AreTheRatesThatABodyInFlightIsGivenTwice) {
+  Keys keys = disc_in_flight();
+  keys["start.w_body_rad_s"] = "[1, 2, 3]";
+  const std::vector<std::string> expected{"start.w1_rad_s", "start.w2_rad_s",
+                                          "start.omega_s_rad_s"};
+  EXPECT_EQ(idle_keys(scene_of(keys, "free")), expected);
+}
 
 // A file is shared by several models; what all of them know is never idle, nor what is not given.
 TEST(IdleKeys, OfAnEmptySceneAreNone) {

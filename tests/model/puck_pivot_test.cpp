@@ -260,6 +260,25 @@ TEST(Pivot, FollowsTheClosedFormUntilItStops) {
                 kPivot_rad);
 }
 
+TEST(Pivot, StatesTheErrorOfItsSpinAngleAndNoneInMetres) {
+  data::Scene scene = pivot_scene();
+  scene.model.spin_down_dry_rad_s2 = 0.8;
+  scene.model.spin_down_viscous_1_s = 0.15;
+  scene.run.tolerance = 1e-5;
+  const Trajectory run = simulate(scene);
+  EXPECT_TRUE(std::isnan(run.error_estimate_m));
+  EXPECT_GT(run.error_estimate_rad, 0.0);
+}
+
+TEST(Puck, StatesTheErrorOfItsSpinAngleToo) {
+  data::Scene scene = puck_scene();
+  scene.start.w3_rad_s = 30.0;
+  scene.run.tolerance = 1e-5;
+  const Trajectory run = simulate(scene);
+  EXPECT_GT(run.error_estimate_m, 0.0);
+  EXPECT_GT(run.error_estimate_rad, 0.0);
+}
+
 TEST(Pivot, StopsDryInTheParabolasTime) {
   data::Scene scene = pivot_scene();
   scene.model.spin_down_dry_rad_s2 = 4.0;

@@ -90,6 +90,13 @@ TEST(Simulate, ErrorEstimateCoversTheTrueError) {
   }
 }
 
+TEST(Simulate, StatesNoErrorInMetresWhereTheCentreOfMassStaysPut) {
+  Reference expected = reference("s01_free_thesis");
+  const Trajectory run = rerun(expected, 1e-7);
+  EXPECT_TRUE(std::isnan(run.error_estimate_m));
+  EXPECT_GT(run.error_estimate_rad, 0.0);
+}
+
 TEST(Simulate, TheThesisFormGivesTheSameMotion) {
   Reference expected = reference("s04_top_loops");
   expected.posed.scene.model.name = "top-euler";

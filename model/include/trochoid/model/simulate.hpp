@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/model/outcome.hpp"
 
@@ -32,14 +33,23 @@ struct Trajectory {
   std::vector<Event> events;
   Outcome outcome = Outcome::reached_end;
   double end_s = 0.0;
-  double error_estimate_m =
-      0.0;  ///< of the path, from a second run at a hundredth of the tolerance
-  double error_estimate_rad = 0.0;  ///< of the direction of the axis, likewise
+  /// Of the path, from a second run at a hundredth of the tolerance; NaN for the models whose
+  /// centre of mass stays where it is (free, pivot).
+  double error_estimate_m = 0.0;
+  /// Of the direction of the axis, likewise; of the spin angle where the axis is upright (puck,
+  /// pivot).
+  double error_estimate_rad = 0.0;
   Statistics statistics;
 };
 
+/// The model has no use for the integrator that run.integrator asks for.
+class NotOffered : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// Runs the scene's model from [start] over [run]. Never silently wrong: see Outcome.
-/// @throws InputError if the scene lacks what the model needs.
+/// @throws InputError if the scene lacks what the model needs, NotOffered.
 [[nodiscard]] Trajectory simulate(const data::Scene& scene);
 
 }  // namespace trochoid::model
