@@ -255,6 +255,15 @@ class Fit(unittest.TestCase):
             with self.assertRaisesRegex(trochoid.InputError, "was not fitted to .*other.csv"):
                 trochoid.predict(fit, other)
 
+    def test_a_fit_tells_the_checksums_of_its_scene_and_camera(self):
+        seen_by = {"camera": {"file": str(SAMPLE / "camera.json")}, "model": {"name": "top"}}
+        self.assertEqual(set(trochoid.fit(noisy_track(), seen_by).inputs), {"camera.json"})
+        with tempfile.TemporaryDirectory() as folder:
+            scene = pathlib.Path(folder) / "scene.toml"
+            scene.write_text(trochoid.Scene(seen_by).toml)
+            self.assertEqual(set(trochoid.fit(noisy_track(), scene).inputs),
+                             {"scene.toml", "camera.json"})
+
     def test_tracks_of_one_name_are_kept_apart_and_none_counts_twice(self):
         with tempfile.TemporaryDirectory() as folder:
             paths = [pathlib.Path(folder) / name / "top.track.csv" for name in ("a", "b")]
@@ -391,6 +400,11 @@ class Recording(unittest.TestCase):
             file.source_sha256 = 64 * "0"
             with self.assertRaisesRegex(trochoid.InputError, "track: was tracked in another recording"):
                 trochoid.overlay(copy, file, still=pathlib.Path(folder) / "other.png")
+            other = pathlib.Path(folder) / "other.track.csv"
+            file.write(other)
+            with self.assertRaisesRegex(trochoid.InputError,
+                                        "other.track.csv: was tracked in another recording"):
+                trochoid.overlay(copy, other, still=pathlib.Path(folder) / "other.png")
         for wrong in ({"effort": None}, {"objects": 1.5}, {"at_px": 3}, {"rate_hz": "fast"}):
             with self.assertRaisesRegex(trochoid.InputError, next(iter(wrong))):
                 trochoid.track(SAMPLE / "video.mp4", **wrong)

@@ -58,8 +58,13 @@ TEST(Prediction, TheGivenPlaceOfAPivotIsNotJudged) {
   EXPECT_TRUE(residuals(file, turning(), 1.0).at(0).empty());
 }
 
-// A disc nearly flat with a strong loss: down within a second, and recorded for two.
-TEST(Prediction, GoesOnWhereABodyFellFlat) {
+// A disc nearly flat with a strong loss, down within a second, and recorded for two.
+struct Falling {
+  data::Fit fit;
+  data::TrackFile file;
+};
+
+Falling falling() {
   data::Fit fit;
   fit.model = "rolling";
   fit.scene_toml = R"([body]
@@ -79,12 +84,25 @@ w2_rad_s = 10.0
   fit.arcs = {{.track = 0, .object = 0, .from_s = 0.0, .to_s = 2.0, .samples = 3}};
   data::TrackFile file;
   file.tracks = {{.object = 0, .samples = {seen(0.0, 0.0), seen(1.0, 0.0), seen(2.0, 0.0)}}};
+  return {fit, file};
+}
+
+TEST(Prediction, GoesOnWhereABodyFellFlat) {
+  const auto [fit, file] = falling();
   const PredictedPath path = replay(fit, file);
   const auto last = path.at(0, 2.0);
   ASSERT_TRUE(last);
   EXPECT_EQ(last->theta_rad, 0.0);
   EXPECT_NEAR(last->centre_m.z(), 0.003, 1e-12);  // half its thickness above the floor
   EXPECT_EQ(path.arcs.front().ended, "");
+}
+
+TEST(Prediction, PutsABodyAsHighAsItsPriorSays) {
+  auto [fit, file] = falling();
+  fit.scene_toml += "[fit]\nprior = { thickness_m = [0.01, 1e-4] }\n";
+  const auto last = replay(fit, file).at(0, 2.0);
+  ASSERT_TRUE(last);
+  EXPECT_NEAR(last->centre_m.z(), 0.005, 1e-12);
 }
 
 // --- what the way of measuring adds to a fit
@@ -125,7 +143,7 @@ data::TrackFile recorded(const std::string& scene, const Measured& measured) {
     sample.t_s = stamp_s;
     sample.centre_px = {0.0, row_px};
     sample.centre_m = measured.scale * Eigen::Vector2d(at(x, t_s), at(y, t_s)) +
-                      Eigen::Vector2d(noise(generator), noise(generator));
+                      Eigen::Vector2d{noise(generator), noise(generator)};
     sample.covariance_m2 = kNoise_m * kNoise_m * Eigen::Matrix2d::Identity();
     track.samples.push_back(sample);
   }

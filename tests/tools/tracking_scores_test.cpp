@@ -57,6 +57,23 @@ TEST(TrackingScores, OfTwoAttitudesThatLookAlikeTheFoldedOnesAreCompared) {
   EXPECT_NEAR(s.precession.normalised, 1.0, 1e-9);
 }
 
+// A frame in which the body is hidden counts neither as one to be found nor as found; a sample
+// without metres has no bias in them.
+TEST(TrackingScores, CountWhatCanBeCompared) {
+  data::Table truth = truth_of(0.6);
+  truth.columns.emplace_back("vis_frac");
+  truth.values.conservativeResize(Eigen::NoChange, 9);
+  truth.values.col(8) << 1.0, 0.2;
+  data::Track track = track_of(0.6, 1.0);
+  track.samples[0].centre_m = {0.002, -0.001};
+  const TruthScore s = score_against_truth(track, truth, disc(), 30.0);
+  EXPECT_EQ(s.frames, 1);
+  EXPECT_EQ(s.found, 1);
+  EXPECT_EQ(s.lost, 0);
+  EXPECT_NEAR(s.bias_mm.x(), 2.0, 1e-12);
+  EXPECT_NEAR(s.bias_mm.y(), -1.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace trochoid::tools
 #endif

@@ -210,7 +210,7 @@ py::dict overlay(const fs::path& video, const py::dict& file, const data::Fit* f
   if (scene != nullptr)
     input.scene = scene->scene;
   else if (fit != nullptr)
-    input.scene = tools::scene_of_fit(*fit, fit_file.empty() ? fs::path("fit") : fit_file);
+    input.scene = tools::scene_with_camera(*fit, fit_file.empty() ? fs::path("fit") : fit_file);
   if (camera_file) input.camera = data::read_camera(*camera_file);
   if (fit != nullptr)
     input.fit_track =
@@ -382,8 +382,8 @@ void add_scene(py::module_& module) {
 /// Of the files behind a fit; what is handed in comes back with one more.
 void add_provenance(py::module_& module) {
   using tools::Checksums;
-  module.def("with_checksum", [](Checksums known, const fs::path& file) {
-    tools::add_checksum(known, file);
+  module.def("with_scene", [](Checksums known, const fs::path& named, const SceneValue& scene) {
+    tools::add_scene(known, named, scene.scene);
     return known;
   });
   module.def("with_track", [](Checksums known, const fs::path& file) {

@@ -478,8 +478,10 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     given = _Given(tracks)
     if scene is None and not model:
         raise InputError("fit: give a scene, or model='top' (the only one that needs no body)")
-    if isinstance(scene, (str, os.PathLike)) and os.path.isfile(scene):
-        given.inputs = _core.with_checksum(given.inputs, os.fspath(scene))
+    resolved = Scene(scene)
+    if scene is not None:
+        named = os.fspath(scene) if isinstance(scene, (str, os.PathLike)) else ""
+        given.inputs = _core.with_scene(given.inputs, named, resolved._value)
     if not isinstance(start, (type(None), Mapping)):
         raise _wrong("start", start, "a dict of numbers by parameter name")
     first_guess = {_text("start", name): _number(f"start[{name!r}]", value)
@@ -492,7 +494,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
     one = isinstance(tracks, (str, Track, TrackFile, Trajectory)) or not isinstance(tracks, Sequence)
     files = [tracks] if one else list(tracks)
     output, = _outputs([scene, *files], output=output)
-    result = Fit(_core.fit([_track_dict(t) for t in given.tracks], Scene(scene)._value,
+    result = Fit(_core.fit([_track_dict(t) for t in given.tracks], resolved._value,
                            _flag("compare", compare), options, given.inputs))
     if output is not None:
         result.write(output)
@@ -510,12 +512,18 @@ class PredictedArc(_Record):
     ended: str              #: why it stops before the arc does, else empty
 
 
+def _shown_file(track: Any) -> TrackFile:
+    """The track file a fit or a recording is shown over: of a path with all its header says."""
+    if isinstance(track, (str, os.PathLike)):
+        return read_track(track)
+    return track if isinstance(track, TrackFile) else TrackFile(_Given(track).tracks)
+
+
 def predict(fit: Union[Path, Fit], tracks: Union[Path, Track, TrackFile], *,
             fit_track: Optional[int] = None) -> list[PredictedArc]:
     """Replays a fit over the track it was made from; of a fit of several, ``fit_track`` says which of
     them that is, counted from 0."""
-    file = TrackFile(_Given(tracks).tracks)
-    arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(file),
+    arcs = _core.predict(_fit(fit, tracks)._value, _file_dict(_shown_file(tracks)),
                          _optional(_whole, "fit_track", fit_track))
     return [PredictedArc(**arc) for arc in arcs]
 
@@ -555,8 +563,7 @@ def overlay(video: Path, track: Union[Path, Track, TrackFile], fit: Union[None, 
                "fit_file": fit if isinstance(fit, (str, os.PathLike)) else "",
                "track_file": track if isinstance(track, (str, os.PathLike)) else "",
                "fit_track": _optional(_whole, "fit_track", fit_track)}
-    file = track if isinstance(track, TrackFile) else TrackFile(_Given(track).tracks)
-    frames = _core.overlay(_path("video", video), _file_dict(file),
+    frames = _core.overlay(_path("video", video), _file_dict(_shown_file(track)),
                            _fit(fit, track)._value if fit is not None else None,
                            Scene(scene)._value if scene is not None else None,
                            _optional(_path, "camera", camera), options)
@@ -576,8 +583,8 @@ class Trajectory(_Record):
     outcome: str                 #: why the run ended: reached_end, flat, rim_switch, lift_off ...
     sentence: str                #: the same for people
     end_s: float
-    error_estimate_m: float      #: of the path
-    error_estimate_rad: float    #: of the direction of the axis
+    error_estimate_m: float      #: of the path; NaN where the centre of mass stays where it is
+    error_estimate_rad: float    #: of the axis' direction; of the spin angle where it is upright
     steps: int
     evaluations: int             #: of the right-hand side
 

@@ -58,9 +58,9 @@ bool is_pattern(const std::string& name) {
 
 /// The files a pattern in the last part of a path names, sorted.
 std::vector<fs::path> expanded(const fs::path& path) {
-  if (!is_pattern(path.filename().string())) return {path};
-  std::vector<fs::path> found;
   std::error_code code;
+  if (!is_pattern(path.filename().string()) || fs::exists(path, code)) return {path};
+  std::vector<fs::path> found;
   for (fs::directory_iterator entry(path.parent_path(), code), end; !code && entry != end;
        entry.increment(code)) {
     const std::string name = entry->path().filename().string();

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "campaign/campaign.hpp"
+#include "common/fitted_scene.hpp"
 #include "draw/svg.hpp"
 #include "report/parts.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -22,8 +23,8 @@ const char* status_of(const CampaignLine& line) {
   return line.record.exit_status == 0 ? "done" : "not good";
 }
 
-/// A parameter of the body or the table, not of one arc's start.
-bool is_shared(const data::FitParameter& p) {
+/// What was found of a recording, but for the starts of its later arcs.
+bool is_found(const data::FitParameter& p) {
   return p.status != data::ParameterStatus::fixed && p.name.find('@') == std::string::npos;
 }
 
@@ -33,7 +34,7 @@ std::vector<std::string> parameter_names(const std::vector<CampaignLine>& lines)
   for (const CampaignLine& line : lines)
     if (line.fit)
       for (const data::FitParameter& p : line.fit->parameters)
-        if (is_shared(p) && std::find(names.begin(), names.end(), p.name) == names.end())
+        if (is_found(p) && std::find(names.begin(), names.end(), p.name) == names.end())
           names.push_back(p.name);
   return names;
 }
@@ -55,14 +56,17 @@ struct Spread {
   std::vector<double> values, sigmas;
 };
 
-/// model -> parameter -> values; only fits that converged and saw the parameter.
+/// model -> parameter -> values, of the body and the table: no two throws start alike. Only of fits
+/// that converged and saw the parameter.
 std::map<std::string, std::map<std::string, Spread>> spreads(
     const std::vector<CampaignLine>& lines) {
   std::map<std::string, std::map<std::string, Spread>> all;
   for (const CampaignLine& line : lines) {
     if (!line.fit || !line.fit->converged) continue;
     for (const data::FitParameter& p : line.fit->parameters) {
-      if (!is_shared(p) || !p.identifiable || !(p.sigma > 0.0) || !std::isfinite(p.sigma)) continue;
+      if (!is_found(p) || is_start(p) || !p.identifiable || !(p.sigma > 0.0) ||
+          !std::isfinite(p.sigma))
+        continue;
       Spread& spread = all[line.fit->model][p.name];
       spread.unit = p.unit;
       spread.values.push_back(p.value);

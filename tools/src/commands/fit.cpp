@@ -166,12 +166,10 @@ data::Fit fitted(const FitCommand& command, const std::vector<data::Track>& trac
     options.log = detail;
   else
     options.progress = [&progress](const std::string& stage) { progress.update(stage); };
-  try {
+  return of_tracks(fmt::format("{}", fmt::join(command.tracks, ", ")), [&] {
     return in_scene(command.scene,
                     [&] { return fit_job(tracks, scene, options, command.compare); });
-  } catch (const TrackError& error) {
-    throw InputError(fmt::format("{}: {}", fmt::join(command.tracks, ", "), error.what()));
-  }
+  });
 }
 
 /// What could explain a track that the fit does not.
@@ -198,11 +196,7 @@ void run(const FitCommand& command) {
   data::Scene scene;
   if (!command.scene.empty()) {
     scene = load_scene(command.scene);
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(command.scene, ignored))
-      add_checksum(inputs, command.scene);
-    if (std::filesystem::is_regular_file(scene.camera.file, ignored))
-      add_checksum(inputs, scene.camera.file);
+    add_scene(inputs, command.scene, scene);
   } else if (command.options.model.empty()) {
     throw InputError("give --scene scene.toml, or --model top (the only one that needs no body)");
   }

@@ -52,7 +52,7 @@ OverlayInput read_inputs(const OverlayCommandOptions& options) {
   if (!options.scene.empty()) {
     input.scene = data::read_scene(options.scene);
   } else if (input.fit) {
-    input.scene = scene_of_fit(*input.fit, options.fit);
+    input.scene = scene_with_camera(*input.fit, options.fit);
     if (options.camera.empty()) tell_missing_camera(*input.scene, options.fit);
   }
   input.camera = named_camera(options.camera, options.scene.empty() ? data::Scene{} : *input.scene,

@@ -35,7 +35,8 @@ struct RenderOptions {
   std::string scene;
   fs::path output, camera;
   double rate_hz = 0.0, until_s = 0.0;
-  int width_px = 640, height_px = 480, quality = 14;
+  std::optional<int> width_px, height_px;  ///< of a camera that is no file's
+  int quality = 14;
   double body = -1.0, floor = -1.0;  // brightness, instead of the style's colours
   std::optional<double> exposure;    // share of the frame interval, instead of the scene's
   bool no_shadow = false, lossless = false, json = false;
@@ -110,8 +111,17 @@ data::Camera camera_over(const Motion& motion, const data::Body& body, int width
 data::Camera camera_of(const RenderOptions& options, const data::Scene& scene,
                        const Motion& motion) {
   if (!options.camera.empty()) return data::read_camera(options.camera);
-  if (auto camera = data::camera_of(scene, options.width_px, options.height_px)) return *camera;
-  return camera_over(motion, *scene.body, options.width_px, options.height_px);
+  if (!scene.camera.file.empty() && (options.width_px || options.height_px))
+    throw InputError(
+        fmt::format("{}: camera.file = '{}' says how large the pictures are; leave --width and "
+                    "--height out, or "
+                    "camera.file",
+                    options.scene, scene.camera.file));
+  constexpr int kWidth_px = 640, kHeight_px = 480;
+  const int width_px = options.width_px.value_or(kWidth_px),
+            height_px = options.height_px.value_or(kHeight_px);
+  if (auto camera = data::camera_of(scene, width_px, height_px)) return *camera;
+  return camera_over(motion, *scene.body, width_px, height_px);
 }
 
 bool in_picture(const data::Pose<>& pose, const data::Camera& camera) {
@@ -469,10 +479,14 @@ void add_render_command(CLI::App& app) {
       });
   CLI::Option* camera = command->add_option("--camera", options->camera,
                                             "Camera file [the scene's, else from above]");
-  command->add_option("--width", options->width_px, "Width of the pictures [px, 640]")
+  command
+      ->add_option("--width", options->width_px,
+                   "Width of the pictures [px, the camera file's, else 640]")
       ->check(whole_number_within(32, 8192))
       ->excludes(camera);
-  command->add_option("--height", options->height_px, "Height of the pictures [px, 480]")
+  command
+      ->add_option("--height", options->height_px,
+                   "Height of the pictures [px, the camera file's, else 480]")
       ->check(whole_number_within(32, 8192))
       ->excludes(camera);
   command->add_option("--rate", options->rate_hz, "Frame rate [Hz, the scene's run.rate_hz]")

@@ -37,7 +37,7 @@ ReportInput inputs(const ReportOptions& options) {
     input.fit = data::read_fit(options.fit);
     check_made_from(*input.fit, options.fit, options.track);
     input.fit_track = place_in_fit(*input.fit, options.fit, input.tracks, options.fit_track);
-    input.scene = scene_of_fit(*input.fit, options.fit);
+    input.scene = scene_with_camera(*input.fit, options.fit);
   }
   return input;
 }

@@ -313,7 +313,10 @@ void run(const RunOptions& options) {
   PendingFolder pending(folder_of(options));
   run.timed("track", [&] { track(run, options); });
   pending.told_by_its_name([&] { keep_track(run, options, pending.path()); });
-  run.timed("fit", [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
+  run.timed("fit", [&] {
+    of_tracks(options.inputs.video.string(),
+              [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
+  });
   const Verdict verdict =
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();

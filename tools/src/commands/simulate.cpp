@@ -98,7 +98,10 @@ void print_steady(const data::Scene& scene, bool as_json) {
 
 /// "ring" of ring.toml and ring.fit.json, the name of a bundled scene.
 std::string stem_of(const SimulateOptions& options) {
-  if (!options.fit.empty()) return options.fit.stem().stem().string();
+  if (!options.fit.empty()) {
+    const fs::path stem = options.fit.stem();
+    return (stem.extension() == ".fit" ? stem.stem() : stem).string();
+  }
   const fs::path named(options.scene);
   return named.extension() == ".toml" ? named.stem().string() : options.scene;
 }
@@ -114,10 +117,11 @@ void tell(const SimulateOptions& options, const model::Trajectory& run, const fs
                        {"model", run.model},
                        {"integrator", run.integrator},
                        {"error_estimate_m", run.error_estimate_m},
+                       {"error_estimate_rad", run.error_estimate_rad},
                        {"pictures", pictures}});
   fmt::print("{}: {} rows. {}\n", output.string(), run.values.rows(), outcome);
-  note(fmt::format("model {}, integrator {} ({}), error estimate {:.1e} m", run.model,
-                   run.integrator, run.integrator_reason, run.error_estimate_m));
+  note(fmt::format("model {}, integrator {} ({}), error estimate {}", run.model, run.integrator,
+                   run.integrator_reason, error_words(run)));
   for (const std::string& picture : pictures) fmt::print("{}\n", picture);
 }
 
@@ -207,7 +211,11 @@ void run(const SimulateOptions& options) {
     throw InputError(
         "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
         "a fit with --fit FILE");
-  if (options.steady) return print_steady(wanted_scene(options), options.json);
+  if (options.steady) {
+    const data::Scene scene = wanted_scene(options);
+    return in_scene(options.fit.empty() ? options.scene : options.fit.string(),
+                    [&] { print_steady(scene, options.json); });
+  }
   simulate_scene(options);
 }
 
@@ -234,10 +242,12 @@ void add_simulate_command(CLI::App& app) {
       ->add_option("--tolerance", options->tolerance,
                    "Relative tolerance of the integration [the scene's run.tolerance]")
       ->check(number_within(1e-15, 0.1));
-  command->add_option("--model", options->model, "Model, instead of the scene's");
-  command->add_option("--integrator", options->integrator,
-                      "Method, instead of the scene's: auto, dop853, taylor, radau, cvode-adams, "
-                      "cvode-bdf or arkode");
+  command->add_option("--model", options->model, "Model, instead of the scene's")
+      ->check(CLI::IsMember(
+          {"free", "top", "top-euler", "rolling", "smooth", "sliding", "puck", "pivot"}));
+  command->add_option("--integrator", options->integrator, "Method, instead of the scene's")
+      ->check(CLI::IsMember(
+          {"auto", "dop853", "taylor", "radau", "cvode-adams", "cvode-bdf", "arkode"}));
   command->add_flag("--thesis", options->thesis,
                     "Add body rates, angular momentum, wrapped angles and running integrals");
   command->add_option("--plots", options->plots,

@@ -101,6 +101,10 @@ void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
 
 }  // namespace
 
+bool is_start(const data::FitParameter& parameter) {
+  return kStart.contains(parameter.name.substr(0, parameter.name.find('@')));
+}
+
 double time_factor(const data::Fit& fit) {
   return value_of(fit, "frame_rate_factor", 0).value_or(1.0);
 }
@@ -109,13 +113,18 @@ double arc_start_s(const data::Fit& fit, std::size_t arc) {
   return arc == 0 ? fit.time_origin_s : fit.arcs.at(arc).from_s;
 }
 
+data::Scene scene_of(const data::Fit& fit, const std::string& name) {
+  data::Scene scene =
+      fitting::scene_as_fitted(data::parse_scene(fit.scene_toml, "the scene stored in " + name));
+  scene.model.name = fit.model;
+  return scene;
+}
+
 data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   if (arc >= fit.arcs.size())
     throw InputError(
         fmt::format("the fit has {} arcs, counted from 0: no arc {}", fit.arcs.size(), arc));
-  data::Scene scene =
-      fitting::scene_as_fitted(data::parse_scene(fit.scene_toml, "the scene stored in the fit"));
-  scene.model.name = fit.model;
+  data::Scene scene = scene_of(fit);
   scene.start = {};
   for (const auto& [name, field] : kStart)
     if (const auto value = value_of(fit, name, arc)) scene.start.*field = value;

@@ -26,21 +26,6 @@ const data::Track* track_of(const data::TrackFile& file, int object) {
   return file.tracks.size() == 1 ? &file.tracks.front() : nullptr;
 }
 
-// The track an arc was fitted to, if it is one of this file.
-const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& file,
-                                int first_track) {
-  const int place = arc.track - first_track;
-  if (place < 0 || place >= static_cast<int>(file.tracks.size())) return nullptr;
-  const data::Track* track = track_of(file, arc.object);
-  return track == nullptr || track->samples.empty() ? nullptr : track;
-}
-
-data::Scene scene_in(const data::Fit& fit) {
-  data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in the fit");
-  if (scene.model.name == "auto") scene.model.name = fit.model;
-  return scene;
-}
-
 // Every sample time within the arc and a uniform subdivision between them, so that the curve is
 // smooth, gaps are bridged and residuals need no interpolation.
 std::vector<double> grid_of(const data::Track& track, const data::FitArc& arc) {
@@ -156,8 +141,16 @@ void put_where_seen(PredictedArc& arc, const data::Track& track) {
 
 }  // namespace
 
+const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& file,
+                                int first_track) {
+  const int place = arc.track - first_track;
+  if (place < 0 || place >= static_cast<int>(file.tracks.size())) return nullptr;
+  const data::Track* track = track_of(file, arc.object);
+  return track == nullptr || track->samples.empty() ? nullptr : track;
+}
+
 PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int track_index) {
-  const data::Scene scene = scene_in(fit);
+  const data::Scene scene = scene_of(fit);
   PredictedPath path{.model = fit.model, .arcs = {}};
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
     if (const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index)) {
@@ -183,7 +176,7 @@ std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data
     request.start_s = arc_start_s(fit, i);
     request.tolerance = tolerance;
     const model::Prediction run =
-        fitting::fitted_prediction(fit, scene_in(fit), i, request, rows_of(*track, grid));
+        fitting::fitted_prediction(fit, scene_of(fit), i, request, rows_of(*track, grid));
     if (run.outcome != model::Outcome::reached_end) return std::nullopt;
     return run.values;
   }

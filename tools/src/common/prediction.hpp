@@ -13,14 +13,14 @@
 namespace trochoid::tools {
 
 /// The fitted model's motion over one arc, on a grid that holds every sample of the track and is
-/// several times finer in between. Angles the model does not have are absent (empty).
+/// several times finer in between.
 struct PredictedArc {
   int object = 0;
   double from_s = 0.0, to_s = 0.0;
   std::string ended;  ///< why the prediction stops before to_s, empty if it does not
   std::vector<double> t_s;
   std::vector<data::Pose<>> pose;
-  bool has_tilt = false;  ///< pose.theta_rad and phi_rad are predicted
+  bool has_tilt = false;  ///< pose.theta_rad and phi_rad are predicted; else they are 0
 };
 
 struct PredictedPath {
@@ -32,6 +32,11 @@ struct PredictedPath {
   /// A disc on a fixed pivot: where it is was given, not predicted.
   [[nodiscard]] bool angles_alone() const { return model == "pivot"; }
 };
+
+/// The track of a file that an arc of a fit was made from; null: of another recording.
+/// @param first_track  which of the fitted tracks is the file's first
+[[nodiscard]] const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& file,
+                                              int first_track);
 
 /// Replays a fit: rebuilds its model from the scene stored in it and runs it with the fitted
 /// values.

@@ -22,6 +22,11 @@ std::string time_left_words(double elapsed_s, double fraction) {
   return ", " + duration_words(elapsed_s * (1.0 - fraction) / fraction) + " left";
 }
 
+/// Work goes on where nobody can read what is said of it: stderr may be closed or full.
+void say(const std::string& words) {
+  std::fputs(words.c_str(), stderr);
+}
+
 }  // namespace
 
 void set_talk(Talk talk) {
@@ -32,11 +37,11 @@ Talk talk() {
 }
 
 void note(const std::string& line) {
-  if (current_talk != Talk::quiet) fmt::print(stderr, "{}\n", line);
+  if (current_talk != Talk::quiet) say(line + "\n");
 }
 
 void detail(const std::string& line) {
-  if (current_talk == Talk::verbose) fmt::print(stderr, "{}\n", line);
+  if (current_talk == Talk::verbose) say(line + "\n");
 }
 
 std::string duration_words(double seconds) {
@@ -54,7 +59,7 @@ Progress::Progress(std::string what, std::string unit)
       last_(start_) {}
 
 Progress::~Progress() {
-  if (drawn_) fmt::print(stderr, "\r\033[K");
+  if (drawn_) say("\r\033[K");
 }
 
 bool Progress::due() {
@@ -66,7 +71,7 @@ bool Progress::due() {
 
 void Progress::draw(const std::string& line) {
   drawn_ = true;
-  fmt::print(stderr, "\r\033[K{}", line);
+  say("\r\033[K" + line);
   std::fflush(stderr);
 }
 

@@ -26,6 +26,12 @@ void add_checksum(Checksums& checksums, const fs::path& file) {
   add_named(checksums, file.filename().string(), file.string(), data::sha256_of_file(file));
 }
 
+void add_scene(Checksums& checksums, const fs::path& named, const data::Scene& scene) {
+  std::error_code ignored;
+  for (const fs::path& file : {named, fs::path(scene.camera.file)})
+    if (fs::is_regular_file(file, ignored)) add_checksum(checksums, file);
+}
+
 void add_track(Checksums& checksums, const fs::path& file) {
   const std::string digest = data::sha256_of_file(file);
   for (const auto& [name, known] : checksums)

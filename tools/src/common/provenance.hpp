@@ -5,6 +5,7 @@
 #include <string>
 
 #include "trochoid/data/fit.hpp"
+#include "trochoid/data/scene.hpp"
 #include "trochoid/data/track.hpp"
 
 namespace trochoid::tools {
@@ -14,6 +15,10 @@ using Checksums = std::map<std::string, std::string>;
 
 /// Adds a file under its name; a second file of that name, under its folder too.
 void add_checksum(Checksums& checksums, const std::filesystem::path& file);
+
+/// Adds the files a scene is made of: its own, if `named` is one (a bundled scene is none), and its
+/// camera's.
+void add_scene(Checksums& checksums, const std::filesystem::path& named, const data::Scene& scene);
 
 /// The same for a track file. @throws InputError if it is among them: a recording counts once.
 void add_track(Checksums& checksums, const std::filesystem::path& file);

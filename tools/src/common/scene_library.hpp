@@ -46,4 +46,14 @@ auto in_scene(const std::string& scene, const Use& use) {
   }
 }
 
+/// Runs `use`, which is given tracks: what it finds wrong with them is said with their name.
+template <class Use>
+auto of_tracks(const std::string& names, const Use& use) {
+  try {
+    return use();
+  } catch (const TrackError& error) {
+    throw InputError(names + ": " + error.what());
+  }
+}
+
 }  // namespace trochoid::tools

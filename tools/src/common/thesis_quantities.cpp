@@ -6,6 +6,7 @@
 
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/integral.hpp"
+#include "trochoid/model/inertia.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -23,10 +24,21 @@ Array wrapped(const Array& angle) {
   return angle.unaryExpr([](double a) { return std::remainder(a, data::kTurn); });
 }
 
+/// About the pivot of a top, else about the centre of mass; nothing without a mass.
 std::optional<Eigen::Vector3d> principal_moments(const data::Scene& scene) {
   if (scene.start.moments_kg_m2) return scene.start.moments_kg_m2;
-  if (!scene.body || !scene.body->I_kg_m2 || !scene.body->Is_kg_m2) return std::nullopt;
-  return Eigen::Vector3d(*scene.body->I_kg_m2, *scene.body->I_kg_m2, *scene.body->Is_kg_m2);
+  if (!scene.body) return std::nullopt;
+  const data::Body& body = *scene.body;
+  if (body.kind == data::BodyKind::top) {
+    if (!body.I_kg_m2 || !body.Is_kg_m2) return std::nullopt;
+    return Eigen::Vector3d(*body.I_kg_m2, *body.I_kg_m2, *body.Is_kg_m2);
+  }
+  if (!body.mass_kg) return std::nullopt;
+  const model::CentralInertia central = model::central_inertia(body);
+  const double arm_m =
+      scene.support.kind == data::SupportKind::pivot ? body.l_m.value_or(0.0) : 0.0;
+  const double across = central.transverse_kg_m2 + central.mass_kg * arm_m * arm_m;
+  return Eigen::Vector3d(across, across, central.axial_kg_m2);
 }
 
 }  // namespace

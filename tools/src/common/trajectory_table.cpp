@@ -2,7 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace trochoid::tools {
+
+std::string error_words(const model::Trajectory& run) {
+  const std::string of_axis = fmt::format("{:.1e} rad", run.error_estimate_rad);
+  return std::isnan(run.error_estimate_m)
+             ? of_axis
+             : fmt::format("{:.1e} m, {}", run.error_estimate_m, of_axis);
+}
 
 data::Table trajectory_table(const model::Trajectory& run) {
   data::Table table;
@@ -13,7 +22,7 @@ data::Table trajectory_table(const model::Trajectory& run) {
       {"integrator", fmt::format("{}: {}", run.integrator, run.integrator_reason)},
       {"outcome", fmt::format("{} at t = {} s: {}", model::name(run.outcome), run.end_s,
                               model::sentence(run.outcome))},
-      {"error estimate [m]", fmt::format("{:.1e}", run.error_estimate_m)},
+      {"error estimate", error_words(run)},
       {"steps", fmt::format("{} accepted, {} rejected, {} evaluations", run.statistics.steps,
                             run.statistics.rejected, run.statistics.evaluations)}};
   for (const model::Event& event : run.events)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/fitted_scene.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -15,10 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::optional<data::Scene> scene_of(const OverlayInput& input) {
+std::optional<data::Scene> shown_scene(const OverlayInput& input) {
   if (input.scene) return input.scene;
-  if (input.fit && !input.fit->scene_toml.empty())
-    return data::parse_scene(input.fit->scene_toml, "the scene stored in the fit");
+  if (input.fit && !input.fit->scene_toml.empty()) return scene_of(*input.fit);
   return std::nullopt;
 }
 
@@ -91,7 +91,7 @@ void OverlayContent::check_pictures(int width_px, int height_px,
 
 OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int height_px)
     : tracks_(input.tracks),
-      scene_(scene_of(input)),
+      scene_(shown_scene(input)),
       camera_(input.camera),
       frame_times_(input.tracks) {
   if (!camera_ && scene_ && has_camera(*scene_)) {

@@ -5,11 +5,10 @@
 
 #include "common/constants.hpp"
 #include "common/fitted_scene.hpp"
+#include "common/prediction.hpp"
 #include "report/parts.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/data/io.hpp"
 #include "trochoid/data/table.hpp"
-#include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/simulate.hpp"
 
 // What the fitted motion does that no camera sees: energy and forces.
@@ -71,16 +70,16 @@ class Curve {
 
 }  // namespace
 
-std::vector<DynamicsChart> dynamics_of(const data::Fit& fit, int track, int object,
+std::vector<DynamicsChart> dynamics_of(const ReportInput& input, const data::Track& track,
                                        std::span<const double> at_s) {
   constexpr double kMillijoule = 1e3;
   Curve energy("energy [mJ]", at_s.size()), per_moment("energy / I [1/s²]", at_s.size()),
       normal("contact force N / m g", at_s.size()), needed("friction needed |F| / N", at_s.size());
-  const data::Scene given =
-      fitting::scene_as_fitted(data::parse_scene(fit.scene_toml, "the scene stored in the fit"));
+  const data::Fit& fit = *input.fit;
+  const data::Scene given = scene_of(fit);
   const bool mass_known = given.body && given.body->mass_kg;
   for (std::size_t arc = 0; arc < fit.arcs.size(); ++arc) {
-    if (fit.arcs[arc].track != track || fit.arcs[arc].object != object) continue;
+    if (track_of_arc(fit.arcs[arc], input.tracks, input.fit_track) != &track) continue;
     data::Scene scene;
     const auto table = run_arc(fit, arc, scene);
     if (!table) continue;

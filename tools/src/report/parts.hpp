@@ -57,9 +57,11 @@ struct DynamicsChart {
   std::string label;           ///< with its unit
   std::vector<double> values;  ///< at the times asked for; NaN where the model does not reach
 };
-/// Energy, normal force and needed friction of the fitted motion of one object at the given times,
-/// as far as its model has them. Forces need the mass.
-[[nodiscard]] std::vector<DynamicsChart> dynamics_of(const data::Fit& fit, int track, int object,
+/// Energy, normal force and needed friction of the fitted motion of one object of the input at the
+/// given times, as far as its model has them. Forces need the mass.
+/// @param track  of input.tracks. @pre input.fit
+[[nodiscard]] std::vector<DynamicsChart> dynamics_of(const ReportInput& input,
+                                                     const data::Track& track,
                                                      std::span<const double> at_s);
 
 // --- time series ---

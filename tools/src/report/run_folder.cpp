@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/fitted_scene.hpp"
 #include "common/json_object.hpp"
 #include "common/recording_name.hpp"
 #include "trochoid/data/error.hpp"
@@ -147,8 +148,8 @@ ReportInput read_run_folder(const fs::path& folder) {
   return input;
 }
 
-data::Scene scene_of_fit(const data::Fit& fit, const fs::path& fit_file) {
-  data::Scene scene = data::parse_scene(fit.scene_toml, "the scene stored in " + fit_file.string());
+data::Scene scene_with_camera(const data::Fit& fit, const fs::path& fit_file) {
+  data::Scene scene = scene_of(fit, fit_file.string());
   // A run leaves the camera beside the fit and names it so; a fit of its own names it as the scene
   // did, and both may have been moved.
   const fs::path named = scene.camera.file, folder = fit_file.parent_path();

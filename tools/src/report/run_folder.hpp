@@ -22,6 +22,7 @@ inline constexpr const char* kRunFile = "run.json";
 
 /// The scene stored in a fit, its camera file as it is named, seen from the fit's folder or from
 /// here, else beside the fit.
-[[nodiscard]] data::Scene scene_of_fit(const data::Fit& fit, const std::filesystem::path& fit_file);
+[[nodiscard]] data::Scene scene_with_camera(const data::Fit& fit,
+                                            const std::filesystem::path& fit_file);
 
 }  // namespace trochoid::tools

@@ -213,8 +213,7 @@ class ObjectSeries {
     if (arc_ == nullptr || !facts_.input.fit) return charts;
     std::vector<double> times_s;
     for (const SampleRow& row : rows_) times_s.push_back(row.t_s);
-    for (const DynamicsChart& curve :
-         dynamics_of(*facts_.input.fit, facts_.input.fit_track, track_.object, times_s)) {
+    for (const DynamicsChart& curve : dynamics_of(facts_.input, track_, times_s)) {
       json chart{{"label", curve.label}, {"series", json::array()}};
       chart["series"].push_back(line("predicted", "line", "predicted",
                                      column([&](std::size_t i) { return curve.values[i]; })));

@@ -62,6 +62,9 @@ StudyRun study_run(const data::Scene& scene, const ReferenceRun& reference, int 
     result.estimate_rad = run.error_estimate_rad;
     compare(run, reference, result);
     result.energy_drift = energy_drift(scene, run);
+  } catch (const model::NotOffered& error) {
+    result.offered = false;
+    result.refusal = error.what();
   } catch (const Error& error) {
     result.refusal = error.what();
   }

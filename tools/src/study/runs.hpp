@@ -12,6 +12,7 @@ namespace trochoid::tools {
 struct StudyRun {
   model::Outcome outcome = model::Outcome::reached_end;
   std::string refusal;        ///< why the scene could not be run at all, empty if it was
+  bool offered = true;        ///< the model has this integrator
   double axis_error = 0.0;    ///< largest |k - k_reference|, about the error of the tilt [rad]
   double path_error_m = 0.0;  ///< largest distance of the CoM from the reference
   double time_us = 0.0;       ///< fastest of the repeats, outputs included

@@ -21,6 +21,7 @@ class Rms {
   void add(double error) { sum_ += error * error, ++count_; }
   [[nodiscard]] double square() const { return count_ > 0 ? sum_ / count_ : kUnknown; }
   [[nodiscard]] double value() const { return std::sqrt(square()); }
+  [[nodiscard]] int count() const { return count_; }
 
  private:
   double sum_ = 0.0;
@@ -107,7 +108,7 @@ TruthScore score_against_truth(const data::Track& track, const data::Table& trut
       ++score.wrong;
       continue;
     }
-    ++score.found;
+    score.found += counts ? 1 : 0;
     pixels.add(error_px.norm());
     score.bias_px += error_px;
     if (error_px.norm() > score.largest_px)
@@ -122,7 +123,8 @@ TruthScore score_against_truth(const data::Track& track, const data::Table& trut
   }
   score.rms_px = pixels.value();
   score.rms_mm = metres.value();
-  if (score.found > 0) score.bias_px /= score.found, score.bias_mm /= score.found;
+  if (pixels.count() > 0) score.bias_px /= pixels.count();
+  if (metres.count() > 0) score.bias_mm /= metres.count();
   score.normalised = normalised.square();
   score.tilt = attitude.tilt.score();
   score.precession = attitude.precession.score();

@@ -12,9 +12,9 @@ namespace trochoid::tools {
 
 /// Against exact truth. NaN where nothing can be compared.
 struct TruthScore {
-  int frames = 0;  ///< of the truth in which at least half of the outline is visible
-  int found = 0, lost = 0;
-  int wrong = 0;  ///< samples farther off than the body is large
+  int frames = 0;           ///< of the truth in which at least half of the outline is visible
+  int found = 0, lost = 0;  ///< of these
+  int wrong = 0;            ///< samples farther off than the body is large
   double rms_px = 0.0, largest_px = 0.0, rms_mm = 0.0;
   Eigen::Vector2d bias_px = Eigen::Vector2d::Zero(), bias_mm = Eigen::Vector2d::Zero();
   double normalised = 0.0;  ///< mean of error^T covariance^-1 error / 2; 1 = honest sigmas
