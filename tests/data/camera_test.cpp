@@ -65,7 +65,7 @@ TEST(Camera, ReturnsToThePointItProjected) {
   for (const Camera& camera : {tilted_camera(), Camera::overhead(640, 480, 1500.0, 0.8),
                                Camera::from_scale(640, 480, 1500.0)})
     for (int i = 0; i < 200; ++i) {
-      const Eigen::Vector3d point(lateral(draw), lateral(draw), height(draw));
+      const Eigen::Vector3d point{lateral(draw), lateral(draw), height(draw)};
       const Eigen::Vector2d image = camera.image_from_table(point);
       // Newton ends at rounding: 1e-12 m is 1e-9 px here.
       EXPECT_LT((camera.table_from_image(image, point.z()) - point).norm(), 1e-12)

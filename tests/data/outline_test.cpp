@@ -89,7 +89,10 @@ std::vector<Pose<>> many_poses(const Body& body, int count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> theta(0.01, kPi - 0.01), phi(-kPi, kPi);
   std::vector<Pose<>> poses;
-  for (int i = 0; i < count; ++i) poses.push_back(pose_at(theta(random), phi(random), body));
+  for (int i = 0; i < count; ++i) {
+    const double tilt = theta(random), turn = phi(random);
+    poses.push_back(pose_at(tilt, turn, body));
+  }
   return poses;
 }
 

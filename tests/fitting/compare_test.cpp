@@ -221,7 +221,7 @@ TEST(Compare, ListsModelsThatExplainNothingWithTheirReason) {
   std::mt19937_64 generator(9);
   std::uniform_real_distribution<double> anywhere(-0.1, 0.1);
   for (data::TrackSample& sample : jumping.samples)
-    sample.centre_m = Eigen::Vector2d(anywhere(generator), anywhere(generator));
+    sample.centre_m = Eigen::Vector2d{anywhere(generator), anywhere(generator)};
   const Comparison none = compare_one(jumping, top());
   ASSERT_EQ(none.fit.comparison.size(), 5U);
   for (const data::ModelScore& score : none.fit.comparison) {

@@ -130,7 +130,7 @@ TEST(Consensus, PlacesScatteredAtAnEndAreWrong) {
       std::mt19937_64 generator(seed);
       std::uniform_real_distribution<double> anywhere_m(-0.1, 0.1);
       for (int i = kSamples - wrong; i < kSamples; ++i)
-        path.xy_m.row(i) += Eigen::RowVector2d(anywhere_m(generator), anywhere_m(generator));
+        path.xy_m.row(i) += Eigen::RowVector2d{anywhere_m(generator), anywhere_m(generator)};
       const std::vector<int> kept = consistent_path(path.t_s, path.xy_m, path.sigma_m);
       const auto wrongly =
           std::count_if(kept.begin(), kept.end(), [&](int i) { return i >= kSamples - wrong; });

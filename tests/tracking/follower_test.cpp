@@ -79,7 +79,7 @@ class SmearedDisc : public testing::Test {
 
 // One sighting tells no speed: by the next picture the disc may have gone most of its width.
 TEST_F(SmearedDisc, IsFoundAFrameAfterItWasFirstSeenThoughItWentMoreThanItsRadius) {
-  constexpr double kGone_px = 1.7 * kRadius_px;
+  constexpr double kGone_px = 1.5 * kRadius_px;
   const Eigen::Vector2d at(60.0, 80.0), gone_to = at + kGone_px * Eigen::Vector2d(1.0, 0.1);
   const Frame first = frame(0, 0.3, at), second = frame(1, 0.3 + kPerFrame_rad, gone_to);
   const auto one = seen_in(first, 0.3, at);

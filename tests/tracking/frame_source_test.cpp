@@ -107,13 +107,15 @@ TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
     std::array<int, 4> abcd;
     cv::Size size;
     cv::Point bright;  // where the stored top left corner is seen
+    cv::Point low;     // and the stored bottom left one
   };
   const cv::Size lying(kClipWidth, kClipHeight), standing(kClipHeight, kClipWidth);
   const std::vector<Case> cases{
-      {{1, 0, 0, 1}, lying, {5, 5}},
-      {{0, 1, -1, 0}, standing, {kClipHeight - 6, 5}},             // a quarter turn clockwise
-      {{-1, 0, 0, -1}, lying, {kClipWidth - 6, kClipHeight - 6}},  // upside down
-      {{0, -1, 1, 0}, standing, {5, kClipWidth - 6}}};             // a quarter turn back
+      {{1, 0, 0, 1}, lying, {5, 5}, {5, kClipHeight - 6}},
+      // a quarter turn clockwise, upside down, and a quarter turn back
+      {{0, 1, -1, 0}, standing, {kClipHeight - 6, 5}, {5, 5}},
+      {{-1, 0, 0, -1}, lying, {kClipWidth - 6, kClipHeight - 6}, {kClipWidth - 6, 5}},
+      {{0, -1, 1, 0}, standing, {5, kClipWidth - 6}, {kClipHeight - 6, kClipWidth - 6}}};
   for (const Case& c : cases) {
     const fs::path path = folder_ / "sideways.mp4";
     cv::Mat picture(kClipHeight, kClipWidth, CV_8UC3, cv::Scalar::all(40));
@@ -135,7 +137,23 @@ TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
     cv::blur(frame->luma, smooth, cv::Size(9, 9));
     EXPECT_GT(smooth.at<uchar>(c.bright), 180);
     EXPECT_LT(cv::mean(smooth)[0], 90.0);
+    // A rolling shutter exposes the stored rows, one after the other.
+    const auto share = [&](const cv::Point& at) {
+      return readout_share(source->info(), Eigen::Vector2d(at.x, at.y));
+    };
+    EXPECT_NEAR(share(c.bright), 5.0 / (kClipHeight - 1), 1e-12);
+    EXPECT_NEAR(share(c.low), 1.0 - 5.0 / (kClipHeight - 1), 1e-12);
   }
+}
+
+// Matroska counts milliseconds.
+TEST_F(FrameSourceTest, PicturesOfOneTimeAreRefusedUnlessTheRateIsGiven) {
+  const fs::path path = write_clip("fast.mkv", "FFV1", 2000.0);
+  EXPECT_THAT(error_of(path), HasSubstr("fast.mkv: frame 2 is shown at 0.001 s and the one before "
+                                        "it at 0.001 s"));
+  SourceOptions options;
+  options.frame_rate_hz = 2000.0;
+  EXPECT_THAT(error_of(path, options), IsEmpty());
 }
 
 TEST_F(FrameSourceTest, LimitedRangeLumaIsStretched) {

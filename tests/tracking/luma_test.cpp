@@ -13,11 +13,6 @@ extern "C" {
 namespace trochoid::tracking {
 namespace {
 
-struct FrameFree {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-using OwnedFrame = std::unique_ptr<AVFrame, FrameFree>;
-
 constexpr int kOddWidth = 7, kOddHeight = 5;  // odd: planes of half the size are rounded up
 
 // What is coded for a pixel of the half-size planes, 0..255.
@@ -29,8 +24,8 @@ std::uint8_t cr_at(int x, int y) {
 }
 
 // A picture that says this in some format, sample by sample.
-OwnedFrame coded_as(AVPixelFormat pixel_format) {
-  OwnedFrame frame(av_frame_alloc());
+PictureHandle coded_as(AVPixelFormat pixel_format) {
+  PictureHandle frame(av_frame_alloc());
   frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
   EXPECT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
   const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(pixel_format);
@@ -71,7 +66,7 @@ TEST(Luma, IsReadWhereverItsBitsLie) {
   constexpr int kLevel = 100, kLimited = 16 + kLevel * 219 / 255;
   for (const AVPixelFormat pixel_format :
        {AV_PIX_FMT_GRAY8, AV_PIX_FMT_YUV420P, AV_PIX_FMT_YUV420P10LE, AV_PIX_FMT_P010LE}) {
-    OwnedFrame frame(av_frame_alloc());
+    PictureHandle frame(av_frame_alloc());
     frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
     ASSERT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
     const AVComponentDescriptor& c = av_pix_fmt_desc_get(pixel_format)->comp[0];
@@ -96,7 +91,7 @@ TEST(Luma, IsReadWhereverItsBitsLie) {
 TEST(Chroma, IsEmptyWhereThereIsNoneOfItsOwn) {
   for (const AVPixelFormat pixel_format :
        {AV_PIX_FMT_GRAY8, AV_PIX_FMT_GRAY10LE, AV_PIX_FMT_BGR24}) {
-    OwnedFrame frame(av_frame_alloc());
+    PictureHandle frame(av_frame_alloc());
     frame->format = pixel_format, frame->width = kOddWidth, frame->height = kOddHeight;
     ASSERT_EQ(av_frame_get_buffer(frame.get(), 0), 0);
     EXPECT_TRUE(chroma_of(*frame).empty()) << av_get_pix_fmt_name(pixel_format);

@@ -540,7 +540,7 @@ TEST(OutlineFitter, ErrorsOfAFlatDiscAreSmallAndAsLargeAsStated) {
   constexpr int kDraws = 30;
   double square = 0.0, normalised = 0.0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const Eigen::Vector2d centre(80.0 + within(random), 70.0 + within(random));
+    const Eigen::Vector2d centre{80.0 + within(random), 70.0 + within(random)};
     const auto seen = disc.measure(centre, random);
     ASSERT_TRUE(seen);
     const Eigen::Vector2d off = seen->centre_px - centre;
@@ -581,7 +581,7 @@ TEST(OutlineFitter, OnAnEvenFloorATiltedDiscIsNotMovedForTheSakeOfAContactShadow
   constexpr int kDraws = 30;
   double sum_px = 0.0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const Eigen::Vector2d centre_px(80.0 + within(random), 70.0 + within(random));
+    const Eigen::Vector2d centre_px{80.0 + within(random), 70.0 + within(random)};
     cv::Mat picture = floor.clone();
     draw_disc(picture, centre_px.x(), centre_px.y(), 30.0, 30.0 * std::cos(kTilt_rad), 0.0, 60.0);
     data::Pose<> predicted;

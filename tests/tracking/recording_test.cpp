@@ -26,6 +26,20 @@ TEST(Recording, LooksAheadAsFarAsItCan) {
   EXPECT_GE(recording.samples().luma.size(), Background::kSamples);
 }
 
+TEST(Recording, LooksBeyondAPartThatFitsIntoOneWindow) {
+  constexpr int kPictures = 100, kLast = 45;
+  const ScratchFolder folder("short_part");
+  for (int i = 0; i < kPictures; ++i)
+    cv::imwrite(folder / fmt::format("{:02}.png", i), cv::Mat(48, 64, CV_8U, cv::Scalar(i)));
+  constexpr std::size_t kAll = 1 << 24;  // bytes
+  Recording recording(folder / "", {.frame_rate_hz = 100.0, .to = fmt::format("f{}", kLast)}, kAll);
+  ASSERT_TRUE(recording.advance(0));
+  ASSERT_EQ(recording.window().back().index, kLast);
+  double latest = 0.0;
+  for (const cv::Mat& luma : recording.samples().luma) latest = std::max(latest, cv::mean(luma)[0]);
+  EXPECT_GT(latest, kLast);
+}
+
 TEST(Recording, LeavesOutWhatLiesOutsideOfThePartAskedForWhenToldSo) {
   constexpr int kPictures = 100, kLast = 45;
   const ScratchFolder folder("part");

@@ -24,7 +24,7 @@ TEST(FitRim, ErrorsAreSmallAndAsLargeAsTheySay) {
   double squares = 0.0, normalised = 0.0;
   constexpr int kTrials = 60;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const Eigen::Vector2d centre(60.0 + fraction(random), 50.0 + fraction(random));
+    const Eigen::Vector2d centre{60.0 + fraction(random), 50.0 + fraction(random)};
     cv::Mat picture(100, 120, CV_64F, cv::Scalar(150.0));
     draw_disc(picture, centre.x(), centre.y(), 30.0, 18.0, 0.05 * trial, 50.0);
     const cv::Mat luma = developed(picture, 3.0, random);

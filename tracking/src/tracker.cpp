@@ -437,7 +437,11 @@ class Tracking {
   }
 
   void report_progress() const {
-    if (options_.progress) options_.progress(frames_, recording_.info().frames);
+    if (!options_.progress) return;
+    // How many frames lie between two moments is not known beforehand.
+    const SourceOptions asked = source_options(scene_, options_);
+    const bool part = !asked.from.empty() || !asked.to.empty();
+    options_.progress(frames_, part ? 0 : recording_.info().frames);
   }
 
   /// Metres for a track measured by rims: a camera over the floor, or the known radius.
@@ -475,7 +479,7 @@ class Tracking {
     std::string words = fmt::format("{}: the CoM of the fitted cylinder", camera_words());
     AssemblyOptions how{.fold = result.file.angles_folded,
                         .readout_s = scene_.camera.readout_s,
-                        .height_px = recording_.info().height_px};
+                        .video = recording_.info()};
     if (scene_.body && !scene_.body->marks.empty())
       how.mark_rad = scene_.body->marks.front().angle_rad;
     for (std::size_t k = 0; k < paths_.size(); ++k) {

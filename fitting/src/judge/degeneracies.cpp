@@ -85,8 +85,13 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
   for (const Channel one : angles) groups.push_back({one});
   if (angles.size() > 1) groups.push_back(angles);
   std::vector<data::BrokenDegeneracy> broken;
-  std::set<int> told;
+  std::set<std::string> told;
+  for (const data::BrokenDegeneracy& known : fit.broken_degeneracies)
+    told.insert(known.parameters.begin(), known.parameters.end());
   for (const Channels& group : groups) {
+    if (std::any_of(fit.broken_degeneracies.begin(), fit.broken_degeneracies.end(),
+                    [&](const auto& known) { return known.readings == word_for(group); }))
+      continue;
     const Eigen::MatrixXd others = without(group, all, scaled);
     if (others.rows() == 0) continue;  // a recording of nothing else
     const Eigen::VectorXd rest = directions_of(others).sd();
@@ -96,10 +101,10 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
       const data::FitParameter* parameter = fit.find(problem.name(i));
       const bool known = parameter != nullptr && parameter->identifiable;
       if (own || !known || rest[i] < std::max(1.0, kClearly * with[i]) ||
-          (group.size() > 1 && told.contains(i)))
+          (group.size() > 1 && told.contains(problem.name(i))))
         continue;
       names.push_back(problem.name(i));
-      told.insert(i);
+      told.insert(names.back());
     }
     if (names.empty()) continue;
     broken.push_back(broken_by(word_for(group), names));

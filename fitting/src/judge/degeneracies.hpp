@@ -11,7 +11,7 @@ namespace trochoid::fitting {
 /// determine: known to their natural size (natural_size) with these readings, and not by the rest
 /// of the recording and the priors. The spin's own angle, which nothing else could show, does not
 /// count. Linear about the solution, and as if residuals were independent.
-/// @param fit  says which parameters are determined at all.
+/// @param fit  says which parameters are determined at all; what it tells already is left out.
 /// @throws NumericalError where the model has no prediction.
 [[nodiscard]] std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                                       const Eigen::VectorXd& u,

@@ -193,11 +193,8 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
     warn_short_top(problem, fit);
     admit_steady_precession(problem, solution.u, fit);
   }
-  for (data::BrokenDegeneracy& broken : broken_degeneracies(problem, solution.u, fit))
-    if (std::none_of(
-            fit.broken_degeneracies.begin(), fit.broken_degeneracies.end(),
-            [&](const data::BrokenDegeneracy& told) { return told.readings == broken.readings; }))
-      fit.broken_degeneracies.push_back(std::move(broken));
+  const auto broken = broken_degeneracies(problem, solution.u, fit);
+  fit.broken_degeneracies.insert(fit.broken_degeneracies.end(), broken.begin(), broken.end());
 }
 
 }  // namespace trochoid::fitting

@@ -97,18 +97,19 @@ void look_into(const fs::path& path, const tracking::BoardPattern& pattern, View
   auto frame = source->next(), following = source->next();
   if (!following) return views.look(frame->luma, path.string(), pattern);
   double next_s = 0.0;
+  const std::size_t first = views.found.size();
   for (; frame; frame = std::exchange(following, following ? source->next() : std::nullopt)) {
     if (frame->t_s < next_s) continue;
     next_s = frame->t_s + kEvery_s;
     const std::size_t before = views.found.size();
     views.look(frame->luma, fmt::format("{} frame {}", path.string(), frame->index), pattern);
-    if (views.found.size() < 2 || views.found.size() == before) continue;
+    if (before == first || views.found.size() == before) continue;
     const auto &a = views.found[before - 1].image_px, &b = views.found[before].image_px;
     double moved = 0.0;
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
       moved += (a[i] - b[i]).norm() / static_cast<double>(std::min(a.size(), b.size()));
     if (moved < kMoved * frame->luma.cols) views.found.pop_back(), views.pictures.pop_back();
-    if (views.found.size() >= kMost) break;
+    if (views.found.size() - first >= kMost) break;
   }
 }
 

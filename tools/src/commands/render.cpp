@@ -46,7 +46,8 @@ struct RenderOptions {
 // Poses of a run at any time, between samples by cubics through four of them.
 class Motion {
  public:
-  Motion(const model::Trajectory& run, double rate_hz) : model_(run.model), rate_hz_(rate_hz) {
+  Motion(const model::Trajectory& run, double rate_hz)
+      : model_(run.model), rate_hz_(rate_hz), goes_on_(run.outcome == model::Outcome::reached_end) {
     for (const char* name : {"x_m", "y_m", "z_m", "theta_rad", "phi_rad", "psi_rad"}) {
       const auto at = std::find(run.columns.begin(), run.columns.end(), name);
       if (at == run.columns.end())
@@ -65,7 +66,9 @@ class Motion {
     const double place = t_s * rate_hz_;
     const auto i = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(place)) - 1, 0,
                                             std::max<Eigen::Index>(0, last - 3));
-    const double u = std::min(place, static_cast<double>(last)) - static_cast<double>(i);
+    // Half of the last picture's exposure lies beyond the end of a run that would have gone on.
+    const double until = static_cast<double>(last) + (goes_on_ ? 0.5 * kPerFrame : 0.0);
+    const double u = std::min(place, until) - static_cast<double>(i);
     const auto value = [&](std::size_t column) {
       const Eigen::VectorXd& v = columns_[column];
       if (last < 3) return v[std::clamp<Eigen::Index>(std::lround(place), 0, last)];
@@ -83,6 +86,7 @@ class Motion {
  private:
   std::string model_;
   double rate_hz_;
+  bool goes_on_;  ///< the run ended because its time was up
   std::vector<Eigen::VectorXd> columns_;
 };
 

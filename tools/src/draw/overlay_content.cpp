@@ -26,8 +26,6 @@ bool has_shape(const std::optional<data::Scene>& scene) {
   return scene && scene->body && scene->body->radius_m > 0.0;
 }
 
-}  // namespace
-
 // A camera file may have gone since.
 bool has_camera(const data::Scene& scene) {
   std::error_code ignored;
@@ -52,6 +50,8 @@ bool saw(const data::Camera& camera, const data::TrackFile& tracks, double radiu
     }
   return off_px.empty() || data::median(std::move(off_px)) < kFewPx;
 }
+
+}  // namespace
 
 std::optional<data::Camera> camera_from_track(const data::TrackFile& tracks, int width_px,
                                               int height_px) {

@@ -208,16 +208,21 @@ PictureRenderer::Seen PictureRenderer::trace(double x_px, double y_px, const Pos
   return seen;
 }
 
+/// Whether what is seen of the body belongs to a mark.
+bool PictureRenderer::shows_mark(const Seen& seen) const {
+  const double up = seen.hit.normal.z();
+  if (std::abs(up) <= 0.5) return false;
+  return std::any_of(body_.marks.begin(), body_.marks.end(), [&](const data::SpinMark& mark) {
+    const Eigen::Vector2d centre(mark.distance_m * std::cos(mark.angle_rad),
+                                 mark.distance_m * std::sin(mark.angle_rad));
+    return (up > 0.0 ? mark.on_upper_face : mark.on_lower_face) &&
+           (seen.hit.at.head<2>() - centre).norm() < mark.size_m;
+  });
+}
+
 Eigen::Vector3f PictureRenderer::shade_body(const Seen& seen, const Posed& body) const {
   constexpr double kShininess = 60.0;
-  Eigen::Vector3f colour = style_.body;
-  if (std::abs(seen.hit.normal.z()) > 0.5)
-    for (const data::SpinMark& mark : body_.marks) {
-      if (!(seen.hit.normal.z() > 0.0 ? mark.on_upper_face : mark.on_lower_face)) continue;
-      const Eigen::Vector2d centre(mark.distance_m * std::cos(mark.angle_rad),
-                                   mark.distance_m * std::sin(mark.angle_rad));
-      if ((seen.hit.at.head<2>() - centre).norm() < mark.size_m) colour = style_.mark;
-    }
+  const Eigen::Vector3f colour = shows_mark(seen) ? style_.mark : style_.body;
   const Eigen::Vector3d lamp = body.body_from_table * to_lamp_;
   const double facing = std::max(0.0, seen.hit.normal.dot(lamp));
   const Eigen::Vector3d half = (lamp - seen.along.normalized()).normalized();
@@ -305,15 +310,11 @@ cv::Rect PictureRenderer::window(const data::Pose<>& pose) const {
 }
 
 /// The surface a pixel's corner shows: 0 the floor, else a face or a wall (told apart by their
-/// normals), a mark (by its shade) or an axle (by how near the axis it is).
+/// normals), a mark or an axle (by how near the axis it is).
 int PictureRenderer::surface_at(double x_px, double y_px, const Posed& body) const {
   const Seen seen = trace(x_px, y_px, body);
   if (!seen.body) return 0;
-  if (std::abs(seen.hit.normal.z()) > 0.5) {
-    const bool marked =
-        !body_.marks.empty() && shade_body(seen, body).sum() > 1.5F * style_.body.sum();
-    return marked ? 2 : 1;
-  }
+  if (std::abs(seen.hit.normal.z()) > 0.5) return shows_mark(seen) ? 2 : 1;
   const bool axle =
       seen.hit.at.head<2>().norm() < 0.5 * body_.radius_m && body_.inner_radius_m <= 0.0;
   return axle ? 4 : 3;

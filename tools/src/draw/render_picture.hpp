@@ -52,6 +52,7 @@ class PictureRenderer {
   [[nodiscard]] Eigen::Vector3d direction(double x_px, double y_px) const;
   [[nodiscard]] Eigen::Vector3d eye(double x_px, double y_px) const;
   [[nodiscard]] Seen trace(double x_px, double y_px, const Posed& body) const;
+  [[nodiscard]] bool shows_mark(const Seen& seen) const;
   [[nodiscard]] Eigen::Vector3f shade_body(const Seen& seen, const Posed& body) const;
   [[nodiscard]] bool may_hide_lamp(const Eigen::Vector3d& to_body_m) const;
   [[nodiscard]] float floor_light(const Eigen::Vector3d& at_m, const Posed& body) const;

@@ -145,7 +145,8 @@ class Studio {
   [[nodiscard]] std::optional<Error> measure(std::int64_t draw, std::mt19937_64& random) const {
     std::uniform_real_distribution<double> within(-1.0, 1.0);
     std::normal_distribution<double> normal;
-    const data::Pose<> truth = pose(within(random), within(random));
+    const double tilted = within(random), turned = within(random);
+    const data::Pose<> truth = pose(tilted, turned);
     const cv::Mat luma = lens_.picture({truth}, draw);
     constexpr double kMissed_px = 0.5, kMissed_rad = 0.01;  // of a prediction
     const double px_m = 2.0 * kRadius_m / case_.size_px;

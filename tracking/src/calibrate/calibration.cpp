@@ -182,8 +182,12 @@ std::optional<BoardView> find_board(const cv::Mat& luma, const BoardPattern& pat
 double set_floor(data::Camera& camera, const FloorPoints& points, double height_m,
                  double sigma_px) {
   const std::size_t n = points.table_m.size();
-  if (n < 4 || n != points.image_px.size())
-    throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
+  if (n != points.image_px.size())
+    throw InputError(
+        fmt::format("{} points of the floor in the table's frame and {} in the picture; "
+                    "they must go in pairs",
+                    n, points.image_px.size()));
+  if (n < 4) throw InputError(fmt::format("{} points of the floor; at least four are needed", n));
   std::vector<cv::Point3d> table;
   std::vector<cv::Point2d> image;
   for (std::size_t i = 0; i < n; ++i) {

@@ -102,7 +102,9 @@ class LibavSource final : public FrameSource {
       ++frames_read_;
       const std::int64_t place_before = std::exchange(place_, place(frame.index));
       frame.missing_before = place_ - place_before - 1;
-      last_s_ = frame.t_s = presentation_time_s();
+      frame.t_s = presentation_time_s();
+      check_later(frame);
+      last_s_ = frame.t_s;
       last_index_ = frame.index;
       if (after(window_.to, frame)) {
         finished_ = true;
@@ -318,6 +320,16 @@ class LibavSource final : public FrameSource {
     return static_cast<double>(place_) / rate_hz;
   }
 
+  /// No motion can be told from pictures of one time.
+  void check_later(const Frame& frame) const {
+    if (frames_read_ < 2 || frame.t_s > last_s_) return;
+    fail(
+        fmt::format("frame {} is shown at {:g} s and the one before it at {:g} s: the container's "
+                    "clock is too coarse, or its stamps are wrong; give the true rate (--rate, or "
+                    "camera.frame_rate_hz)",
+                    frame.index, frame.t_s, last_s_));
+  }
+
   /// A picture of a series that cannot be decoded would shift all after it in time.
   void check_in_place() const {
     if (!series_) return;
@@ -461,6 +473,15 @@ std::string sha256_of_recording(const fs::path& path) {
 
 std::unique_ptr<FrameSource> open_video(const fs::path& path, const SourceOptions& options) {
   return std::make_unique<LibavSource>(path, options);
+}
+
+double readout_share(const VideoInfo& video, const Eigen::Vector2d& point_px) {
+  const int turned = video.orientation;
+  const bool along_x = turned >= 5,
+             backwards = turned == 3 || turned == 4 || turned == 6 || turned == 7;
+  const int rows = along_x ? video.width_px : video.height_px;
+  const double share = (along_x ? point_px.x() : point_px.y()) / std::max(1, rows - 1);
+  return std::clamp(backwards ? 1.0 - share : share, 0.0, 1.0);
 }
 
 }  // namespace trochoid::tracking

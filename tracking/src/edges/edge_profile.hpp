@@ -30,7 +30,9 @@ class LightWindow {
   /// Bilinear sample; `holds` must be true for the point.
   [[nodiscard]] float at(float x_px, float y_px) const {
     const float x = x_px - static_cast<float>(window_.x), y = y_px - static_cast<float>(window_.y);
-    const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+    // A point just before the last pixel may round to it.
+    const int ix = std::min(static_cast<int>(x), window_.width - 2),
+              iy = std::min(static_cast<int>(y), window_.height - 2);
     const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
     const float* upper = light_.ptr<float>(iy) + ix;
     const float* lower = upper + light_.step1();

@@ -9,7 +9,7 @@ extern const Kernel isa_avx2;
 
 const Kernel& kernel() {
 #if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  static const bool wide = __builtin_cpu_supports("avx2");
   if (wide) return isa_avx2;
 #endif
   return isa_baseline;

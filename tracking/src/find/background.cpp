@@ -179,7 +179,9 @@ void Background::clear_of(const Ellipse& rim) {
   constexpr double kBlur_px = 2.0;  // the rim's own
   constexpr int kReach_px = 6;
   const auto covered = [&](const cv::Size& size, double scale, double wider_px) {
-    const Eigen::Vector2f centre = (scale * rim.centre_px).cast<float>();
+    // Pixel centres are whole numbers in planes of either size.
+    const Eigen::Vector2f centre =
+        (scale * rim.centre_px - Eigen::Vector2d::Constant(0.5 * (1.0 - scale))).cast<float>();
     const auto width = static_cast<float>(2.0 * scale * (rim.semi_major_px() + wider_px));
     const auto height = static_cast<float>(2.0 * scale * (rim.semi_minor_px() + wider_px));
     const auto angle_deg = static_cast<float>(data::degrees(rim.angle_rad()));

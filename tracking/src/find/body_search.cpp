@@ -171,9 +171,11 @@ std::optional<Seed> seed_about(const std::vector<Frame>& held, std::size_t index
                                const Background& background, const BodyFinder& finder,
                                const Eigen::Vector2d& at_px) {
   const Frame& frame = held[index];
-  Look look{.frame = frame, .background = background.plate()};
+  Plate plate;
+  background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+  Look look{.frame = frame, .background = plate};
   std::vector<Detection> guesses;
-  for (const Silhouette& body : find_silhouettes(frame, background.plate()))
+  for (const Silhouette& body : find_silhouettes(frame, plate))
     if (body.detection.box.contains(
             cv::Point(static_cast<int>(at_px.x()), static_cast<int>(at_px.y()))))
       guesses.push_back(body.detection);

@@ -99,15 +99,14 @@ void Recording::stop_sampling() {
 }
 
 bool Recording::leave_out_the_rest() {
-  const bool part = !options_.from.empty() || !options_.to.empty();
-  if (!part || rest_left_out_ || !looked_ahead_) return false;
+  if (!is_part() || rest_left_out_ || !looked_ahead_) return false;
   rest_left_out_ = true;
   elsewhere_.clear();
   return true;
 }
 
 BackgroundSamples Recording::samples() {
-  const bool all = elsewhere_.empty() && (ended_ || rest_left_out_);
+  const bool all = elsewhere_.empty() && ((ended_ && !is_part()) || rest_left_out_);
   std::vector<Frame> chosen = spread(window_, all ? kBackgroundSamples : kBackgroundSamples / 2);
   if (!all) {
     read_ahead();

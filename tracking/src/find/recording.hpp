@@ -48,6 +48,7 @@ class Recording {
  private:
   void remember_window();
   void read_ahead();
+  [[nodiscard]] bool is_part() const { return !options_.from.empty() || !options_.to.empty(); }
   [[nodiscard]] std::optional<Frame> next_of(FrameSource& source) const;
 
   std::filesystem::path path_;

@@ -267,14 +267,6 @@ class Chain {
     return std::nullopt;
   }
 
-  /// Half of what lies between two tilts.
-  [[nodiscard]] double between_tilts(double one_rad, double other_rad) const {
-    const auto folded = [&](double tilt) {
-      return alike_ ? std::min(tilt, data::kPi - tilt) : tilt;
-    };
-    return 0.5 * std::abs(folded(one_rad) - folded(other_rad));
-  }
-
   /// A reading of node i measured afresh; nothing if the picture leads elsewhere.
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
                                                  std::size_t reading) const {
@@ -327,7 +319,7 @@ class Chain {
   [[nodiscard]] double tilt_cost(const Pose& from, const Pose& to) const {
     constexpr double kLeast_rad = 0.02, kOfTurn = 0.15, kMost = 1.5;  // the rest nods
     const double turn_rad = between_axes(axis_of(from), axis_of(to), alike_);
-    const double change_rad = 2.0 * between_tilts(from.theta_rad, to.theta_rad);
+    const double change_rad = between_tilts(from.theta_rad, to.theta_rad, alike_);
     return lean_weight_ * std::min(1.0, turn_rad / kAnother_rad) *
            std::min(kMost, change_rad / (kLeast_rad + kOfTurn * turn_rad));
   }
@@ -339,7 +331,8 @@ class Chain {
     constexpr double kErrors_rad = 0.05;
     double apart2 = 0.0;
     for (const AttitudeNode& node : nodes_)
-      apart2 += std::pow(2.0 * between_tilts(node.poses[0].theta_rad, node.poses[1].theta_rad), 2);
+      apart2 +=
+          std::pow(between_tilts(node.poses[0].theta_rad, node.poses[1].theta_rad, alike_), 2);
     const double errors2 = kErrors_rad * kErrors_rad * static_cast<double>(nodes_.size());
     return apart2 > errors2 ? 1.0 - errors2 / apart2 : 0.0;
   }
@@ -438,7 +431,7 @@ class Chain {
       const Pose &chosen = seen->pose->pose, &mirrored = rival.pose->pose;
       doubts[i]->off_px = 0.5 * (rival.centre_px - seen->centre_px);
       doubts[i]->off_m = 0.5 * (mirrored.centre_m - chosen.centre_m).head<2>();
-      doubts[i]->off_theta_rad = between_tilts(chosen.theta_rad, mirrored.theta_rad);
+      doubts[i]->off_theta_rad = 0.5 * between_tilts(chosen.theta_rad, mirrored.theta_rad, alike_);
     });
     return with_frames_between(doubts);
   }

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <vector>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/parallel.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -46,6 +47,11 @@ Surroundings surroundings_of(const std::vector<Glimpse>& glimpses, std::size_t i
 double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike) {
   const double cosine = a.dot(b);
   return std::acos(std::clamp(alike ? std::abs(cosine) : cosine, -1.0, 1.0));
+}
+
+double between_tilts(double one_rad, double other_rad, bool alike) {
+  const auto folded = [&](double tilt) { return alike ? std::min(tilt, data::kPi - tilt) : tilt; };
+  return std::abs(folded(one_rad) - folded(other_rad));
 }
 
 double shadow_log_score_ratio(const Sighting& one, const Sighting& other) {

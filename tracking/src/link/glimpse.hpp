@@ -82,5 +82,7 @@ void doubt_attitude(const Eigen::Vector2d& off_px, const Eigen::Vector2d& off_m,
                     double off_tilt_rad, Sighting& seen);
 /// Angle between two axes [rad]; with faces that look alike between the lines they lie on.
 [[nodiscard]] double between_axes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool alike);
+/// Difference of two tilts [rad]; with faces that look alike of whichever face is up.
+[[nodiscard]] double between_tilts(double one_rad, double other_rad, bool alike);
 
 }  // namespace trochoid::tracking

@@ -119,9 +119,10 @@ class Mending {
 /// What the frames around still contradict may be where they say instead: its covariance holds
 /// both. Where it does so for another reading already, which may be the same, the tilt's alone is
 /// seen to.
-void doubt_reading(const Expected& expected, Sighting& seen) {
+void doubt_reading(const Expected& expected, bool alike, Sighting& seen) {
   PoseMeasurement& pose = *seen.pose;
-  const double off_rad = std::abs(expected.seen.pose->pose.theta_rad - pose.pose.theta_rad);
+  const double off_rad =
+      between_tilts(expected.seen.pose->pose.theta_rad, pose.pose.theta_rad, alike);
   if (seen.attitude_doubtful) {
     pose.sigma_theta_rad = std::max(pose.sigma_theta_rad, off_rad);
     return;
@@ -178,7 +179,7 @@ void doubt_what_is_contradicted(const BodyFinder& finder, std::vector<Glimpse>& 
                             (poor[i] && off > kPoorOff_rad));
       if (off < least_rad) least_rad = off, nearest = std::move(expected);
     }
-    if (nearest && doubted) doubt_reading(*nearest, *glimpses[i].seen);
+    if (nearest && doubted) doubt_reading(*nearest, finder.faces_look_alike(), *glimpses[i].seen);
   }
 }
 

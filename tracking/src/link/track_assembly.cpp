@@ -201,9 +201,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     const Sighting& seen = at.seen;
     data::TrackSample sample;
     sample.frame = index;
-    sample.t_s =
-        at.t_s + options.readout_s *
-                     std::clamp(seen.centre_px.y() / std::max(1, options.height_px - 1), 0.0, 1.0);
+    sample.t_s = at.t_s + options.readout_s * readout_share(options.video, seen.centre_px);
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
     const double usual = *inflation++;

@@ -146,9 +146,11 @@ struct Fit {
   /// [product of the two parameters' units]. Of a top whose nutation is not seen by curvature,
   /// while the sigmas that this hides are infinite.
   Eigen::MatrixXd covariance;
-  double chi2 = 0.0;                ///< of the residuals over their sigmas, robustly weighted, >= 0
-  int dof = 0;                      ///< degrees of freedom: measurements less free parameters
-  double noise_scale = 1.0;         ///< factor by which the track's sigmas were re-estimated
+  double chi2 = 0.0;  ///< of the residuals over their sigmas, robustly weighted, >= 0
+  int dof = 0;        ///< degrees of freedom: measurements less free parameters
+  /// Factor by which the tracks' sigmas were re-estimated, of the first arc's positions if it has
+  /// any; over a first guess where a track came without them.
+  double noise_scale = 1.0;
   double aicc = 0.0, bic = 0.0;     ///< information criteria, correlated residuals allowed for
   double whiteness_p = 0.0;         ///< p-value of the residuals being white, 0..1
   double correlation_time_s = 0.0;  ///< over which residuals hang together [s]; 0 if white

@@ -72,7 +72,8 @@ struct FloorPoints {
 /// (a board lying on it: its thickness), and completes the camera's covariance.
 /// @param sigma_px  standard deviation of the points per coordinate, should they scatter by less.
 /// @returns the rms reprojection error per coordinate [px].
-/// @throws InputError for fewer than four points or points on a line.
+/// @throws InputError for fewer than four points, points on a line or seen from below;
+/// NumericalError if they determine no pose.
 double set_floor(data::Camera& camera, const FloorPoints& points, double height_m,
                  double sigma_px = 0.0);
 

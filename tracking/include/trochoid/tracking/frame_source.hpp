@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -36,6 +37,10 @@ struct VideoInfo {
   std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
   int orientation = 1;  ///< how the stored pictures were turned to be upright, by Exif's numbers
 };
+
+/// Where in a rolling shutter's readout a point of the upright picture is exposed, 0 (first row) ..
+/// 1: the rows are the stored picture's, whichever way it was turned.
+[[nodiscard]] double readout_share(const VideoInfo& video, const Eigen::Vector2d& point_px);
 
 struct SourceOptions {
   bool colour = false;
