@@ -39,7 +39,7 @@ struct AssemblyOptions {
   bool on_pin = false;     ///< held at its own middle: turns about the vertical where seen face on
   double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
   double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
-  VideoInfo video;         ///< whose rows these are
+  VideoInfo video{};       ///< whose rows these are
 };
 
 /// Track samples of a path: metres and their covariance, unwrapped and folded angles, times of the
