@@ -369,6 +369,26 @@ TEST(SteadyPrecession, HidesAAndBThoughTheTiltIsSeenAndTellsTheLength) {
   }
 }
 
+TEST(SteadyPrecession, TellsBAtASeenTiltWhereAIsKnown) {
+  const data::Track track = circling_track(true);
+  data::Scene scene;
+  scene.model.name = "top";
+  constexpr double kA_1_s2 = 200.0, kRate_rad_s = 6.0;
+  scene.fit.prior["a_1_s2"] = {kA_1_s2, 2.0};
+  const data::Fit fit = fitting::fit(std::span(&track, 1), scene);
+  EXPECT_TRUE(fit.find("a_1_s2")->identifiable);
+  EXPECT_TRUE(fit.find("b_1_s")->identifiable);
+  EXPECT_LT(pull(fit, "b_1_s", kA_1_s2 / kRate_rad_s + kRate_rad_s * std::cos(0.8)), kFar);
+}
+
+TEST(SteadyPrecession, HidesAAndBBehindGlitchesToo) {
+  data::Track track = circling_track(true);
+  for (const std::size_t i : {30U, 77U, 78U, 150U}) track.samples[i].centre_m.x() += 0.01;
+  for (const std::size_t i : {12U, 100U}) track.samples[i].theta->value_rad = 1.3;
+  const data::Fit fit = fit_top(track, {});
+  for (const char* name : {"a_1_s2", "b_1_s"}) EXPECT_FALSE(fit.find(name)->identifiable) << name;
+}
+
 // No nutation tells a and b, whatever a mark shows of the spin.
 TEST(BrokenDegeneracies, AreNotThoseOfWhatACircleHides) {
   data::Track track = circling_track(false);

@@ -69,6 +69,7 @@ class Tracking {
   static SourceOptions source_options(const data::Scene& scene, const TrackOptions& options) {
     SourceOptions source;
     source.chroma = true;
+    source.apart_in_time = true;
     source.frame_rate_hz = scene.camera.frame_rate_hz;
     source.from = options.from.empty() ? scene.tracking.from : options.from;
     source.to = options.to.empty() ? scene.tracking.to : options.to;

@@ -159,7 +159,10 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
   fit.dof = score.rows - static_cast<int>(problem.free.size());
   fit.aicc = score.aicc;
   fit.bic = score.bic;
-  const ArcData& first = problem.arcs[0];
+  // Over a first guess it says nothing, where any track states its noise.
+  const auto stated = std::find_if(problem.arcs.begin(), problem.arcs.end(),
+                                   [](const ArcData& arc) { return !arc.sigma_unknown; });
+  const ArcData& first = stated != problem.arcs.end() ? *stated : problem.arcs[0];
   const bool positions = first.observables[0] == model::Observable::x_m;
   fit.noise_scale = noise_scale(first, positions ? Channel::position : Channel::psi);
   fit.whiteness_p = error.whiteness.p_value;

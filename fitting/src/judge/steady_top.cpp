@@ -82,6 +82,27 @@ Problem without_spin(const Problem& problem) {
   return path;
 }
 
+// The samples none of whose readings stand out.
+ArcData without_glitches(const Problem& path) {
+  constexpr double kStandsOut = 0.5;
+  const ArcData& arc = path.arcs[0];
+  std::vector<bool> good(arc.t_s.size(), true);
+  for (const Reading& reading : arc.readings)
+    if (robust_weight(path, 0, reading) < kStandsOut)
+      good[static_cast<std::size_t>(reading.sample)] = false;
+  std::vector<int> kept;
+  for (std::size_t i = 0; i < good.size(); ++i)
+    if (good[i]) kept.push_back(static_cast<int>(i));
+  return arc.keep(kept);
+}
+
+bool known_beforehand(const Problem& problem, const char* name) {
+  const int index = problem.predictor->index_of(name);
+  for (const FreeParameter& parameter : problem.free)
+    if (parameter.index == index) return parameter.prior.has_value();
+  return true;  // not fitted at all
+}
+
 // Weighted as in the fit. @pre problem's only arc has no spin.
 double chi2_of(const Problem& problem, const Steady& steady, const Eigen::Vector2d& pivot_m) {
   const ArcData& arc = problem.arcs[0];
@@ -106,6 +127,9 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   const ArcData& arc = problem.arcs[0];
   if (arc.observable_index(Observable::x_m) < 0) return;
   const bool tilt_seen = arc.observable_index(Observable::theta_rad) >= 0;
+  // At a known tilt and rate either of a and b tells the other.
+  if (tilt_seen && (known_beforehand(problem, "a_1_s2") || known_beforehand(problem, "b_1_s")))
+    return;
   const Eigen::VectorXd values = problem.values(0, u);
   const int px = problem.predictor->index_of("pivot_x_m");
   const int py = problem.predictor->index_of("pivot_y_m");
@@ -113,7 +137,7 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   const Problem path = without_spin(problem);
   Eigen::VectorXd residuals;
   if (!evaluate(path, 0, u, residuals, nullptr)) return;
-  const Steady steady = steady_through(path.arcs[0], pivot_m, drag);
+  const Steady steady = steady_through(without_glitches(path), pivot_m, drag);
   // Parameters that mean nothing lower chi-square by their number +- sqrt(2) times its root, 3
   // sigma; and of as many frequencies as there are samples nutation may take that of the noise's
   // strongest line. Of a, b, l, tilt and its rate a circle has its radius, and its tilt where seen.
@@ -132,7 +156,10 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
     parameter.sigma = std::numeric_limits<double>::infinity();
     parameter.note += "; no nutation is seen";
   }
-  if (tilt_seen) fit.broken_degeneracies.push_back(broken_by("tilt", by_tilt));
+  const bool by_tilt_alone = std::none_of(
+      by_tilt.begin(), by_tilt.end(),
+      [&](const std::string& name) { return known_beforehand(problem, name.c_str()); });
+  if (tilt_seen && by_tilt_alone) fit.broken_degeneracies.push_back(broken_by("tilt", by_tilt));
   fit.warnings.push_back(fmt::format(
       "no nutation is seen: steady precession determines {}l sin(theta) = {:.6g} m, the rate W = "
       "{:.6g} rad/s, and a + W^2 cos(theta) = b W; not {}",

@@ -244,7 +244,7 @@ void add_simulate_command(CLI::App& app) {
       ->check(number_within(1e-15, 0.1));
   command->add_option("--model", options->model, "Model, instead of the scene's")
       ->check(CLI::IsMember(
-          {"free", "top", "top-euler", "rolling", "smooth", "sliding", "puck", "pivot"}));
+          {"auto", "free", "top", "top-euler", "rolling", "smooth", "sliding", "puck", "pivot"}));
   command->add_option("--integrator", options->integrator, "Method, instead of the scene's")
       ->check(CLI::IsMember(
           {"auto", "dop853", "taylor", "radau", "cvode-adams", "cvode-bdf", "arkode"}));

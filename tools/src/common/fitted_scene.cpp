@@ -102,7 +102,9 @@ void set_top(const data::Fit& fit, std::size_t arc, data::Scene& scene) {
 }  // namespace
 
 bool is_start(const data::FitParameter& parameter) {
-  return kStart.contains(parameter.name.substr(0, parameter.name.find('@')));
+  // A top's b holds the spin it was given.
+  const std::string name = parameter.name.substr(0, parameter.name.find('@'));
+  return kStart.contains(name) || name == "b_1_s" || name == "omega_s_rad_s";
 }
 
 double time_factor(const data::Fit& fit) {

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <new>
 #include <optional>
 #include <utility>
@@ -102,9 +103,7 @@ class LibavSource final : public FrameSource {
       ++frames_read_;
       const std::int64_t place_before = std::exchange(place_, place(frame.index));
       frame.missing_before = place_ - place_before - 1;
-      frame.t_s = presentation_time_s();
-      check_later(frame);
-      last_s_ = frame.t_s;
+      last_s_ = frame.t_s = presentation_time_s();
       last_index_ = frame.index;
       if (after(window_.to, frame)) {
         finished_ = true;
@@ -112,6 +111,7 @@ class LibavSource final : public FrameSource {
         return std::nullopt;
       }
       if (before(window_.from, frame)) continue;
+      check_later(frame);
       convert(frame);
       any_chosen_ = true;
       return frame;
@@ -321,13 +321,14 @@ class LibavSource final : public FrameSource {
   }
 
   /// No motion can be told from pictures of one time.
-  void check_later(const Frame& frame) const {
-    if (frames_read_ < 2 || frame.t_s > last_s_) return;
+  void check_later(const Frame& frame) {
+    const double before_s = std::exchange(handed_out_s_, frame.t_s);
+    if (!options_.apart_in_time || frame.t_s > before_s) return;
     fail(
         fmt::format("frame {} is shown at {:g} s and the one before it at {:g} s: the container's "
                     "clock is too coarse, or its stamps are wrong; give the true rate (--rate, or "
                     "camera.frame_rate_hz)",
-                    frame.index, frame.t_s, last_s_));
+                    frame.index, frame.t_s, before_s));
   }
 
   /// A picture of a series that cannot be decoded would shift all after it in time.
@@ -444,7 +445,8 @@ class LibavSource final : public FrameSource {
   std::int64_t frames_read_ = 0;
   std::int64_t last_index_ = 0;  ///< of the picture that was decoded last
   double last_s_ = 0.0;          ///< its time
-  bool any_chosen_ = false;      ///< of the window
+  double handed_out_s_ = -std::numeric_limits<double>::infinity();  ///< time of the last one
+  bool any_chosen_ = false;                                         ///< of the window
   std::int64_t first_stamp_ = AV_NOPTS_VALUE, last_stamp_ = AV_NOPTS_VALUE;
   double steady_rate_hz_ = 0.0;  ///< 0 = stamps do not tell of a lost picture
   std::int64_t place_ = -1;      ///< in time, of the picture that was decoded last

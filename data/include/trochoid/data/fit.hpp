@@ -148,8 +148,8 @@ struct Fit {
   Eigen::MatrixXd covariance;
   double chi2 = 0.0;  ///< of the residuals over their sigmas, robustly weighted, >= 0
   int dof = 0;        ///< degrees of freedom: measurements less free parameters
-  /// Factor by which the tracks' sigmas were re-estimated, of the first arc's positions if it has
-  /// any; over a first guess where a track came without them.
+  /// Factor by which the tracks' sigmas were re-estimated, of positions if there are any; over a
+  /// first guess where no track came with them.
   double noise_scale = 1.0;
   double aicc = 0.0, bic = 0.0;     ///< information criteria, correlated residuals allowed for
   double whiteness_p = 0.0;         ///< p-value of the residuals being white, 0..1

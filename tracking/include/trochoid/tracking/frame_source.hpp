@@ -53,7 +53,8 @@ struct SourceOptions {
   int decoder_threads = 0;   ///< 0 = the decoder's choice
   /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
   bool key_frames_only = false;
-  bool chroma = false;  ///< fill Frame::chroma where the coding has it
+  bool chroma = false;         ///< fill Frame::chroma where the coding has it
+  bool apart_in_time = false;  ///< refuse a picture of the same time as the one before, or earlier
 };
 
 /// Frames in order from a video file or an image sequence: printf-style ("img/%04d.png"), a pattern
