@@ -440,9 +440,7 @@ class Tracking {
   void report_progress() const {
     if (!options_.progress) return;
     // How many frames lie between two moments is not known beforehand.
-    const SourceOptions asked = source_options(scene_, options_);
-    const bool part = !asked.from.empty() || !asked.to.empty();
-    options_.progress(frames_, part ? 0 : recording_.info().frames);
+    options_.progress(frames_, recording_.is_part() ? 0 : recording_.info().frames);
   }
 
   /// Metres for a track measured by rims: a camera over the floor, or the known radius.

@@ -25,6 +25,8 @@ class Recording {
             std::function<void()> checkpoint = {});
 
   [[nodiscard]] const VideoInfo& info() const { return source_->info(); }
+  /// Whether SourceOptions::from or to leave some of it out.
+  [[nodiscard]] bool is_part() const { return !options_.from.empty() || !options_.to.empty(); }
   /// Pictures so far that repeat the one before.
   [[nodiscard]] std::int64_t repeated() const { return repeats_.count(); }
   [[nodiscard]] const std::vector<Frame>& window() const { return window_; }
@@ -48,7 +50,6 @@ class Recording {
  private:
   void remember_window();
   void read_ahead();
-  [[nodiscard]] bool is_part() const { return !options_.from.empty() || !options_.to.empty(); }
   [[nodiscard]] std::optional<Frame> next_of(FrameSource& source) const;
 
   std::filesystem::path path_;
