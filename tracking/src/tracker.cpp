@@ -469,6 +469,15 @@ class Tracking {
     return on > off;
   }
 
+  [[nodiscard]] std::string note_about_scale() const {
+    const bool tilts = scene_.support.kind != data::SupportKind::flat;
+    return fmt::format(
+        "without a camera metres go by how large the body looks, with its shadow{}: some per cent "
+        "off, which no error bar holds; `trochoid calibrate` makes a camera file from this very "
+        "recording",
+        tilts ? ", and one that tilts is not where the middle of its rim appears" : "");
+  }
+
   TrackResult result() {
     TrackResult result;
     result.file.source = video_.filename().string();
@@ -497,11 +506,7 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
-    if (!camera_ && has_shape(scene_) && scene_.support.kind != data::SupportKind::flat)
-      result.file.notes.emplace_back(
-          "without a camera metres go by how large the body looks, and a body that tilts is not "
-          "where the middle of its rim appears: off by more than the error bars say, which a "
-          "camera file would mend");
+    if (!camera_ && has_shape(scene_)) result.file.notes.push_back(note_about_scale());
     const WhatWasRead read{.frames = frames_,
                            .missing = missing_,
                            .repeated = recording_.repeated(),

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "commands.hpp"
+#include "commands/body_camera.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
@@ -32,7 +33,8 @@ struct CalibrateOptions {
   std::vector<fs::path> inputs;
   std::string pattern = "9x6", dictionary = "4X4_50", floor;
   double square_mm = 0.0, marker_mm = 0.0, floor_height_mm = 0.0, radius_mm = 0.0;
-  fs::path floor_points, circle_points, output, picture;
+  fs::path floor_points, circle_points, output, picture, scene;
+  double camera_height_mm = 0.0;
   bool json = false;
 };
 
@@ -417,7 +419,20 @@ void check_names(const CalibrateOptions& options) {
   if (!options.picture.empty()) check_picture_name(options.picture);
 }
 
+void calibrate_by_scene(const CalibrateOptions& options) {
+  if (options.inputs.size() > 1)
+    throw InputError(fmt::format("{}: --scene takes one recording, and a camera is one's own",
+                                 options.inputs[1].string()));
+  calibrate_by_body({options.inputs.front(), options.scene, options.output,
+                     options.camera_height_mm, options.json});
+}
+
 void run(const CalibrateOptions& options) {
+  if (!options.scene.empty()) return calibrate_by_scene(options);
+  if (!(options.square_mm > 0.0))
+    throw InputError(
+        "give --square-mm, the side of a square of the board, or --scene, whose body of known "
+        "size tells the camera");
   check_names(options);
   check_points(options);
   const tracking::BoardPattern pattern = pattern_of(options);
@@ -448,17 +463,20 @@ void run(const CalibrateOptions& options) {
 void add_calibrate_command(CLI::App& app) {
   auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command =
-      app.add_subcommand("calibrate", "Find a camera from pictures of a board, and the floor");
+      app.add_subcommand("calibrate",
+                         "Find a camera from pictures of a board, and the floor, or "
+                         "from the recording of a body of known size");
   command
-      ->add_option("inputs", options->inputs, "Pictures of the board, a folder of them or a video")
+      ->add_option("inputs", options->inputs,
+                   "Pictures of the board, a folder of them or a video; with --scene the recording")
       ->required();
-  command->add_option(
+  CLI::Option* pattern = command->add_option(
       "--pattern", options->pattern,
       "Columns x rows: inner corners of a chessboard, squares of a ChArUco board [9x6]");
   constexpr double kLeast_mm = 0.5, kMost_mm = 1000.0;  // no slip between millimetres and metres
-  command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
-      ->required()
-      ->check(number_within(kLeast_mm, kMost_mm));
+  CLI::Option* square =
+      command->add_option("--square-mm", options->square_mm, "Side of a square [mm]")
+          ->check(number_within(kLeast_mm, kMost_mm));
   command
       ->add_option("--marker-mm", options->marker_mm,
                    "Side of a marker [mm]: the board is a ChArUco board")
@@ -486,12 +504,31 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("--radius-mm", options->radius_mm, "Radius of that rim [mm]")
       ->check(positive_number())
       ->needs("--circle-points");
-  command->add_option("--picture", options->picture,
-                      "Picture of the corners and their residuals to write (.png, .jpg)");
+  CLI::Option* picture =
+      command->add_option("--picture", options->picture,
+                          "Picture of the corners and their residuals to write (.png, .jpg)");
+  command
+      ->add_option("--scene", options->scene,
+                   "No board: a scene with a body of known size on the floor, under a camera that "
+                   "looks straight down")
+      ->excludes(pattern)
+      ->excludes(square)
+      ->excludes(picture)
+      ->excludes("--marker-mm")
+      ->excludes("--floor")
+      ->excludes("--floor-height-mm")
+      ->excludes("--floor-points")
+      ->excludes("--circle-points");
+  command
+      ->add_option("--camera-height-mm", options->camera_height_mm,
+                   "Height of that camera above the floor, by tape, to 2 % [mm]")
+      ->check(positive_number())
+      ->needs("--scene");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   add_json_flag(*command, options->json);
   command->footer(
-      "Example: trochoid calibrate board/*.png --pattern 9x6 --square-mm 20 -o camera.json");
+      "Examples:\n  trochoid calibrate board/*.png --pattern 9x6 --square-mm 20 -o camera.json\n"
+      "  trochoid calibrate ring.mp4 --scene ring.toml --camera-height-mm 800 -o camera.json");
   command->callback([options] { run(*options); });
 }
 

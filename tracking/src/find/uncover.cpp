@@ -11,8 +11,6 @@
 namespace trochoid::tracking {
 namespace {
 
-constexpr int kSamples = Quantiles::kSamples;
-
 cv::Mat disc_of(int width_px) {
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {width_px, width_px});
 }
@@ -88,7 +86,7 @@ struct StaticSurroundings {
 };
 
 /// Mean of the samples that the surroundings would explain; nothing if there is none.
-std::optional<double> floor_like(const std::array<int, kSamples>& levels,
+std::optional<double> floor_like(const std::array<int, Quantiles::kSamples>& levels,
                                  const StaticSurroundings::Expected& expected) {
   double sum = 0.0;
   int count = 0;
@@ -198,14 +196,14 @@ void uncover(cv::Mat& plane, const std::vector<cv::Mat>& samples, const Changes&
   // The rim of what changed changed too, by less than counts.
   cv::Mat changed;
   cv::dilate(moved, changed, cv::Mat::ones(5, 5, CV_8U));
-  std::array<int, kSamples> levels{};
+  std::array<int, Quantiles::kSamples> levels{};
   for (int y = 0; y < plane.rows; ++y)
     for (int x = 0; x < plane.cols; ++x) {
       if (changed.at<std::uint8_t>(y, x) == 0) continue;
       const auto expected = around.at(x, y, noise);
       std::uint8_t& plate = plane.at<std::uint8_t>(y, x);
       if (!expected || expected->explains(plate)) continue;
-      for (std::size_t k = 0; k < kSamples; ++k)
+      for (std::size_t k = 0; k < Quantiles::kSamples; ++k)
         levels[k] = samples[Quantiles::place_of(k, samples.size())].at<std::uint8_t>(y, x);
       if (const auto floor = floor_like(levels, *expected))
         plate = cv::saturate_cast<std::uint8_t>(*floor);
