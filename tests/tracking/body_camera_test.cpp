@@ -84,7 +84,7 @@ TEST(FitOverhead, FindsTheCameraUnderWhichOutlinesWereMade) {
 
 TEST(FitOverhead, NoiseOfTheEdgesStaysWithinTheErrorBars) {
   double squares = 0.0;
-  constexpr int kDraws = 8;
+  constexpr int kDraws = 4;
   for (unsigned seed = 1; seed <= kDraws; ++seed) {
     const OverheadFit fit = fitted(rolling(0.2, 0.0, seed));
     const Eigen::Vector2d off = (fit.numbers - numbers(kScale_px_per_m, kHeight_m)).head<2>();

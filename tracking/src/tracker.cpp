@@ -469,13 +469,17 @@ class Tracking {
     return on > off;
   }
 
-  [[nodiscard]] std::string note_about_scale() const {
-    const bool tilts = scene_.support.kind != data::SupportKind::flat;
+  [[nodiscard]] static std::string note_about_scale(const data::Support& support) {
+    const bool flat = support.kind == data::SupportKind::flat;
+    const bool on_floor = flat || support.kind == data::SupportKind::floor;
     return fmt::format(
-        "without a camera metres go by how large the body looks, with its shadow{}: some per cent "
-        "off, which no error bar holds; `trochoid calibrate` makes a camera file from this very "
-        "recording",
-        tilts ? ", and one that tilts is not where the middle of its rim appears" : "");
+        "without a camera metres go by how large the body looks, with its shadow{}: off by more "
+        "than the error bars say, which a camera file would mend{}",
+        flat ? "" : ", and a body that tilts is not where the middle of its rim appears",
+        on_floor
+            ? "; of a camera that looks straight down `trochoid calibrate VIDEO --scene SCENE` "
+              "makes one from this very recording"
+            : "");
   }
 
   TrackResult result() {
@@ -506,7 +510,8 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
-    if (!camera_ && has_shape(scene_)) result.file.notes.push_back(note_about_scale());
+    if (!camera_ && has_shape(scene_))
+      result.file.notes.push_back(note_about_scale(scene_.support));
     const WhatWasRead read{.frames = frames_,
                            .missing = missing_,
                            .repeated = recording_.repeated(),

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/json_summary.hpp"
@@ -9,6 +10,7 @@
 #include "common/progress.hpp"
 #include "common/scene_library.hpp"
 #include "common/value_words.hpp"
+#include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/tracking/body_camera.hpp"
 
@@ -16,8 +18,7 @@ namespace trochoid::tools {
 namespace {
 
 void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
-  const double sigma_scale = found.sigma_scale * found.scale_px_per_m,
-               sigma_height_m = found.sigma_height * found.height_m;
+  const double sigma_scale = found.sigma_scale * found.scale_px_per_m;
   if (command.json)
     return print_json({{"camera", command.output.string()},
                        {"pictures", found.pictures},
@@ -25,15 +26,15 @@ void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
                        {"scale_px_per_m", found.scale_px_per_m},
                        {"sigma_scale_px_per_m", sigma_scale},
                        {"height_m", found.height_m},
-                       {"sigma_height_m", sigma_height_m}});
+                       {"sigma_height_m", found.sigma_height * found.height_m}});
   fmt::print("{}: camera by the body's outline in {} pictures, rms {:.2f} px\n",
              command.output.string(), found.pictures, found.rms_px);
-  fmt::print("scale {} px/m on the floor, {} m above it{}\n",
-             value_words(found.scale_px_per_m, sigma_scale),
-             value_words(found.height_m, sigma_height_m),
-             command.camera_height_mm > 0.0
-                 ? ""
-                 : "; a height taken by tape (--camera-height-mm) makes both better");
+  const bool by_tape = command.camera_height_mm > 0.0;
+  fmt::print("scale {} px/m on the floor, {:.3g} m above it ({:.3g} to {:.3g}){}\n",
+             value_words(found.scale_px_per_m, sigma_scale), found.height_m,
+             found.height_m * std::exp(-found.sigma_height),
+             found.height_m * std::exp(found.sigma_height),
+             by_tape ? "" : "; a height by tape (--camera-height-mm) makes both better");
   fmt::print(
       "taken to look straight down, to about a degree, and its lens to be without distortion: "
       "pictures of a board would tell\n");
@@ -42,7 +43,11 @@ void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
 }  // namespace
 
 void calibrate_by_body(const BodyCameraCommand& command) {
-  check_outputs({command.output}, {command.video, command.scene});
+  // The camera that the scene names is not read, and may be the one that is made.
+  check_outputs({command.output}, {command.video});
+  if (std::error_code ignored; std::filesystem::equivalent(command.output, command.scene, ignored))
+    throw InputError(
+        fmt::format("{}: is read by this command; name another output", command.output.string()));
   const data::Scene scene = data::read_scene(command.scene);
   in_scene(command.scene.string(), [&] { tracking::check_tells_a_camera(scene); });
   tracking::BodyCamera found;

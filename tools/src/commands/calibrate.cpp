@@ -421,7 +421,7 @@ void check_names(const CalibrateOptions& options) {
 
 void calibrate_by_scene(const CalibrateOptions& options) {
   if (options.inputs.size() > 1)
-    throw InputError(fmt::format("{}: --scene takes one recording, and a camera is one's own",
+    throw InputError(fmt::format("with --scene one recording is looked at, not also {}",
                                  options.inputs[1].string()));
   calibrate_by_body({options.inputs.front(), options.scene, options.output,
                      options.camera_height_mm, options.json});
@@ -509,8 +509,8 @@ void add_calibrate_command(CLI::App& app) {
                           "Picture of the corners and their residuals to write (.png, .jpg)");
   command
       ->add_option("--scene", options->scene,
-                   "No board: a scene with a body of known size on the floor, under a camera that "
-                   "looks straight down")
+                   "Without a board: the scene of a recording with a disc or ring of known size on "
+                   "the floor, under a camera that looks straight down")
       ->excludes(pattern)
       ->excludes(square)
       ->excludes(picture)
@@ -521,8 +521,8 @@ void add_calibrate_command(CLI::App& app) {
       ->excludes("--circle-points");
   command
       ->add_option("--camera-height-mm", options->camera_height_mm,
-                   "Height of that camera above the floor, by tape, to 2 % [mm]")
-      ->check(positive_number())
+                   "Height of the lens above the floor, with --scene, taken as good to 2 % [mm]")
+      ->check(number_within(10.0, 1e5))
       ->needs("--scene");
   command->add_option("-o,--output", options->output, "Camera file to write (JSON)")->required();
   add_json_flag(*command, options->json);

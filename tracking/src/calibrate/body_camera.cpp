@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
@@ -56,6 +57,11 @@ class Search {
 
   BodyCamera run() {
     const OverheadNumbers rough = look_by_rims();
+    if (centres_px_.size() < kFewest)
+      throw InputError(
+          fmt::format("{}: the body is seen in {} pictures, too few to tell a camera "
+                      "({} at least)",
+                      video_.string(), centres_px_.size(), kFewest));
     report(0.1);
     return refine(survey(rough));
   }
@@ -64,6 +70,7 @@ class Search {
   // Focal lengths of telephones and camcorders in widths of the picture: 0.7 to 2.5.
   static constexpr double kUsualFocal = 1.3, kFocalSigma = 0.5;
   static constexpr double kTurnSigma_rad = 0.0175;
+  static constexpr std::size_t kFewest = 8;  // pictures
   /// Part of the recording, as [from, to] in frames.
   struct Part {
     std::int64_t from, to;
@@ -75,6 +82,7 @@ class Search {
 
   [[nodiscard]] TrackResult track(const std::optional<OverheadNumbers>& numbers,
                                   const std::optional<Part>& part) const {
+    data::Scene scene = scene_;
     TrackOptions how;
     how.effort = Effort::quick;
     how.edges = numbers.has_value();
@@ -82,10 +90,11 @@ class Search {
     if (part) {
       how.from = fmt::format("f{}", part->from);
       how.to = fmt::format("f{}", part->to);
+      if (scene.tracking.at_px) scene.tracking.at_px = centres_px_.at(part->from);
     }
     std::optional<data::Camera> camera;
     if (numbers) camera = overhead_camera(*numbers, size_px_);
-    return track_video(video_, scene_, camera, how);
+    return track_video(video_, scene, camera, how);
   }
 
   /// Where the body is seen, and the scale its usual size tells: a few per cent off, since rims
@@ -93,10 +102,9 @@ class Search {
   OverheadNumbers look_by_rims() {
     const TrackResult seen = track(std::nullopt, std::nullopt);
     for (const data::TrackSample& sample : seen.file.tracks.front().samples)
-      frames_.push_back(sample.frame);
-    const double scale = usual_scale(seen);
+      centres_px_[sample.frame] = sample.centre_px;
     OverheadNumbers numbers = OverheadNumbers::Zero();
-    numbers[kLogScale] = std::log(scale);
+    numbers[kLogScale] = std::log(usual_scale(seen));
     numbers[kLogHeight] = prior_.log_height.value_or(prior_.log_focal - numbers[kLogScale]);
     return numbers;
   }
@@ -111,14 +119,34 @@ class Search {
       px += (sample.centre_px - middle_px).norm();
       m += sample.centre_m.norm();
     }
+    if (!(m > 0.0))
+      throw NumericalError(
+          fmt::format("{}: a body that never leaves the middle of the picture tells no camera",
+                      video_.string()));
     return px / m;
   }
 
-  /// Frames about the middle of those in which the body was seen.
-  [[nodiscard]] Part middle(std::int64_t count) const {
-    const std::int64_t at = frames_[frames_.size() / 2];
-    const std::int64_t from = std::max(frames_.front(), at - count / 2);
-    return {from, std::min(frames_.back(), from + count - 1)};
+  /// So many frames, or as many as there are, in which the body moves most: a body at rest shows
+  /// the same outline again and again.
+  [[nodiscard]] Part liveliest(std::int64_t count) const {
+    std::map<std::int64_t, double> way_px;  // up to each frame
+    double way = 0.0;
+    const Eigen::Vector2d* last = nullptr;
+    for (const auto& [frame, centre_px] : centres_px_) {
+      if (last != nullptr) way += (centre_px - *last).norm();
+      way_px[frame] = way;
+      last = &centre_px;
+    }
+    Part best{way_px.begin()->first, way_px.begin()->first};
+    double longest = -1.0;
+    for (const auto& [frame, before] : way_px) {
+      const auto end = std::prev(way_px.upper_bound(frame + count - 1));
+      if (end->second - before > longest) {
+        longest = end->second - before;
+        best = {frame, end->first};
+      }
+    }
+    return best;
   }
 
   /// How much of the outline is seen where a camera puts it: edges, each the less the farther off
@@ -131,7 +159,7 @@ class Search {
       for (const double residual : seen.edges->column("residual_px"))
         sum += std::max(0.0, 1.0 - std::pow(residual / kOff_px, 2));
       return sum;
-    } catch (const InputError&) {  // with this camera the body is not found
+    } catch (const Error&) {  // with this camera the body is not found
       return 0.0;
     }
   }
@@ -139,13 +167,13 @@ class Search {
   /// The best of a grid about the rough numbers. Where scale is off by more than a per cent or two,
   /// edges are taken for others, and no adjustment finds back.
   [[nodiscard]] OverheadNumbers survey(const OverheadNumbers& rough) const {
-    constexpr std::int64_t kFrames = 24;
-    constexpr int kEitherWay = 5;
-    constexpr double kStep = 0.02;
-    const Part part = middle(kFrames);
+    constexpr std::int64_t kFrames = 16;
+    constexpr int kSmaller = 6, kLarger = 3;  // shadows make bodies look large
+    constexpr double kStep = 0.025;
+    const Part part = liveliest(kFrames);
     std::vector<OverheadNumbers> tried;
     for (const double focal : prior_.log_height ? std::vector{0.0} : std::vector{-0.35, 0.35})
-      for (int i = -kEitherWay; i <= kEitherWay; ++i) {
+      for (int i = -kSmaller; i <= kLarger; ++i) {
         OverheadNumbers numbers = rough;
         numbers[kLogScale] += kStep * i;
         numbers[kLogHeight] += focal;
@@ -156,6 +184,11 @@ class Search {
                       [&](std::size_t i) { agreements[i] = agreement(tried[i], part); });
     report(0.5);
     const auto best = std::max_element(agreements.begin(), agreements.end());
+    if (!(*best > 0.0))
+      throw InputError(fmt::format(
+          "{}: under no camera that looks straight down the body is seen as large as it looks; "
+          "check radius_m and thickness_m{}",
+          video_.string(), options_.height_m ? ", and the camera's height" : ""));
     return tried[static_cast<std::size_t>(best - agreements.begin())];
   }
 
@@ -183,9 +216,9 @@ class Search {
   [[nodiscard]] BodyCamera refine(OverheadNumbers numbers) const {
     constexpr std::int64_t kFrames = 240;
     constexpr int kRounds = 6;
-    constexpr std::size_t kFewest = 8;
     constexpr double kSettled = 0.3;  // of its sigma
-    const Part part = middle(kFrames);
+    const Part part = liveliest(kFrames);
+    Eigen::Vector2d moved;
     OverheadFit fit{};
     std::size_t pictures = 0;
     for (int round = 0; round < kRounds; ++round) {
@@ -196,14 +229,25 @@ class Search {
             "{}: the outline of the body is seen well in {} pictures, too few to tell a camera "
             "({} at least)",
             video_.string(), pictures, kFewest));
-      fit = fit_overhead(*scene_.body, scene_.support, size_px_, prior_, numbers, std::move(seen));
-      const Eigen::Array2d moved = (fit.numbers - numbers).head<2>().array();
+      fit = adjusted(numbers, std::move(seen));
+      moved = (fit.numbers - numbers).head<2>();
       numbers = fit.numbers;
       report(0.5 + 0.5 * (round + 1) / kRounds);
-      if ((moved / fit.covariance.diagonal().head<2>().array().sqrt()).abs().maxCoeff() < kSettled)
-        break;
+      const Eigen::Array2d sigma = fit.covariance.diagonal().head<2>().array().sqrt();
+      if ((moved.array() / sigma).abs().maxCoeff() < kSettled) break;
     }
+    fit.covariance.topLeftCorner<2, 2>() += moved * moved.transpose();  // as far as it settled
     return told(fit, static_cast<int>(pictures));
+  }
+
+  [[nodiscard]] OverheadFit adjusted(const OverheadNumbers& numbers,
+                                     std::vector<SeenOutline> seen) const {
+    try {
+      return fit_overhead(*scene_.body, scene_.support, size_px_, prior_, numbers, std::move(seen));
+    } catch (const NumericalError& error) {
+      throw NumericalError(
+          fmt::format("{}: {}; give pictures of a board", video_.string(), error.what()));
+    }
   }
 
   [[nodiscard]] BodyCamera told(const OverheadFit& fit, int pictures) const {
@@ -218,9 +262,9 @@ class Search {
     constexpr double kWorst = 0.05;
     if (!(out.sigma_scale < kWorst))
       throw NumericalError(fmt::format(
-          "{}: the outlines tell the scale to {:.0f} % only; give pictures of a board, or the "
-          "camera's height",
-          video_.string(), 100.0 * out.sigma_scale));
+          "{}: the outlines tell the scale to {:.0f} % only; give pictures of a board{}",
+          video_.string(), 100.0 * out.sigma_scale,
+          options_.height_m ? "" : ", or the camera's height"));
     // f = scale * height, both focal lengths alike, and the shift along the line of sight.
     Eigen::Matrix<double, data::Camera::kNumbers, 4> by =
         Eigen::Matrix<double, data::Camera::kNumbers, 4>::Zero();
@@ -237,14 +281,18 @@ class Search {
   const BodyCameraOptions& options_;
   cv::Size size_px_;
   OverheadPrior prior_;
-  std::vector<std::int64_t> frames_;  ///< in which the body was seen
+  std::map<std::int64_t, Eigen::Vector2d> centres_px_;  ///< by the frame in which it was seen
 };
 
 }  // namespace
 
 void check_tells_a_camera(const data::Scene& scene) {
-  if (!(scene.body && scene.body->radius_m > 0.0))
-    throw InputError("[body] radius_m is missing: a body of known size tells the camera");
+  if (!(scene.body && scene.body->kind != data::BodyKind::top && scene.body->radius_m > 0.0))
+    throw InputError("[body] radius_m is missing: a disc or ring of known size tells the camera");
+  if (!(scene.body->thickness_m > 0.0))
+    throw InputError(
+        "[body] thickness_m is missing: how high its upper rim lies decides how large a body "
+        "looks");
   const data::SupportKind on = scene.support.kind;
   if (on != data::SupportKind::floor && on != data::SupportKind::flat)
     throw InputError(

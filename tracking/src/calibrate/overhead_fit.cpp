@@ -9,6 +9,7 @@
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
+#include "trochoid/data/parallel.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -200,7 +201,7 @@ class OverheadAdjustment {
   [[nodiscard]] Verdict heard(const std::vector<Say>& says) const {
     // What models of edges are wrong by: shadows lie beside all but the upper rim. Where blur or
     // gloss leaves edges off the outline, all of a part may be as far off.
-    constexpr double kRim_px = 0.1, kOther_px = 0.25;
+    constexpr double kRim_px = 0.1, kOther_px = 0.5;
     Eigen::Vector<double, kParts> edges_px =
         Eigen::Vector<double, kParts>::Constant(std::max(kOther_px, fit_.rms_px));
     edges_px[static_cast<Eigen::Index>(Edge::upper_rim)] = std::max(kRim_px, fit_.rms_px);
@@ -242,8 +243,8 @@ class OverheadAdjustment {
 
   /// One step of Gauss and Newton, no longer than its linearisation holds.
   OverheadNumbers step() {
-    std::vector<Linearised> pictures;
-    for (const SeenOutline& seen : seen_) pictures.push_back(linearised(seen));
+    std::vector<Linearised> pictures(seen_.size());
+    data::in_parallel(seen_.size(), 0, [&](std::size_t i) { pictures[i] = linearised(seen_[i]); });
     const double scatter_px = scatter_of(pictures);
     std::vector<Say> says;
     for (const Linearised& edges : pictures) says.push_back(say_of(edges, scatter_px));
