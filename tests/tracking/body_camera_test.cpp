@@ -127,13 +127,16 @@ TEST(CameraFromBody, ACircleDrawnFlatTellsTheScaleOfItsFace) {
   const fs::path clip = scratch / "puck.avi";
   constexpr double kRadius_px = 30.0;
   write_clip(clip, drawn_floor(320, 240, 90.0), 40, 1.0, [&](cv::Mat& picture, int i) {
-    draw_disc(picture, 60.0 + 5.0 * i, 90.0 + 1.3 * i, kRadius_px, kRadius_px, 0.0, 200.0);
+    // Ever faster: the part that is looked at does not begin where the body is pointed at.
+    draw_disc(picture, 50.0 + 2.0 * i + 0.06 * i * i, 90.0 + 1.3 * i, kRadius_px, kRadius_px, 0.0,
+              200.0);
   });
   data::Scene scene;
   scene.body = data::Body{};
   scene.body->radius_m = 0.02;
   scene.body->thickness_m = 1e-5;
   scene.support.kind = data::SupportKind::flat;
+  scene.tracking.at_px = Eigen::Vector2d(50.0, 90.0);
   double done = 0.0;
   BodyCameraOptions options;
   options.progress = [&](double share) {
@@ -163,6 +166,9 @@ TEST(CameraFromBody, ABodyThatTellsNoCameraIsRefused) {
   EXPECT_THROW(check_tells_a_camera(scene), InputError);
   scene.body = disc();
   EXPECT_NO_THROW(check_tells_a_camera(scene));
+  scene.body->thickness_m = 0.0;
+  EXPECT_THROW(check_tells_a_camera(scene), InputError);
+  scene.body = disc();
   scene.support.kind = data::SupportKind::none;
   EXPECT_THROW(check_tells_a_camera(scene), InputError);
   scene.support = {data::SupportKind::pivot, Eigen::Vector3d::Zero()};
@@ -173,6 +179,8 @@ TEST(CameraFromBody, ABodyThatTellsNoCameraIsRefused) {
 TEST(CameraFromBody, ARollingDiscTellsTheCameraThatFilmedIt) {
   const fs::path sample = fs::path(TROCHOID_SOURCE_DIR) / "data/samples/s1_disc_paper";
   data::Scene scene = data::read_scene(sample / "scene.toml");
+  scene.tracking.from = "f40";
+  scene.tracking.to = "f160";
   const data::Camera truth = data::read_camera(sample / "camera.json");
   BodyCameraOptions options;
   options.height_m = 1.2;
