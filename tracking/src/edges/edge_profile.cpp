@@ -74,6 +74,10 @@ bool read_line(const LightWindow& picture, const LightWindow& plate, const Cross
   const bool row = crossing.row;
   const Eigen::Vector2d &p = crossing.image_px, &n = crossing.normal_px;
   const double slope = std::abs(row ? n.x() : n.y()), along = row ? n.y() : n.x();
+  // Where an outline folds back its normals may cancel, and that of a body beside the lens is
+  // nowhere: numbers that are no pixels.
+  constexpr double kAcross = 0.05, kFar_px = 1e6;
+  if (!(slope > kAcross && p.cwiseAbs().maxCoeff() < kFar_px)) return false;
   const int way = (row ? n.x() : n.y()) > 0.0 ? 1 : -1;
   const double from = way * (row ? p.x() : p.y());
   const int line = static_cast<int>(std::lround(row ? p.y() : p.x()));
