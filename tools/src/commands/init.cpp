@@ -136,11 +136,10 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
   std::string text =
       "\n[camera]                   # without file or scale the radius gives the scale, roughly\n";
   text +=
-      "# file = \"camera.json\"     # from trochoid calibrate, which takes this recording too; "
-      "without "
-      "it metres are\n#                          # some per cent off, and a body that tilts is not "
-      "where "
-      "it seems\n";
+      "# file = \"camera.json\"     # from trochoid calibrate, which takes this recording too;\n"
+      "#                          # without it metres are some per cent off, and a body that "
+      "tilts\n"
+      "#                          # is not where it seems\n";
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
   const auto captured = seen.video.capture_rate_hz;
   if (rate_hz)

@@ -13,7 +13,6 @@
 #include "geometry/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
-#include "trochoid/data/quantile.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -252,7 +251,7 @@ class Search {
 
   [[nodiscard]] BodyCamera told(const OverheadFit& fit, int pictures) const {
     BodyCamera out;
-    out.camera = overhead_camera(fit.numbers, size_px_);
+    out.camera = overhead_camera(fit, size_px_);
     out.scale_px_per_m = std::exp(fit.numbers[kLogScale]);
     out.height_m = std::exp(fit.numbers[kLogHeight]);
     out.sigma_scale = std::sqrt(fit.covariance(kLogScale, kLogScale));
@@ -265,14 +264,6 @@ class Search {
           "{}: the outlines tell the scale to {:.0f} % only; give pictures of a board{}",
           video_.string(), 100.0 * out.sigma_scale,
           options_.height_m ? "" : ", or the camera's height"));
-    // f = scale * height, both focal lengths alike, and the shift along the line of sight.
-    Eigen::Matrix<double, data::Camera::kNumbers, 4> by =
-        Eigen::Matrix<double, data::Camera::kNumbers, 4>::Zero();
-    constexpr int kFx = 0, kFy = 1, kTurn = 9, kShiftZ = 14;
-    for (const int focal : {kFx, kFy}) by.row(focal).head<2>().setConstant(out.camera.fx);
-    by(kShiftZ, kLogHeight) = out.height_m;
-    by.block<2, 2>(kTurn, kTurnX).setIdentity();
-    out.camera.covariance = by * fit.covariance * by.transpose();
     return out;
   }
 

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "geometry/pose_motion.hpp"
@@ -16,7 +17,8 @@ namespace trochoid::tracking {
 namespace {
 
 using Edge = data::OutlinePoint::Edge;
-constexpr int kNumbers = 4, kParts = 5;  // of an outline
+constexpr int kNumbers = 4, kParts = 5;                   // of an outline
+constexpr int kFx = 0, kFy = 1, kTurn = 9, kShiftZ = 14;  // of Camera::Deviation
 
 /// Edges of one picture with the part of the outline that each belongs to.
 class MatchedEdges {
@@ -137,6 +139,7 @@ class OverheadAdjustment {
       const PoseMotion::Step step = by * PoseMotion::Step::Unit(motion.count(), k);
       out.by_pose.col(k) = (out.off_px - edges.off_px(motion.moved(seen.pose, step), here)) / by;
     }
+    // Height and turns: a few pixels beside the middle, nearly straight so far.
     const OverheadNumbers by(kShift_px / (scale * body_.radius_m), 0.05, 0.01, 0.01);
     out.by_numbers.resize(out.off_px.size(), kNumbers);
     for (int k = 0; k < kNumbers; ++k) {
@@ -263,6 +266,7 @@ class OverheadAdjustment {
   static double rms_of(const std::vector<Say>& says) {
     double squares_px2 = 0.0, weight = 0.0;
     for (const Say& say : says) squares_px2 += say.squares_px2, weight += say.weight;
+    if (!(weight > 0.0)) throw NumericalError("the outlines determine no camera");
     return std::sqrt(squares_px2 / weight);
   }
 
@@ -292,12 +296,23 @@ class OverheadAdjustment {
 }  // namespace
 
 data::Camera overhead_camera(const OverheadNumbers& numbers, const cv::Size& size_px) {
-  constexpr int kTurn = 9;  // of Camera::Deviation
   data::Camera::Deviation turn = data::Camera::Deviation::Zero();
   turn.segment<2>(kTurn) = numbers.segment<2>(kTurnX);
   return data::Camera::overhead(size_px.width, size_px.height, std::exp(numbers[kLogScale]),
                                 std::exp(numbers[kLogHeight]))
       .moved(turn);
+}
+
+data::Camera overhead_camera(const OverheadFit& fit, const cv::Size& size_px) {
+  data::Camera camera = overhead_camera(fit.numbers, size_px);
+  // f = scale * height, both focal lengths alike, and the shift along the line of sight.
+  Eigen::Matrix<double, data::Camera::kNumbers, kNumbers> by;
+  by.setZero();
+  for (const int focal : {kFx, kFy}) by.row(focal).head<2>().setConstant(camera.fx);
+  by(kShiftZ, kLogHeight) = std::exp(fit.numbers[kLogHeight]);
+  by.block<2, 2>(kTurn, kTurnX).setIdentity();
+  camera.covariance = by * fit.covariance * by.transpose();
+  return camera;
 }
 
 OverheadFit fit_overhead(const data::Body& body, const data::Support& support,

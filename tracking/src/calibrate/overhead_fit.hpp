@@ -39,6 +39,9 @@ struct OverheadFit {
   double rms_px = 0.0;  ///< of the edges about the outlines, outliers apart
 };
 
+/// The camera of a fit, with the covariance of its numbers.
+[[nodiscard]] data::Camera overhead_camera(const OverheadFit& fit, const cv::Size& size_px);
+
 /// Scale and height of an overhead camera from outlines of a body of known size, each with a pose
 /// of its own (bundle adjustment [Triggs2000] with the poses eliminated, Tukey's weights). The
 /// covariance takes the pictures for independent but not the edges of one, and allows for edges
