@@ -46,7 +46,7 @@ data::Scene top_scene(const Eigen::Vector2d& pivot_m = {0.0, 0.0}) {
   return scene;
 }
 
-data::Track track_of(const Planted& planted) {
+data::Track planted_track(const Planted& planted) {
   data::Scene scene = top_scene(planted.pivot_m);
   scene.model.drag_transverse_N_m_s = planted.drag.drag_transverse_N_m_s;
   scene.model.drag_spin_N_m_s = planted.drag.drag_spin_N_m_s;
@@ -87,7 +87,7 @@ data::Fit fit_one(const data::Track& track, const data::Scene& scene = top_scene
 }
 
 TEST(TopFit, FindsTheThesisCaseWithoutAGuess) {
-  const data::Fit result = fit_one(track_of({}));
+  const data::Fit result = fit_one(planted_track({}));
   ASSERT_TRUE(result.converged) << result.reason;
   EXPECT_EQ(result.start_path, "integral_matching");
   // 4 sigma of 3 numbers: once in 5000 seeds.
@@ -101,7 +101,7 @@ TEST(TopFit, FindsTheThesisCaseWithoutAGuess) {
 TEST(TopFit, NeedsNeitherCovarianceNorSceneNorAFirstTimeOfZero) {
   Planted planted;
   planted.with_covariance = false;
-  data::Track track = track_of(planted);
+  data::Track track = planted_track(planted);
   for (data::TrackSample& sample : track.samples) sample.t_s += 17.0;
   FitOptions options;
   options.model = "top";
@@ -120,7 +120,7 @@ TEST(TopFit, FollowsAClockwiseSpinAndAxesBelowTheHorizon) {
     planted.values["b_1_s"] = b;
     planted.values["a_1_s2"] = 0.3;  // swings past theta = pi/2
     planted.values["dphi_rad_s"] = 0.1;
-    const data::Fit result = fit_one(track_of(planted));
+    const data::Fit result = fit_one(planted_track(planted));
     ASSERT_TRUE(result.converged) << result.reason;
     EXPECT_LT(pull(result, "b_1_s", b), 4.0);
     EXPECT_LT(pull(result, "a_1_s2", 0.3), 4.0);
@@ -137,8 +137,8 @@ TEST(TopFit, FindsAPivotNobodyToldItAbout) {
   asked.free_pivot = true;
   data::Scene listed = top_scene();
   listed.fit.free = {"pivot_x_m", "pivot_y_m"};
-  for (const data::Fit& result :
-       {fit_one(track_of(planted), top_scene(), asked), fit_one(track_of(planted), listed)}) {
+  for (const data::Fit& result : {fit_one(planted_track(planted), top_scene(), asked),
+                                  fit_one(planted_track(planted), listed)}) {
     ASSERT_TRUE(result.converged) << result.reason;
     EXPECT_LT(pull(result, "pivot_x_m", 0.02), 4.0);
     EXPECT_LT(pull(result, "pivot_y_m", -0.03), 4.0);
@@ -191,7 +191,7 @@ TEST(TopFit, FindsAPivotFarFromWhereThePathSuggestsIt) {
     planted.pivot_m = l_m * one.pivot_over_l;
     FitOptions options;
     options.free_pivot = true;
-    const data::Fit result = fit_one(track_of(planted), top_scene(), options);
+    const data::Fit result = fit_one(planted_track(planted), top_scene(), options);
     ASSERT_TRUE(result.converged) << result.reason;
     EXPECT_LT(result.chi2 / result.dof, 1.3);
     EXPECT_LT(pull(result, "pivot_x_m", planted.pivot_m.x()), 4.0);
@@ -201,7 +201,7 @@ TEST(TopFit, FindsAPivotFarFromWhereThePathSuggestsIt) {
 }
 
 TEST(TopFit, ShrugsOffGlitches) {
-  data::Track track = track_of({});
+  data::Track track = planted_track({});
   for (std::size_t i = 7; i < track.samples.size(); i += 31) track.samples[i].centre_m.x() += 0.02;
   const data::Fit result = fit_one(track);
   ASSERT_TRUE(result.converged) << result.reason;
@@ -214,17 +214,17 @@ TEST(TopFit, SaysThatAShortTrackIsShort) {
   Planted planted;
   planted.duration_s = 3.0;  // a third of a nutation
   planted.samples = 90;
-  const data::Fit result = fit_one(track_of(planted));
+  const data::Fit result = fit_one(planted_track(planted));
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("nutation")));
 }
 
 TEST(TopFit, WidensTheErrorBarsOfCorrelatedResiduals) {
-  data::Track track = track_of({});
+  data::Track track = planted_track({});
   // Every error repeated over five samples: a fifth of the information.
   const data::Track exact = [] {
     Planted planted;
     planted.sigma_m = 1e-12;
-    return track_of(planted);
+    return planted_track(planted);
   }();
   for (std::size_t i = 0; i < track.samples.size(); ++i) {
     const std::size_t j = i - i % 5;
@@ -232,7 +232,7 @@ TEST(TopFit, WidensTheErrorBarsOfCorrelatedResiduals) {
         exact.samples[i].centre_m + (track.samples[j].centre_m - exact.samples[j].centre_m);
   }
   Planted plain;
-  const data::Fit white = fit_one(track_of(plain)), coloured = fit_one(track);
+  const data::Fit white = fit_one(planted_track(plain)), coloured = fit_one(track);
   ASSERT_TRUE(coloured.converged);
   EXPECT_LT(coloured.whiteness_p, 0.01);
   // sqrt(5) = 2.2 in the limit of many samples. Such steps are no autoregressive process; taken for
@@ -243,7 +243,7 @@ TEST(TopFit, WidensTheErrorBarsOfCorrelatedResiduals) {
 }
 
 TEST(TopFit, DerivesTheSpinOnlyFromWhatIsGiven) {
-  const data::Track track = track_of({});
+  const data::Track track = planted_track({});
   EXPECT_EQ(fit_one(track).find("omega_s_rad_s"), nullptr);
   data::Scene scene = top_scene();
   scene.fit.prior["I_kg_m2"] = {1.0, 0.01};
@@ -259,7 +259,7 @@ TEST(TopFit, DerivesTheSpinOnlyFromWhatIsGiven) {
 }
 
 TEST(TopFit, IsTheSameBitForBitWhenRepeated) {
-  const data::Track track = track_of({});
+  const data::Track track = planted_track({});
   const data::Fit first = fit_one(track), second = fit_one(track);
   for (std::size_t i = 0; i < first.parameters.size(); ++i)
     EXPECT_EQ(first.parameters[i].value, second.parameters[i].value) << first.parameters[i].name;
@@ -268,7 +268,7 @@ TEST(TopFit, IsTheSameBitForBitWhenRepeated) {
 TEST(TopFit, RefusesUnknownParameterNames) {
   data::Scene scene = top_scene();
   scene.fit.fixed["length"] = 0.1;
-  EXPECT_THROW((void)fit_one(track_of({}), scene), InputError);
+  EXPECT_THROW((void)fit_one(planted_track({}), scene), InputError);
 }
 
 // The search would try for nothing, and blame the body's dimensions.
@@ -277,7 +277,7 @@ TEST(TopFit, RefusesAFixedDragThatDrives) {
   scene.model.drag_spin_N_m_s = 1e-6;
   scene.fit.fixed["gamma3_1_s"] = -0.1;
   try {
-    (void)fit_one(track_of({}), scene);
+    (void)fit_one(planted_track({}), scene);
     FAIL() << "no complaint";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("[fit] fixed: gamma3_1_s = -0.1"));
@@ -288,7 +288,7 @@ TEST(TopFit, RefusesAFirstGuessForWhatTheModelDoesNotHave) {
   FitOptions options;
   options.start = {{"theta_rad", 1.0}, {"length_m", 0.1}};
   try {
-    (void)fit(std::vector{track_of({})}, top_scene(), options);
+    (void)fit(std::vector{planted_track({})}, top_scene(), options);
     ADD_FAILURE() << "no refusal";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("'length_m'; model 'top' has"));
@@ -297,12 +297,12 @@ TEST(TopFit, RefusesAFirstGuessForWhatTheModelDoesNotHave) {
 }
 
 TEST(TopFit, SaysOfATrackThatItIsTheTrack) {
-  data::Track track = track_of({});
+  data::Track track = planted_track({});
   track.samples.resize(2);
   EXPECT_THROW((void)fit(std::vector{track}, top_scene()), TrackError);
   FitOptions options;
   options.from = "1e6";
-  EXPECT_THROW((void)fit(std::vector{track_of({})}, top_scene(), options), TrackError);
+  EXPECT_THROW((void)fit(std::vector{planted_track({})}, top_scene(), options), TrackError);
 }
 
 // Without nutation the path is a circle whatever a, b and l are.
@@ -314,11 +314,11 @@ TEST(TopFit, AdmitsThatSteadyPrecessionHidesTheTop) {
   planted.values["b_1_s"] = b;
   planted.values["a_1_s2"] = b * rate - rate * rate * std::cos(theta);
   planted.duration_s = 20.0;
-  const data::Fit result = fit_one(track_of(planted));
+  const data::Fit result = fit_one(planted_track(planted));
   for (const char* name : {"a_1_s2", "b_1_s", "l_m"})
     EXPECT_FALSE(result.find(name)->identifiable) << name;
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("no nutation")));
-  EXPECT_TRUE(fit_one(track_of({})).find("l_m")->identifiable);
+  EXPECT_TRUE(fit_one(planted_track({})).find("l_m")->identifiable);
 }
 
 // Nutation of a tenth of a millimetre at thirty turns a second, in twice that noise: no integral
@@ -331,7 +331,7 @@ TEST(TopFit, FindsAFastTopByItsTremble) {
   planted.duration_s = 1.5;
   planted.samples = 361;
   planted.sigma_m = 2e-4;
-  const data::Fit result = fit_one(track_of(planted));
+  const data::Fit result = fit_one(planted_track(planted));
   ASSERT_TRUE(result.converged) << result.reason;
   EXPECT_LT(pull(result, "a_1_s2", a), kFar);
   EXPECT_LT(pull(result, "b_1_s", b), kFar);
@@ -407,7 +407,7 @@ DyingTop dying_top() {
 TEST(TopFit, TakesTheSpinFromAPriorToTellTheMoments) {
   data::Scene scene = top_scene();
   scene.fit.prior["omega_s_rad_s"] = {3.0, 0.03};
-  const data::Fit result = fit_one(track_of({}), scene);
+  const data::Fit result = fit_one(planted_track({}), scene);
   ASSERT_TRUE(result.converged) << result.reason;
   const data::FitParameter* ratio = result.find("I_over_Is");
   ASSERT_NE(ratio, nullptr);
@@ -423,23 +423,23 @@ TEST(TopFit, CombinesASpinKnownBeforehandWithThatOfTheMoments) {
   scene.body.emplace().kind = data::BodyKind::top;
   scene.fit.prior["I_kg_m2"] = {4e-4, 4e-6};
   scene.fit.prior["Is_kg_m2"] = {1e-4, 1e-9};
-  const data::Fit alone = fit_one(track_of({}), scene);
+  const data::Fit alone = fit_one(planted_track({}), scene);
   const data::FitParameter* spin = alone.find("omega_s_rad_s");
   ASSERT_NE(spin, nullptr);
   EXPECT_LT(pull(alone, "omega_s_rad_s", 3.0), kFar);
   scene.fit.prior["omega_s_rad_s"] = {3.0, spin->sigma};
-  const data::Fit both = fit_one(track_of({}), scene);
+  const data::Fit both = fit_one(planted_track({}), scene);
   EXPECT_NEAR(both.find("omega_s_rad_s")->value, 0.5 * (spin->value + 3.0), 1e-6);
   EXPECT_NEAR(both.find("omega_s_rad_s")->sigma, spin->sigma / std::sqrt(2.0), 1e-6);
   const auto contradicts = testing::Contains(testing::HasSubstr("contradict each other"));
   EXPECT_THAT(both.warnings, testing::Not(contradicts));
   scene.fit.prior["omega_s_rad_s"] = {4.0, 0.03};
-  EXPECT_THAT(fit_one(track_of({}), scene).warnings, contradicts);
+  EXPECT_THAT(fit_one(planted_track({}), scene).warnings, contradicts);
 }
 
 // Of a disc the moments are given about its centre, b has those about the pivot.
 TEST(TopFit, TellsTheSpinOfADiscByItsMomentsAboutThePivot) {
-  const data::Fit groups = fit_one(track_of({}));
+  const data::Fit groups = fit_one(planted_track({}));
   const double l_m = groups.find("l_m")->value;
   data::Scene scene = top_scene();
   data::Body& body = scene.body.emplace();
@@ -447,7 +447,7 @@ TEST(TopFit, TellsTheSpinOfADiscByItsMomentsAboutThePivot) {
   body.mass_kg = 0.1;
   body.I_kg_m2 = 2e-5;
   body.Is_kg_m2 = 3e-5;
-  const data::Fit result = fit_one(track_of({}), scene);
+  const data::Fit result = fit_one(planted_track({}), scene);
   const double ratio = (2e-5 + 0.1 * l_m * l_m) / 3e-5;
   EXPECT_NEAR(result.find("omega_s_rad_s")->value, ratio * result.find("b_1_s")->value,
               1e-6 * ratio);
@@ -462,7 +462,7 @@ TEST(TopFit, TellsMassAndSpinOfADiscByItsMomentsAlone) {
   body.radius_m = 0.05;
   body.I_kg_m2 = I_kg_m2 - mass_kg * l_m * l_m;
   body.Is_kg_m2 = 0.25;
-  const data::Fit result = fit_one(track_of({}), scene);
+  const data::Fit result = fit_one(planted_track({}), scene);
   EXPECT_LT(pull(result, "mass_kg", mass_kg), kFar);
   EXPECT_LT(pull(result, "omega_s_rad_s", I_kg_m2 / 0.25 * kThesis.at("b_1_s")), kFar);
 }
@@ -471,7 +471,7 @@ TEST(TopFit, TakesMomentsForThoseAboutThePivotWhereNoBodyIsGiven) {
   data::Scene scene = top_scene();
   scene.fit.prior = {
       {"mass_kg", {0.1, 1e-5}}, {"I_kg_m2", {1.0, 0.05}}, {"Is_kg_m2", {0.25, 1e-6}}};
-  const data::Fit result = fit_one(track_of({}), scene);
+  const data::Fit result = fit_one(planted_track({}), scene);
   EXPECT_NEAR(result.find("I_over_Is")->value, 4.0, 1e-9);
 }
 
@@ -479,7 +479,7 @@ TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
   data::Scene scene = top_scene();
   for (const auto& [name, value] : kThesis) scene.fit.fixed[name] = value;
   try {
-    (void)fit_one(track_of({}), scene);
+    (void)fit_one(planted_track({}), scene);
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("take one out of fixed"), std::string::npos)
@@ -490,22 +490,22 @@ TEST(TopFit, IsRefusedWhereEverythingIsFixed) {
 TEST(TopFit, KeepsALengthWithinItsBoundsThoughItLiesCloseToOne) {
   data::Scene scene = top_scene();
   scene.fit.bounds["l_m"] = {0.0, 0.1005};
-  const data::Fit result = fit_one(track_of({.sigma_m = 1e-4}), scene);
+  const data::Fit result = fit_one(planted_track({.sigma_m = 1e-4}), scene);
   ASSERT_TRUE(result.converged) << result.reason;
   EXPECT_LT(pull(result, "l_m", 0.1), kFar);
   scene.fit.bounds["l_m"] = {-std::numeric_limits<double>::infinity(), 0.1005};
   // A length has no other lower bound than 0: the same problem.
-  EXPECT_EQ(fit_one(track_of({.sigma_m = 1e-4}), scene).find("l_m")->value,
+  EXPECT_EQ(fit_one(planted_track({.sigma_m = 1e-4}), scene).find("l_m")->value,
             result.find("l_m")->value);
 }
 
 TEST(TopFit, TakesAFirstGuessOfAnArcByItsNumber) {
   FitOptions options;
   options.start = {{"theta_rad@0", 1.0}};
-  EXPECT_TRUE(fit_one(track_of({}), top_scene(), options).converged);
+  EXPECT_TRUE(fit_one(planted_track({}), top_scene(), options).converged);
   for (const char* wrong : {"theta_rad@", "theta_rad@x", "tilt@0"}) {
     options.start = {{wrong, 1.0}};
-    EXPECT_THROW((void)fit_one(track_of({}), top_scene(), options), InputError) << wrong;
+    EXPECT_THROW((void)fit_one(planted_track({}), top_scene(), options), InputError) << wrong;
   }
 }
 
@@ -516,7 +516,7 @@ TEST(TopFit, FindsADragThatTheSceneNamesWithNothing) {
   planted.values["gamma3_dry_1_s2"] = 0.2;
   planted.drag.drag_spin_dry_N_m = 1e-6;
   planted.sigma_m = 3e-4;
-  const data::Track track = track_of(planted);
+  const data::Track track = planted_track(planted);
   data::Scene scene = top_scene();
   data::Body& body = scene.body.emplace();
   body.kind = data::BodyKind::top;
@@ -635,7 +635,7 @@ TEST(TopFit, StepsAcrossThePole) {
   beside.start["phi_rad"] = 1.94;
   beside.start["dtheta_rad_s"] = -1.6;
   beside.start["dphi_rad_s"] = 508.0;
-  const data::Track track = track_of(planted);
+  const data::Track track = planted_track(planted);
   const data::Fit found = fit_one(track, scene), crossed = fit_one(track, scene, beside);
   ASSERT_TRUE(found.converged) << found.reason;
   ASSERT_TRUE(crossed.converged) << crossed.reason;
@@ -646,7 +646,7 @@ TEST(TopFit, StepsAcrossThePole) {
 
 // Whole turns of nutation a sample are not seen at evenly spaced times.
 TEST(TopFit, BelievesAFastTwinOnlyWhereNoSlowerOneIsAsGood) {
-  const data::Track track = track_of({});
+  const data::Track track = planted_track({});
   const data::Scene scene = top_scene();
   const auto predictor = model::make_predictor(scene);
   Problem problem = prepare(std::span(&track, 1), *predictor, scene, {});
