@@ -113,6 +113,20 @@ TEST(FitOverhead, AHeightByTapeIsHeldAndNarrowsTheScale) {
   EXPECT_LT(fit.covariance(kLogScale, kLogScale), 0.7 * alone.covariance(kLogScale, kLogScale));
 }
 
+// A tape that outweighs the outlines shows that it is wrong by what they tell without it.
+TEST(FitOverhead, OutlinesTellTheirOwnHeightBesideAWrongTape) {
+  for (const double tape_m : {kHeight_m, 5.0 * kHeight_m}) {
+    OverheadPrior prior = no_prior();
+    prior.focal_sigma = 0.5;
+    prior.log_height = std::log(tape_m);
+    const OverheadFit fit = fitted(rolling(0.2, 0.0, 3), prior);
+    EXPECT_NEAR(std::exp(fit.numbers[kLogHeight]) / tape_m, 1.0, 0.1);
+    EXPECT_NEAR(fit.own_log_height, std::log(kHeight_m), 2.0 * fit.own_height_sigma);
+    EXPECT_EQ(std::log(tape_m) - fit.own_log_height > 3.0 * fit.own_height_sigma,
+              tape_m > kHeight_m);
+  }
+}
+
 TEST(FitOverhead, EdgesBesideNoOutlineAreRefused) {
   std::vector<SeenOutline> seen = rolling(0.1, 0.0, 1);
   for (SeenOutline& each : seen)

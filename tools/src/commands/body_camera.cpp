@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -17,22 +18,51 @@
 namespace trochoid::tools {
 namespace {
 
+// A height by tape counts for more than what the outlines tell of it, whichever is wrong.
+void doubt_the_tape(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
+  constexpr double kContradicts = 3.0, kWidest = 0.4, kNarrowest = 5.0;
+  if (!(command.camera_height_mm > 0.0)) return;
+  const double widths = found.camera.fx / std::max(found.camera.width_px, found.camera.height_px);
+  if (found.apart_sigmas > kContradicts)
+    note(fmt::format(
+        "the outlines alone put the camera {:.3g} m above the floor ({:.3g} to {:.3g}), {:.1f} "
+        "sigmas "
+        "from --camera-height-mm; check that height (floor to lens), radius_m and thickness_m",
+        found.own_height_m, found.own_height_m * std::exp(-found.sigma_own_height),
+        found.own_height_m * std::exp(found.sigma_own_height), found.apart_sigmas));
+  else if (widths < kWidest || widths > kNarrowest)
+    note(
+        fmt::format("at --camera-height-mm {:g} the focal length is {:.2g} times the longer side "
+                    "of the picture, of "
+                    "most cameras 0.7 to 2.5; is it in mm, from floor to lens?",
+                    command.camera_height_mm, widths));
+}
+
+nlohmann::ordered_json summary(const BodyCameraCommand& command,
+                               const tracking::BodyCamera& found) {
+  nlohmann::ordered_json out{{"camera", command.output.string()},
+                             {"pictures", found.pictures},
+                             {"rms_px", found.rms_px},
+                             {"scale_px_per_m", found.scale_px_per_m},
+                             {"sigma_scale_px_per_m", found.sigma_scale * found.scale_px_per_m},
+                             {"height_m", found.height_m},
+                             {"sigma_height_m", found.sigma_height * found.height_m}};
+  if (command.camera_height_mm > 0.0) {
+    out["height_by_outlines_m"] = found.own_height_m;
+    out["sigma_height_by_outlines_m"] = found.sigma_own_height * found.own_height_m;
+  }
+  return out;
+}
+
 void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
-  const double sigma_scale = found.sigma_scale * found.scale_px_per_m;
-  if (command.json)
-    return print_json({{"camera", command.output.string()},
-                       {"pictures", found.pictures},
-                       {"rms_px", found.rms_px},
-                       {"scale_px_per_m", found.scale_px_per_m},
-                       {"sigma_scale_px_per_m", sigma_scale},
-                       {"height_m", found.height_m},
-                       {"sigma_height_m", found.sigma_height * found.height_m}});
+  doubt_the_tape(command, found);
+  if (command.json) return print_json(summary(command, found));
   fmt::print("{}: camera by the body's outline in {} pictures, rms {:.2f} px\n",
              command.output.string(), found.pictures, found.rms_px);
   const bool by_tape = command.camera_height_mm > 0.0;
   fmt::print("scale {} px/m on the floor, {:.3g} m above it ({:.3g} to {:.3g}){}\n",
-             value_words(found.scale_px_per_m, sigma_scale), found.height_m,
-             found.height_m * std::exp(-found.sigma_height),
+             value_words(found.scale_px_per_m, found.sigma_scale * found.scale_px_per_m),
+             found.height_m, found.height_m * std::exp(-found.sigma_height),
              found.height_m * std::exp(found.sigma_height),
              by_tape ? "" : "; a height by tape (--camera-height-mm) makes both better");
   fmt::print(

@@ -258,6 +258,12 @@ class Search {
     out.sigma_height = std::sqrt(fit.covariance(kLogHeight, kLogHeight));
     out.pictures = pictures;
     out.rms_px = fit.rms_px;
+    if (prior_.log_height) {
+      out.own_height_m = std::exp(fit.own_log_height);
+      out.sigma_own_height = fit.own_height_sigma;
+      out.apart_sigmas = std::abs(fit.own_log_height - *prior_.log_height) /
+                         std::hypot(fit.own_height_sigma, prior_.height_sigma);
+    }
     constexpr double kWorst = 0.05;
     if (!(out.sigma_scale < kWorst))
       throw NumericalError(fmt::format(

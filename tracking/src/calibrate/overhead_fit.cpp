@@ -226,8 +226,9 @@ class OverheadAdjustment {
             -inverse * turns};
   }
 
-  /// That, and what was known before.
-  [[nodiscard]] Verdict with_prior(const Verdict& outlines) const {
+  /// That, and what was known before, the height or not.
+  [[nodiscard]] Verdict with_prior(const Verdict& outlines,
+                                   const std::optional<double>& log_height) const {
     const double focal = std::pow(prior_.focal_sigma, -2);
     const Eigen::Vector2d both = Eigen::Vector2d::Ones(), seen = fit_.numbers.head<2>();
     const double turn = std::pow(prior_.turn_sigma_rad, 2);
@@ -235,10 +236,10 @@ class OverheadAdjustment {
         (outlines.covariance + turn * outlines.by_turns * outlines.by_turns.transpose()).inverse();
     Eigen::Matrix2d information = weight + focal * both * both.transpose();
     Eigen::Vector2d pull = weight * outlines.step + focal * (prior_.log_focal - seen.sum()) * both;
-    if (prior_.log_height) {
+    if (log_height) {
       const double height = std::pow(prior_.height_sigma, -2);
       information(kLogHeight, kLogHeight) += height;
-      pull[kLogHeight] += height * (*prior_.log_height - seen[kLogHeight]);
+      pull[kLogHeight] += height * (*log_height - seen[kLogHeight]);
     }
     const Eigen::Matrix2d covariance = information.inverse();
     return {covariance * pull, covariance, covariance * weight * outlines.by_turns};
@@ -252,8 +253,9 @@ class OverheadAdjustment {
     std::vector<Say> says;
     for (const Linearised& edges : pictures) says.push_back(say_of(edges, scatter_px));
     fit_.rms_px = rms_of(says);
-    const Verdict verdict = with_prior(heard(says));
+    const Verdict outlines = heard(says), verdict = with_prior(outlines, prior_.log_height);
     keep(verdict);
+    keep_own_height(with_prior(outlines, std::nullopt));
     constexpr double kMostScale = 0.1, kMostHeight = 0.3;
     const double share = 1.0 / std::max({std::abs(verdict.step[kLogScale]) / kMostScale,
                                          std::abs(verdict.step[kLogHeight]) / kMostHeight, 1.0});
@@ -275,6 +277,11 @@ class OverheadAdjustment {
     const Eigen::Matrix2d mixed = turn * verdict.by_turns;
     fit_.covariance << verdict.covariance, mixed, mixed.transpose(),
         turn * Eigen::Matrix2d::Identity();
+  }
+
+  void keep_own_height(const Verdict& alone) {
+    fit_.own_log_height = fit_.numbers[kLogHeight] + alone.step[kLogHeight];
+    fit_.own_height_sigma = std::sqrt(alone.covariance(kLogHeight, kLogHeight));
   }
 
   void move(const std::vector<Say>& says, const OverheadNumbers& by, double share) {

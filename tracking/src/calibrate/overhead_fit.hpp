@@ -37,6 +37,9 @@ struct OverheadFit {
   OverheadNumbers numbers;
   Eigen::Matrix4d covariance;
   double rms_px = 0.0;  ///< of the edges about the outlines, outliers apart
+  /// What outlines and focal length tell of the height, without what was known of it: logarithm
+  /// [m], near `numbers`, and its sigma.
+  double own_log_height = 0.0, own_height_sigma = 0.0;
 };
 
 /// The camera of a fit, with the covariance of its numbers.

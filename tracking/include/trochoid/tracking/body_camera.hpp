@@ -24,6 +24,9 @@ struct BodyCamera {
   double sigma_scale = 0.0, sigma_height = 0.0;  ///< relative
   int pictures = 0;                              ///< whose outlines were used
   double rms_px = 0.0;                           ///< of their edges about the outlines
+  /// Where a height was given: what the outlines tell of it on their own, its sigma relative, and
+  /// how many sigmas of both the two are apart.
+  double own_height_m = 0.0, sigma_own_height = 0.0, apart_sigmas = 0.0;
 };
 
 /// @throws InputError unless the scene's body has a size and lies on the floor or rolls on it.
