@@ -20,22 +20,22 @@ namespace {
 
 // A height by tape counts for more than what the outlines tell of it, whichever is wrong.
 void doubt_the_tape(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
-  constexpr double kContradicts = 3.0, kWidest = 0.4, kNarrowest = 5.0;
+  constexpr double kContradicts = 3.0;
+  constexpr double kWidest = 0.4, kNarrowest = 5.0;  // half and twice of what most cameras have
   if (!(command.camera_height_mm > 0.0)) return;
   const double widths = found.camera.fx / std::max(found.camera.width_px, found.camera.height_px);
   if (found.apart_sigmas > kContradicts)
     note(fmt::format(
         "the outlines alone put the camera {:.3g} m above the floor ({:.3g} to {:.3g}), {:.1f} "
-        "sigmas "
-        "from --camera-height-mm; check that height (floor to lens), radius_m and thickness_m",
+        "sigmas from --camera-height-mm; check that height (floor to lens), radius_m and "
+        "thickness_m",
         found.own_height_m, found.own_height_m * std::exp(-found.sigma_own_height),
         found.own_height_m * std::exp(found.sigma_own_height), found.apart_sigmas));
   else if (widths < kWidest || widths > kNarrowest)
-    note(
-        fmt::format("at --camera-height-mm {:g} the focal length is {:.2g} times the longer side "
-                    "of the picture, of "
-                    "most cameras 0.7 to 2.5; is it in mm, from floor to lens?",
-                    command.camera_height_mm, widths));
+    note(fmt::format(
+        "at --camera-height-mm {:g} the focal length is {:.2g} times the longer side of the "
+        "picture, of most cameras 0.7 to 2.5; is it in mm, from floor to lens?",
+        command.camera_height_mm, widths));
 }
 
 nlohmann::ordered_json summary(const BodyCameraCommand& command,
