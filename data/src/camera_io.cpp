@@ -72,6 +72,13 @@ Transfer transfer_of(const JsonReader& json) {
   json.fail("\"transfer\" must be sRGB or linear");
 }
 
+bool metres_by_radius(const JsonReader& json) {
+  const std::string by = json.text_or("metres_by", "calibration");
+  if (by != "calibration" && by != "body_radius")
+    json.fail("\"metres_by\" must be calibration or body_radius");
+  return by == "body_radius";
+}
+
 std::vector<Eigen::Index> numbers_named(const JsonReader& json, const char* key) {
   const nlohmann::json& names = json.at(key);
   if (!names.is_array() || names.empty())
@@ -216,6 +223,7 @@ Camera read_camera(const std::filesystem::path& path) {
                             *camera.exposure_fraction));
   }
   camera.transfer = transfer_of(json);
+  camera.metres_by_radius = metres_by_radius(json);
   if (json.has("covariance")) camera.covariance = covariance_of(json, "covariance");
   check_view(json, camera);
   return camera;
@@ -237,6 +245,7 @@ void write_camera(const Camera& camera, const std::filesystem::path& path) {
   if (camera.frame_rate_hz) json["fps"] = *camera.frame_rate_hz;
   if (camera.exposure_fraction) json["shutter_fraction_of_frame"] = *camera.exposure_fraction;
   if (camera.transfer == Transfer::linear) json["transfer"] = "linear";
+  if (camera.metres_by_radius) json["metres_by"] = "body_radius";
   json["pixel_convention"] = "centre of the top-left pixel is (0,0); x right, y down";
   if (camera.projection == Camera::Projection::orthographic) json["projection"] = "orthographic";
   json["fx"] = camera.fx;

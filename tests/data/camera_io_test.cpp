@@ -74,6 +74,16 @@ TEST(CameraFile, KeepsAnOrthographicCameraOrthographic) {
   EXPECT_EQ(read_camera(folder / "c.json").projection, Camera::Projection::orthographic);
 }
 
+TEST(CameraFile, KeepsThatItsMetresGoByABody) {
+  const TestFolder folder;
+  Camera camera = Camera::overhead(640, 480, 1000.0, 1.2);
+  for (const bool by_radius : {false, true}) {
+    camera.metres_by_radius = by_radius;
+    write_camera(camera, folder / "c.json");
+    EXPECT_EQ(read_camera(folder / "c.json").metres_by_radius, by_radius);
+  }
+}
+
 struct RefusedCamera {
   const char* name;
   std::string text;
@@ -105,6 +115,8 @@ INSTANTIATE_TEST_SUITE_P(
         RefusedCamera{"ShortRow", with("[1, 0, 0]", "[1, 0]"), "list of 3"},
         RefusedCamera{"UnknownCurve", with("\"linear\"", "\"log\""),
                       "\"transfer\" must be sRGB or linear"},
+        RefusedCamera{"UnknownMetres", with("\"linear\"", "\"linear\", \"metres_by\": \"eye\""),
+                      "\"metres_by\" must be calibration or body_radius"},
         RefusedCamera{"CentreFarOutside", with("406.3", "1e6"),
                       "\"cx\" = 1000000 lies so far outside a picture of 800 px"},
         RefusedCamera{"BelowTheFloor", with("0.62", "-0.62"), "above the floor"},

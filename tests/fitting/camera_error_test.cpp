@@ -12,6 +12,7 @@
 
 #include "common.hpp"
 #include "observe/camera_error.hpp"
+#include "observe/observed.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/model/predictor.hpp"
 #include "values_with.hpp"
@@ -230,6 +231,20 @@ TEST(CameraShifts, TurnAnglesAsRotationsDo) {
     EXPECT_NEAR(sign * shifts(row, 2), wanted[i][0], near) << i;
     EXPECT_NEAR(sign * shifts(row, 3) / sine, wanted[i][1], near) << i;
     EXPECT_NEAR(sign * shifts(row, 4), wanted[i][2], near) << i;
+  }
+}
+
+// A body that looked a per cent larger than it is made the camera see a per cent less of the floor.
+TEST_F(FilmedByAnUncertainCamera, APriorOnTheRadiusThatToldTheCameraIsOneOnAllLengths) {
+  const auto predictor = model::make_predictor(top());
+  for (const bool by_radius : {false, true}) {
+    camera_.metres_by_radius = by_radius;
+    data::Scene filmed = scene();
+    filmed.body->radius_m = 0.03;
+    filmed.fit.prior["radius_m"] = {0.03, 0.0003};
+    EXPECT_EQ(observed(*predictor, filmed, 0.01) != nullptr, by_radius);
+    EXPECT_EQ(filmed.fit.prior.contains(kScale), by_radius);
+    if (by_radius) EXPECT_NEAR(filmed.fit.prior.at(kScale).sigma, 0.01, 1e-9);
   }
 }
 

@@ -469,6 +469,17 @@ class Tracking {
     return on > off;
   }
 
+  /// Though it could stand on its rim, no frame shows that it leans.
+  [[nodiscard]] bool lies_throughout(const BodyPath& path) const {
+    constexpr double kClearly = 3.0;  // sigmas
+    return scene_.support.kind == data::SupportKind::floor && !path.frames.empty() &&
+           std::all_of(path.frames.begin(), path.frames.end(), [](const auto& frame) {
+             const auto& pose = frame.second.seen.pose;
+             return pose &&
+                    !(std::abs(std::sin(pose->pose.theta_rad)) > kClearly * pose->sigma_theta_rad);
+           });
+  }
+
   [[nodiscard]] static std::string note_about_scale(const data::Support& support) {
     const bool flat = support.kind == data::SupportKind::flat;
     const bool on_floor = flat || support.kind == data::SupportKind::floor;
@@ -476,10 +487,10 @@ class Tracking {
         "without a camera metres go by how large the body looks, with its shadow{}: off by more "
         "than the error bars say, which a camera file would mend{}",
         flat ? "" : ", and a body that tilts is not where the middle of its rim appears",
-        on_floor
-            ? "; of a camera that looks straight down `trochoid calibrate VIDEO --scene SCENE` "
-              "makes one from this very recording"
-            : "");
+        on_floor ? "; `trochoid calibrate VIDEO --scene SCENE` may make one from this very "
+                   "recording, if "
+                   "its camera looks straight down"
+                 : "");
   }
 
   TrackResult result() {
@@ -510,6 +521,11 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
+    if (!paths_.empty() && std::all_of(paths_.begin(), paths_.end(),
+                                       [&](const auto& path) { return lies_throughout(path); }))
+      result.file.notes.emplace_back(
+          "it lies on its face in every frame: with kind = \"flat\" under [support] a fit takes it "
+          "for a body that slides, not for one that rolls on its rim");
     if (!camera_ && has_shape(scene_))
       result.file.notes.push_back(note_about_scale(scene_.support));
     const WhatWasRead read{.frames = frames_,

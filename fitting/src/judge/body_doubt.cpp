@@ -35,7 +35,7 @@ const std::array<BodyQuantity, 7>& body_quantities() {
 }
 
 bool gave_the_scale(const data::Scene& scene, const std::string& name) {
-  return name == "radius_m" && scene.camera.file.empty() && !scene.camera.scale_px_per_m;
+  return name == "radius_m" && metres_by_radius(scene);
 }
 
 }  // namespace

@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 
 #include "observe/timing.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/io.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -118,12 +120,20 @@ const data::Prior& positive(const std::string& name, const data::Prior& prior) {
 
 }  // namespace
 
+bool metres_by_radius(const data::Scene& scene) {
+  const std::string& file = scene.camera.file;
+  if (scene.camera.scale_px_per_m) return false;
+  if (file.empty()) return true;
+  std::error_code ignored;  // a camera file may have gone since
+  return std::filesystem::is_regular_file(file, ignored) &&
+         data::read_camera(file).metres_by_radius;
+}
+
 std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene,
                                            double frame_s) {
   auto& prior = scene.fit.prior;
-  const bool from_radius = scene.camera.file.empty() && !scene.camera.scale_px_per_m;
   if (const auto radius = prior.find("radius_m");
-      radius != prior.end() && from_radius && scene.body && !prior.contains(kScale)) {
+      radius != prior.end() && scene.body && !prior.contains(kScale) && metres_by_radius(scene)) {
     const auto [value_m, sigma_m] = positive(radius->first, radius->second);
     prior[kScale] = {scene.body->radius_m / value_m,
                      scene.body->radius_m * sigma_m / (value_m * value_m)};

@@ -9,6 +9,10 @@ namespace trochoid::fitting {
 inline constexpr const char* kScale = "scale";                   ///< measured over true length
 inline constexpr const char* kTimeFactor = "frame_rate_factor";  ///< true over measured duration
 
+/// Whether the known radius of the body gave the metres: there was no camera and no scale, or only
+/// the camera that the body itself told.
+[[nodiscard]] bool metres_by_radius(const data::Scene& scene);
+
 /// What the way of measuring adds to a model, as further parameters (role observation):
 ///   scale               x_measured = scale * x; with [fit] free_scale, a prior on "scale", or a
 ///                       prior on radius_m when the known radius gave the metres;

@@ -13,7 +13,6 @@
 #include "common/value_words.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
-#include "trochoid/tracking/body_camera.hpp"
 
 namespace trochoid::tools {
 namespace {
@@ -60,10 +59,7 @@ void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
   fmt::print("{}: camera by the body's outline in {} pictures, rms {:.2f} px\n",
              command.output.string(), found.pictures, found.rms_px);
   const bool by_tape = command.camera_height_mm > 0.0;
-  fmt::print("scale {} px/m on the floor, {:.3g} m above it ({:.3g} to {:.3g}){}\n",
-             value_words(found.scale_px_per_m, found.sigma_scale * found.scale_px_per_m),
-             found.height_m, found.height_m * std::exp(-found.sigma_height),
-             found.height_m * std::exp(found.sigma_height),
+  fmt::print("{}{}\n", overhead_words(found),
              by_tape ? "" : "; a height by tape (--camera-height-mm) makes both better");
   fmt::print(
       "taken to look straight down, to about a degree, and its lens to be without distortion: "
@@ -71,6 +67,25 @@ void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
 }
 
 }  // namespace
+
+tracking::BodyCamera camera_by_body(const std::filesystem::path& video, const data::Scene& scene,
+                                    double height_mm) {
+  constexpr double kMm = 1e-3, kPercent = 100.0;
+  Progress progress("calibrate", "%");
+  tracking::BodyCameraOptions how;
+  if (height_mm > 0.0) how.height_m = kMm * height_mm;
+  how.progress = [&](double share) {
+    progress.update(static_cast<std::int64_t>(kPercent * share), 100);
+  };
+  return tracking::camera_from_body(video, scene, how);
+}
+
+std::string overhead_words(const tracking::BodyCamera& found) {
+  return fmt::format("scale {} px/m on the floor, {:.3g} m above it ({:.3g} to {:.3g})",
+                     value_words(found.scale_px_per_m, found.sigma_scale * found.scale_px_per_m),
+                     found.height_m, found.height_m * std::exp(-found.sigma_height),
+                     found.height_m * std::exp(found.sigma_height));
+}
 
 void calibrate_by_body(const BodyCameraCommand& command) {
   // The camera that the scene names is not read, and may be the one that is made.
@@ -80,17 +95,7 @@ void calibrate_by_body(const BodyCameraCommand& command) {
         fmt::format("{}: is read by this command; name another output", command.output.string()));
   const data::Scene scene = data::read_scene(command.scene);
   in_scene(command.scene.string(), [&] { tracking::check_tells_a_camera(scene); });
-  tracking::BodyCamera found;
-  {
-    Progress progress("calibrate", "%");
-    tracking::BodyCameraOptions how;
-    constexpr double kMm = 1e-3, kPercent = 100.0;
-    if (command.camera_height_mm > 0.0) how.height_m = kMm * command.camera_height_mm;
-    how.progress = [&](double share) {
-      progress.update(static_cast<std::int64_t>(kPercent * share), 100);
-    };
-    found = tracking::camera_from_body(command.video, scene, how);
-  }
+  const tracking::BodyCamera found = camera_by_body(command.video, scene, command.camera_height_mm);
   data::write_camera(found.camera, command.output);
   tell(command, found);
 }

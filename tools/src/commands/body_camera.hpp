@@ -1,5 +1,9 @@
 #pragma once
 #include <filesystem>
+#include <string>
+
+#include "trochoid/data/scene.hpp"
+#include "trochoid/tracking/body_camera.hpp"
 
 namespace trochoid::tools {
 
@@ -9,6 +13,13 @@ struct BodyCameraCommand {
   double camera_height_mm = 0.0;  ///< 0: not known
   bool json = false;
 };
+
+/// tracking::camera_from_body with progress on stderr. @param height_mm  as there, 0: not known.
+[[nodiscard]] tracking::BodyCamera camera_by_body(const std::filesystem::path& video,
+                                                  const data::Scene& scene, double height_mm = 0.0);
+
+/// "scale 1003 ± 12 px/m on the floor, 1.16 m above it (0.835 to 1.61)".
+[[nodiscard]] std::string overhead_words(const tracking::BodyCamera& found);
 
 /// Finds the camera, writes it and tells about it.
 /// @throws InputError, NumericalError: as tracking::camera_from_body.

@@ -18,6 +18,7 @@
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/validators.hpp"
+#include "draw/canvas.hpp"
 #include "draw/encoded_file.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -302,18 +303,17 @@ void draw_check(const CalibrateOptions& options, const Views& views, data::Camer
   (void)tracking::set_floor(camera, {view.board_m, view.image_px}, 0.0);
   cv::Mat picture;
   cv::cvtColor(views.pictures[shown], picture, cv::COLOR_GRAY2BGR);
-  const cv::Scalar blue(178, 114, 0), vermillion(0, 94, 213);
   for (std::size_t i = 0; i < view.image_px.size(); ++i) {
     const Eigen::Vector2d at = view.image_px[i];
     const Eigen::Vector2d there =
         camera.image_from_table<double>({view.board_m[i].x(), view.board_m[i].y(), 0.0});
     const Eigen::Vector2d tip = at + kEnlarged * (there - at);
-    cv::circle(picture, cv::Point2d(at.x(), at.y()), 4, blue, 1, cv::LINE_AA);
-    cv::line(picture, cv::Point2d(at.x(), at.y()), cv::Point2d(tip.x(), tip.y()), vermillion, 2,
-             cv::LINE_AA);
+    cv::circle(picture, cv::Point2d(at.x(), at.y()), 4, palette::blue, 1, cv::LINE_AA);
+    cv::line(picture, cv::Point2d(at.x(), at.y()), cv::Point2d(tip.x(), tip.y()),
+             palette::vermillion, 2, cv::LINE_AA);
   }
   cv::putText(picture, "residuals x 20", {12, picture.rows - 14}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
-              vermillion, 1, cv::LINE_AA);
+              palette::vermillion, 1, cv::LINE_AA);
   write_picture(picture, options.picture);
 }
 

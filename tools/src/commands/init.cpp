@@ -134,12 +134,9 @@ std::string support_words(const Inspection& seen) {
 
 std::string camera_words(const Inspection& seen, const std::optional<double>& rate_hz) {
   std::string text =
-      "\n[camera]                   # without file or scale the radius gives the scale, roughly\n";
+      "\n[camera]                   # without file or scale run takes it from the body's outline\n";
   text +=
-      "# file = \"camera.json\"     # from trochoid calibrate, which takes this recording too;\n"
-      "#                          # without it metres are some per cent off, and a body that "
-      "tilts\n"
-      "#                          # is not where it seems\n";
+      "# file = \"camera.json\"     # from trochoid calibrate; pictures of a board tell it best\n";
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
   const auto captured = seen.video.capture_rate_hz;
   if (rate_hz)

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "commands/body_camera.hpp"
 #include "common/fit_job.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
@@ -47,6 +48,7 @@ struct RunOptions {
 struct Run {
   data::Scene scene;
   std::optional<data::Camera> camera;
+  std::string camera_note;  ///< what the body told of it, or why it did not
   tracking::TrackResult tracked;
   std::optional<data::Fit> fit;
   std::string no_fit_reason;
@@ -86,12 +88,55 @@ Run prepared(const RunOptions& options) {
   return run;
 }
 
+bool wants_a_camera(const Run& run, const RunOptions& options) {
+  if (run.camera || run.scene.camera.scale_px_per_m) return false;
+  if (options.choices.effort == tracking::Effort::quick) return false;
+  try {
+    tracking::check_tells_a_camera(run.scene);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+// For want of a camera file the body's own outline tells the camera, if it can. What is wrong with
+// the recording itself is left to the tracker to say.
+std::optional<tracking::BodyCamera> told_by_body(const RunOptions& options, data::Scene scene,
+                                                 std::string& why_not) {
+  if (!options.choices.from.empty()) scene.tracking.from = options.choices.from;
+  if (!options.choices.to.empty()) scene.tracking.to = options.choices.to;
+  try {
+    return camera_by_body(options.inputs.video, scene);
+  } catch (const Error& error) {
+    why_not = error.what();
+    return std::nullopt;
+  }
+}
+
+void calibrate(Run& run, const RunOptions& options, const fs::path& folder) {
+  std::string why_not;
+  const auto found = told_by_body(options, run.scene, why_not);
+  if (!found) {
+    run.camera_note = "the body does not tell the camera: " + why_not;
+    return;
+  }
+  const fs::path file = folder / "camera.json";
+  data::write_camera(found->camera, file);
+  run.camera = data::read_camera(file);
+  run.scene.camera.file = file.string();
+  run.camera_note =
+      "no camera was given; one that looks straight down is taken from the body's own outline: " +
+      overhead_words(*found) +
+      "; pictures of a board or a height by tape (trochoid calibrate) tell it better";
+}
+
 void track(Run& run, const RunOptions& options) {
   Progress progress("track");
   tracking::TrackOptions how = track_options(run.scene, options.choices);
   how.progress = [&](std::int64_t done, std::int64_t total) { progress.update(done, total); };
   run.tracked = tracking::track_video(options.inputs.video, run.scene, run.camera, how);
   run.tracked.file.made_by = "trochoid " TROCHOID_VERSION;
+  if (!run.camera_note.empty()) run.tracked.file.notes.push_back(run.camera_note);
 }
 
 fs::path track_file(const RunOptions& options, const fs::path& folder) {
@@ -264,6 +309,7 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
                                    {"grade", verdict.grade},
                                    {"frames", run.tracked.summary.frames},
                                    {"found", run.tracked.summary.found},
+                                   {"notes", run.tracked.file.notes},
                                    {"times", run.times}};
     if (run.fit) {
       summary["model"] = run.fit->model;
@@ -283,6 +329,7 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
                    p.status == data::ParameterStatus::free      ? ""
                    : p.status == data::ParameterStatus::derived ? "   (derived)"
                                                                 : "   (from the prior)");
+  for (const std::string& note : run.tracked.file.notes) fmt::print("  note: {}\n", note);
   for (const std::string& remark : verdict.remarks) fmt::print("  note: {}\n", remark);
   fmt::print("Open {}\n", (folder / "report.html").string());
   fmt::print("also {}, {}{}\n", (folder / "overlay.mp4").string(), (folder / "path.png").string(),
@@ -311,6 +358,9 @@ void run(const RunOptions& options) {
   check_replaceable(folder_of(options),
                     {options.inputs.video, options.inputs.scene, options.inputs.camera});
   PendingFolder pending(folder_of(options));
+  if (wants_a_camera(run, options))
+    run.timed("calibrate",
+              [&] { pending.told_by_its_name([&] { calibrate(run, options, pending.path()); }); });
   run.timed("track", [&] { track(run, options); });
   pending.told_by_its_name([&] { keep_track(run, options, pending.path()); });
   run.timed("fit", [&] {

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/progress.hpp"
+#include "draw/canvas.hpp"
 #include "draw/encoded_file.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -16,7 +17,7 @@ namespace {
 constexpr int kSize_px = 640, kMargin_px = 40;
 constexpr double kFrameRate_hz = 30.0, kLongest_s = 20.0, kTail_s = 0.6;
 constexpr int kSubPixelBits = 4;  // sub-pixel bits of OpenCV's drawing functions
-const cv::Scalar kBlue(178, 114, 0), kVermillion(0, 94, 213), kGrey(200, 200, 200);
+const cv::Scalar kGrey(200, 200, 200);
 
 /// Table to picture, equal scales.
 class AnimationView {
@@ -67,9 +68,9 @@ void write_animation(const data::Table& trajectory, const std::filesystem::path&
     while (tail < row && t[tail] < now - kTail_s * speed) ++tail;
     cv::Mat picture = trace.clone();
     for (Eigen::Index i = tail; i < row; ++i)
-      cv::line(picture, view(x[i], y[i]), view(x[i + 1], y[i + 1]), kBlue, 2, cv::LINE_AA,
+      cv::line(picture, view(x[i], y[i]), view(x[i + 1], y[i + 1]), palette::blue, 2, cv::LINE_AA,
                kSubPixelBits);
-    cv::circle(picture, view(x[row], y[row]), 6 << kSubPixelBits, kVermillion, cv::FILLED,
+    cv::circle(picture, view(x[row], y[row]), 6 << kSubPixelBits, palette::vermillion, cv::FILLED,
                cv::LINE_AA, kSubPixelBits);
     cv::putText(picture, fmt::format("t = {:.2f} s", now), {12, kSize_px - 14},
                 cv::FONT_HERSHEY_SIMPLEX, 0.55, {0, 0, 0}, 1, cv::LINE_AA);

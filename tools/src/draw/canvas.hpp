@@ -13,6 +13,8 @@ inline const cv::Scalar black{0, 0, 0};
 inline const cv::Scalar orange{0, 159, 230};
 inline const cv::Scalar sky_blue{233, 180, 86};
 inline const cv::Scalar yellow{66, 228, 240};
+inline const cv::Scalar blue{178, 114, 0};
+inline const cv::Scalar vermillion{0, 94, 213};
 inline const cv::Scalar white{255, 255, 255};
 inline const cv::Scalar observed = sky_blue;
 inline const cv::Scalar predicted = orange;

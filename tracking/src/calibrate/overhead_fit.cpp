@@ -319,6 +319,7 @@ data::Camera overhead_camera(const OverheadFit& fit, const cv::Size& size_px) {
   by(kShiftZ, kLogHeight) = std::exp(fit.numbers[kLogHeight]);
   by.block<2, 2>(kTurn, kTurnX).setIdentity();
   camera.covariance = by * fit.covariance * by.transpose();
+  camera.metres_by_radius = true;
   return camera;
 }
 
