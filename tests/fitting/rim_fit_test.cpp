@@ -209,6 +209,21 @@ TEST(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
   }
 }
 
+// Metres that went by a radius 2 % too small make a path 2 % too short, of a body that is larger.
+TEST(RimFit, ARadiusThatAPriorCorrectsIsThatOfTheBodyAndOfThePath) {
+  constexpr double kTooSmall = 0.98;
+  Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const double radius_m = c.scene.body->radius_m;
+  c.scene.fit.prior["radius_m"] = {radius_m, 0.001 * radius_m};
+  c.scene.body->radius_m *= kTooSmall;
+  for (data::TrackSample& sample : c.track.samples) sample.centre_m *= kTooSmall;
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_NEAR(fit.noise_scale, 1.0, 0.15);
+  EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), 2.5);
+  EXPECT_LT(pull(fit, "w2_rad_s", 22.5526228988618), 2.5);
+  EXPECT_LT(pull(fit, "w3_rad_s", 3.0), 2.5);
+}
+
 // What is not known of the scale and of gravity are two things: their variances add up, and the
 // scale, which is kept, is known as well as before.
 TEST(RimFit, TheErrorsOfTwoPriorsAddUp) {

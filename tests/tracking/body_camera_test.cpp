@@ -204,5 +204,14 @@ TEST(CameraFromBody, ARollingDiscTellsTheCameraThatFilmedIt) {
   EXPECT_LT(found.sigma_scale, 0.01);
 }
 
+// Of a sixth of a round of its node line both ways to lean fit nearly as well, and the camera had
+// settled beside the wrong one.
+TEST(CameraFromBody, ARecordingTooShortToTellTheLeanIsRefused) {
+  const fs::path sample = fs::path(TROCHOID_SOURCE_DIR) / "data/samples/s1_disc_paper";
+  data::Scene scene = data::read_scene(sample / "scene.toml");
+  scene.tracking.to = "f25";
+  EXPECT_THROW(static_cast<void>(camera_from_body(sample / "video.mp4", scene)), NumericalError);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

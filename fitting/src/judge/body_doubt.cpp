@@ -41,9 +41,10 @@ bool gave_the_scale(const data::Scene& scene, const std::string& name) {
 }  // namespace
 
 void take_priors_for_given(data::Scene& scene) {
+  scale_by_radius(scene);
   for (const BodyQuantity& given : body_quantities())
     if (const auto prior = scene.fit.prior.find(given.name);
-        prior != scene.fit.prior.end() && scene.body && !gave_the_scale(scene, given.name))
+        prior != scene.fit.prior.end() && scene.body)
       given.set(scene, prior->second.value);
 }
 

@@ -129,15 +129,20 @@ bool metres_by_radius(const data::Scene& scene) {
          data::read_camera(file).metres_by_radius;
 }
 
+void scale_by_radius(data::Scene& scene) {
+  auto& prior = scene.fit.prior;
+  const auto radius = prior.find("radius_m");
+  if (radius == prior.end() || !scene.body || prior.contains(kScale) || !metres_by_radius(scene))
+    return;
+  const auto [value_m, sigma_m] = positive(radius->first, radius->second);
+  prior[kScale] = {scene.body->radius_m / value_m,
+                   scene.body->radius_m * sigma_m / (value_m * value_m)};
+}
+
 std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene,
                                            double frame_s) {
+  scale_by_radius(scene);
   auto& prior = scene.fit.prior;
-  if (const auto radius = prior.find("radius_m");
-      radius != prior.end() && scene.body && !prior.contains(kScale) && metres_by_radius(scene)) {
-    const auto [value_m, sigma_m] = positive(radius->first, radius->second);
-    prior[kScale] = {scene.body->radius_m / value_m,
-                     scene.body->radius_m * sigma_m / (value_m * value_m)};
-  }
   if (const auto rate = prior.find("frame_rate_hz"); rate != prior.end()) {
     const auto [value_hz, sigma_hz] = positive(rate->first, rate->second);
     const double assumed_hz = scene.camera.frame_rate_hz.value_or(value_hz);

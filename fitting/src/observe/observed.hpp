@@ -13,6 +13,10 @@ inline constexpr const char* kTimeFactor = "frame_rate_factor";  ///< true over 
 /// the camera that the body itself told.
 [[nodiscard]] bool metres_by_radius(const data::Scene& scene);
 
+/// Where it did and a prior says what that radius is, the prior on "scale" that follows, if there
+/// is none yet: of the body's radius, by which the metres went, over the prior's.
+void scale_by_radius(data::Scene& scene);
+
 /// What the way of measuring adds to a model, as further parameters (role observation):
 ///   scale               x_measured = scale * x; with [fit] free_scale, a prior on "scale", or a
 ///                       prior on radius_m when the known radius gave the metres;

@@ -87,6 +87,18 @@ std::string overhead_words(const tracking::BodyCamera& found) {
                      found.height_m * std::exp(found.sigma_height));
 }
 
+std::string way_to_a_camera(const data::Scene& scene) {
+  if (!scene.camera.file.empty() || scene.camera.scale_px_per_m) return {};
+  if (!(scene.body && scene.body->radius_m > 0.0)) return {};
+  try {
+    tracking::check_tells_a_camera(scene);
+    return "`trochoid calibrate VIDEO --scene SCENE` may make a camera file from this very "
+           "recording, if its camera looks straight down";
+  } catch (const InputError& error) {
+    return std::string("the body tells no camera: ") + error.what();
+  }
+}
+
 void calibrate_by_body(const BodyCameraCommand& command) {
   // The camera that the scene names is not read, and may be the one that is made.
   check_outputs({command.output}, {command.video});

@@ -21,6 +21,10 @@ struct BodyCameraCommand {
 /// "scale 1003 ± 12 px/m on the floor, 1.16 m above it (0.835 to 1.61)".
 [[nodiscard]] std::string overhead_words(const tracking::BodyCamera& found);
 
+/// How a recording whose scene names no camera may come by one, or why it cannot; empty where the
+/// scene says what the camera sees, or gives no body.
+[[nodiscard]] std::string way_to_a_camera(const data::Scene& scene);
+
 /// Finds the camera, writes it and tells about it.
 /// @throws InputError, NumericalError: as tracking::camera_from_body.
 void calibrate_by_body(const BodyCameraCommand& command);

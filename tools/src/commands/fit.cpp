@@ -132,16 +132,29 @@ void check_not_recording(const std::filesystem::path& output, const std::string&
                                  output.string(), track));
 }
 
+/// The camera file by which a track's metres go, as its header names it; empty: none.
+std::string camera_file_of(const data::TrackFile& file) {
+  const std::string name = file.camera.substr(0, file.camera.find(':'));
+  return name.ends_with(".json") ? name : "";
+}
+
 /// @param inputs  the files read.
 /// @param remarks  what they note about their tracks.
+/// @param cameras  of the tracks that were measured with one: what a scene without it leaves out.
 std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& inputs,
-                                     std::vector<std::string>& remarks) {
+                                     std::vector<std::string>& remarks,
+                                     std::vector<std::string>& cameras) {
   std::vector<data::Track> tracks;
   std::set<int> objects;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
     for (const data::Track& track : file.tracks) objects.insert(track.object);
     for (const std::string& line : file.notes) remarks.push_back(path + ": " + line);
+    if (const std::string camera = camera_file_of(file); !camera.empty())
+      cameras.push_back(fmt::format(
+          "{}: was measured with {}, which no scene names under [camera] file: what its "
+          "calibration leaves uncertain is in no error bar",
+          path, camera));
     add_track(inputs, path);
     add_recording(inputs, file.source, file.source_sha256, path);
     check_not_recording(command.output, path, file.source);
@@ -191,8 +204,8 @@ void run(const FitCommand& command) {
   check_outputs({command.output, timing_file(command.output)}, read);
   static_cast<void>(data::parse_window(command.options.from, command.options.to));
   Checksums inputs;
-  std::vector<std::string> remarks;
-  const std::vector<data::Track> tracks = read_tracks(command, inputs, remarks);
+  std::vector<std::string> remarks, cameras;
+  const std::vector<data::Track> tracks = read_tracks(command, inputs, remarks, cameras);
   data::Scene scene;
   if (!command.scene.empty()) {
     scene = load_scene(command.scene);
@@ -212,6 +225,7 @@ void run(const FitCommand& command) {
     fmt::print("{}", data::fit_text(fit, "fit"));
   else
     print(fit);
+  if (scene.camera.file.empty()) remarks.insert(remarks.end(), cameras.begin(), cameras.end());
   for (const std::string& line : remarks) note(line);
   if (!fit.converged)
     throw NotGood(

@@ -88,11 +88,9 @@ Run prepared(const RunOptions& options) {
   return run;
 }
 
-bool wants_a_camera(const Run& run, const RunOptions& options) {
-  if (run.camera || run.scene.camera.scale_px_per_m) return false;
-  if (options.choices.effort == tracking::Effort::quick) return false;
+bool tells_a_camera(const data::Scene& scene) {
   try {
-    tracking::check_tells_a_camera(run.scene);
+    tracking::check_tells_a_camera(scene);
     return true;
   } catch (const InputError&) {
     return false;
@@ -114,20 +112,24 @@ std::optional<tracking::BodyCamera> told_by_body(const RunOptions& options, data
 }
 
 void calibrate(Run& run, const RunOptions& options, const fs::path& folder) {
-  std::string why_not;
-  const auto found = told_by_body(options, run.scene, why_not);
-  if (!found) {
+  run.camera_note = run.camera ? "" : way_to_a_camera(run.scene);
+  const bool quick = options.choices.effort == tracking::Effort::quick;
+  if (run.camera_note.empty() || quick || !tells_a_camera(run.scene)) return;
+  run.timed("calibrate", [&] {
+    std::string why_not;
+    const auto found = told_by_body(options, run.scene, why_not);
     run.camera_note = "the body does not tell the camera: " + why_not;
-    return;
-  }
-  const fs::path file = folder / "camera.json";
-  data::write_camera(found->camera, file);
-  run.camera = data::read_camera(file);
-  run.scene.camera.file = file.string();
-  run.camera_note =
-      "no camera was given; one that looks straight down is taken from the body's own outline: " +
-      overhead_words(*found) +
-      "; pictures of a board or a height by tape (trochoid calibrate) tell it better";
+    if (!found) return;
+    const fs::path file = folder / "camera.json";
+    data::write_camera(found->camera, file);
+    run.camera = data::read_camera(file);
+    run.scene.camera.file = file.string();
+    run.camera_note = fmt::format(
+        "no camera was given; one that looks straight down is taken from the body's own outline "
+        "(rms {:.2f} px): {}; pictures of a board or a height by tape (trochoid calibrate) tell it "
+        "better",
+        found->rms_px, overhead_words(*found));
+  });
 }
 
 void track(Run& run, const RunOptions& options) {
@@ -358,9 +360,7 @@ void run(const RunOptions& options) {
   check_replaceable(folder_of(options),
                     {options.inputs.video, options.inputs.scene, options.inputs.camera});
   PendingFolder pending(folder_of(options));
-  if (wants_a_camera(run, options))
-    run.timed("calibrate",
-              [&] { pending.told_by_its_name([&] { calibrate(run, options, pending.path()); }); });
+  pending.told_by_its_name([&] { calibrate(run, options, pending.path()); });
   run.timed("track", [&] { track(run, options); });
   pending.told_by_its_name([&] { keep_track(run, options, pending.path()); });
   run.timed("fit", [&] {
@@ -378,10 +378,10 @@ void run(const RunOptions& options) {
 
 std::shared_ptr<RunOptions> add_options(CLI::App& command) {
   auto options = std::make_shared<RunOptions>();
-  add_track_options(
-      command, options->inputs, options->choices,
-      "quick: fewer edges, one model; normal: compare models; exact: all edges, also profile "
-      "likelihoods and bootstrap");
+  add_track_options(command, options->inputs, options->choices,
+                    "quick: fewer edges, no camera from the outline, one model; normal: compare "
+                    "models; exact: all edges, also profile "
+                    "likelihoods and bootstrap");
   command.add_option("-o,--output", options->output,
                      "Folder to make (default: VIDEO's name with .trochoid)");
   command
@@ -422,7 +422,8 @@ void add_run_command(CLI::App& app) {
   const auto options = add_options(*command);
   command->footer(
       "Example:\n  trochoid run ring.mp4 --scene ring.toml\nwrites ring.trochoid/; open "
-      "ring.trochoid/report.html");
+      "ring.trochoid/report.html. Without a camera it takes one that looks straight "
+      "down from the outline of the body.");
   command->callback([options] { run(*options); });
 }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "commands/body_camera.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
@@ -99,6 +100,8 @@ void run(const TrackCommandOptions& options) {
     result = tracking::track_video(inputs.video, scene, camera, how);
   }
   result.file.made_by = "trochoid " TROCHOID_VERSION;
+  if (std::string way = camera ? "" : way_to_a_camera(scene); !way.empty())
+    result.file.notes.push_back(std::move(way));
   data::write_track(result.file, options.output);
   if (result.edges) data::write_table(*result.edges, options.edges);
   std::optional<tracking::SmoothTrack> smoothed;

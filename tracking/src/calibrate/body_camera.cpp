@@ -11,6 +11,7 @@
 
 #include "calibrate/overhead_fit.hpp"
 #include "geometry/pose_motion.hpp"
+#include "pose/pose_start.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 #include "trochoid/tracking/frame_source.hpp"
@@ -236,7 +237,24 @@ class Search {
       if ((moved.array() / sigma).abs().maxCoeff() < kSettled) break;
     }
     fit.covariance.topLeftCorner<2, 2>() += moved * moved.transpose();  // as far as it settled
+    refuse_mirrored(fit, outlines(track(fit.numbers, part), fit.numbers));
     return told(fit, static_cast<int>(pictures));
+  }
+
+  /// A body leaning one way looks nearly like one that leans the other way. In a recording too
+  /// short to tell, a camera may settle beside mirrored poses; the outlines then fit the others
+  /// better.
+  void refuse_mirrored(const OverheadFit& fit, std::vector<SeenOutline> seen) const {
+    constexpr double kClearly = 0.85;  // of the rms: 0.7 to 0.8 where it was so, else 0.92 and more
+    const data::Camera camera = overhead_camera(fit.numbers, size_px_);
+    const PoseMotion motion(*scene_.body, scene_.support, camera);
+    for (SeenOutline& one : seen) one.pose = mirrored(camera, motion, one.pose);
+    if (adjusted(fit.numbers, std::move(seen)).rms_px < kClearly * fit.rms_px)
+      throw NumericalError(
+          fmt::format("{}: too short to tell which way the body leans, and a camera hangs on that; "
+                      "give more of "
+                      "the recording{}, or pictures of a board",
+                      video_.string(), options_.height_m ? "" : ", the camera's height"));
   }
 
   [[nodiscard]] OverheadFit adjusted(const OverheadNumbers& numbers,
