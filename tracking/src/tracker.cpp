@@ -524,8 +524,7 @@ class Tracking {
                                        [&](const auto& path) { return lies_throughout(path); }))
       result.file.notes.emplace_back(
           "it is not seen to lean, as if it lay on its face: with kind = \"flat\" under [support] "
-          "a "
-          "fit takes it for a body that slides, not for one that rolls on its rim");
+          "a fit takes it for a body that slides, not for one that rolls on its rim");
     if (!camera_ && has_shape(scene_))
       result.file.notes.push_back(note_about_scale(scene_.support));
     const WhatWasRead read{.frames = frames_,

@@ -380,8 +380,7 @@ std::shared_ptr<RunOptions> add_options(CLI::App& command) {
   auto options = std::make_shared<RunOptions>();
   add_track_options(command, options->inputs, options->choices,
                     "quick: fewer edges, no camera from the outline, one model; normal: compare "
-                    "models; exact: all edges, also profile "
-                    "likelihoods and bootstrap");
+                    "models; exact: all edges, also profile likelihoods and bootstrap");
   command.add_option("-o,--output", options->output,
                      "Folder to make (default: VIDEO's name with .trochoid)");
   command

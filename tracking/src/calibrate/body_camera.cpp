@@ -12,6 +12,7 @@
 #include "calibrate/overhead_fit.hpp"
 #include "geometry/pose_motion.hpp"
 #include "pose/pose_start.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
 #include "trochoid/tracking/frame_source.hpp"
@@ -241,20 +242,35 @@ class Search {
     return told(fit, static_cast<int>(pictures));
   }
 
+  /// How far the axis went round the vertical, there and back counted as nothing.
+  static double turned_rad(const std::vector<SeenOutline>& seen) {
+    double turned = 0.0;
+    for (std::size_t i = 1; i < seen.size(); ++i)
+      turned += std::remainder(seen[i].pose.phi_rad - seen[i - 1].pose.phi_rad, data::kTurn);
+    return std::abs(turned);
+  }
+
   /// A body leaning one way looks nearly like one that leans the other way. In a recording too
   /// short to tell, a camera may settle beside mirrored poses; the outlines then fit the others
-  /// better.
+  /// better. In longer ones, where a wrong thickness may do the same, the tracker tells the two by
+  /// how the axis goes round.
   void refuse_mirrored(const OverheadFit& fit, std::vector<SeenOutline> seen) const {
+    if (turned_rad(seen) > 0.5 * data::kTurn) return;
     constexpr double kClearly = 0.85;  // of the rms: 0.7 to 0.8 where it was so, else 0.92 and more
     const data::Camera camera = overhead_camera(fit.numbers, size_px_);
     const PoseMotion motion(*scene_.body, scene_.support, camera);
     for (SeenOutline& one : seen) one.pose = mirrored(camera, motion, one.pose);
-    if (adjusted(fit.numbers, std::move(seen)).rms_px < kClearly * fit.rms_px)
-      throw NumericalError(
-          fmt::format("{}: too short to tell which way the body leans, and a camera hangs on that; "
-                      "give more of "
-                      "the recording{}, or pictures of a board",
-                      video_.string(), options_.height_m ? "" : ", the camera's height"));
+    double rms_px = 0.0;
+    try {
+      rms_px = adjusted(fit.numbers, std::move(seen)).rms_px;
+    } catch (const NumericalError&) {  // nothing is outlined like that
+      return;
+    }
+    if (rms_px < kClearly * fit.rms_px)
+      throw NumericalError(fmt::format(
+          "{}: too short to tell which way the body leans, and a camera hangs on that; give more "
+          "of the recording{}, or pictures of a board",
+          video_.string(), options_.height_m ? "" : ", the camera's height"));
   }
 
   [[nodiscard]] OverheadFit adjusted(const OverheadNumbers& numbers,
