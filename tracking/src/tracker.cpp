@@ -474,8 +474,8 @@ class Tracking {
     constexpr double kClearly = 3.0;  // sigmas
     constexpr double kByChance = 0.05;
     if (scene_.support.kind != data::SupportKind::floor || path.frames.empty()) return false;
-    const auto leaning =
-        std::count_if(path.frames.begin(), path.frames.end(), [](const auto& frame) {
+    const auto leaning = std::count_if(
+        path.frames.begin(), path.frames.end(), [](const BodyPath::Frames::value_type& frame) {
           const auto& pose = frame.second.seen.pose;
           return !pose ||
                  std::abs(std::sin(pose->pose.theta_rad)) > kClearly * pose->sigma_theta_rad;
