@@ -34,10 +34,6 @@ const std::array<BodyQuantity, 7>& body_quantities() {
   return all;
 }
 
-bool gave_the_scale(const data::Scene& scene, const std::string& name) {
-  return name == "radius_m" && metres_by_radius(scene);
-}
-
 }  // namespace
 
 void take_priors_for_given(data::Scene& scene) {
@@ -123,7 +119,8 @@ std::vector<Doubt> body_doubts(const Problem& problem, const Eigen::VectorXd& u,
   std::optional<Linearised> all;
   for (const BodyQuantity& given : body_quantities()) {
     const auto prior = scene.fit.prior.find(given.name);
-    if (prior == scene.fit.prior.end() || !scene.body || gave_the_scale(scene, given.name) ||
+    if (prior == scene.fit.prior.end() || !scene.body ||
+        (prior->first == "radius_m" && metres_by_radius(scene)) ||
         problem.predictor->index_of(given.name) >= 0)
       continue;
     if (!all) all = linearise(problem, u);

@@ -7,7 +7,8 @@
 
 namespace trochoid::fitting {
 
-/// Gives body and gravity of a scene the values of the priors stated on them.
+/// Gives body and gravity of a scene the values of the priors stated on them; where a radius gave
+/// the metres, the scale that follows gets its own (scale_by_radius).
 void take_priors_for_given(data::Scene& scene);
 
 /// Something the model takes for given that is known to a prior's standard deviation only.

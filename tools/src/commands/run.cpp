@@ -88,15 +88,6 @@ Run prepared(const RunOptions& options) {
   return run;
 }
 
-bool tells_a_camera(const data::Scene& scene) {
-  try {
-    tracking::check_tells_a_camera(scene);
-    return true;
-  } catch (const InputError&) {
-    return false;
-  }
-}
-
 // For want of a camera file the body's own outline tells the camera, if it can. What is wrong with
 // the recording itself is left to the tracker to say.
 std::optional<tracking::BodyCamera> told_by_body(const RunOptions& options, data::Scene scene,
@@ -114,7 +105,7 @@ std::optional<tracking::BodyCamera> told_by_body(const RunOptions& options, data
 void calibrate(Run& run, const RunOptions& options, const fs::path& folder) {
   run.camera_note = run.camera ? "" : way_to_a_camera(run.scene);
   const bool quick = options.choices.effort == tracking::Effort::quick;
-  if (run.camera_note.empty() || quick || !tells_a_camera(run.scene)) return;
+  if (run.camera_note.empty() || quick) return;
   run.timed("calibrate", [&] {
     std::string why_not;
     const auto found = told_by_body(options, run.scene, why_not);

@@ -222,9 +222,11 @@ class Search {
     Eigen::Vector2d moved;
     OverheadFit fit{};
     std::size_t pictures = 0;
+    double turned = 0.0;
     for (int round = 0; round < kRounds; ++round) {
       std::vector<SeenOutline> seen = outlines(track(numbers, part), numbers);
       pictures = seen.size();
+      turned = turned_rad(seen);
       if (pictures < kFewest)
         throw NumericalError(fmt::format(
             "{}: the outline of the body is seen well in {} pictures, too few to tell a camera "
@@ -238,7 +240,8 @@ class Search {
       if ((moved.array() / sigma).abs().maxCoeff() < kSettled) break;
     }
     fit.covariance.topLeftCorner<2, 2>() += moved * moved.transpose();  // as far as it settled
-    refuse_mirrored(fit, outlines(track(fit.numbers, part), fit.numbers));
+    if (turned < 0.5 * data::kTurn)
+      refuse_mirrored(fit, outlines(track(fit.numbers, part), fit.numbers));
     return told(fit, static_cast<int>(pictures));
   }
 
@@ -255,7 +258,6 @@ class Search {
   /// better. In longer ones, where a wrong thickness may do the same, the tracker tells the two by
   /// how the axis goes round.
   void refuse_mirrored(const OverheadFit& fit, std::vector<SeenOutline> seen) const {
-    if (turned_rad(seen) > 0.5 * data::kTurn) return;
     constexpr double kClearly = 0.85;  // of the rms: 0.7 to 0.8 where it was so, else 0.92 and more
     const data::Camera camera = overhead_camera(fit.numbers, size_px_);
     const PoseMotion motion(*scene_.body, scene_.support, camera);
