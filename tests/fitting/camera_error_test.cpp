@@ -219,7 +219,7 @@ TEST(CameraShifts, TurnAnglesAsRotationsDo) {
   std::vector<ArcData> arcs{make_arc(track, 0, static_cast<int>(wanted.size()),
                                      {.position = true, .theta = true, .phi = true, .psi = true},
                                      false)};
-  note_camera_shifts(camera, {}, arcs);
+  note_camera_shifts(camera, {}, false, arcs);
   ASSERT_EQ(arcs[0].camera_shifts.size(), 1U);
   const CameraShifts& shifts = arcs[0].camera_shifts[0];
   const double sign = shifts(0, 2) * wanted[0][0] > 0.0 ? 1.0 : -1.0;  // of a deviation: either

@@ -29,7 +29,7 @@ data::Body disc() {
 }
 
 OverheadNumbers numbers(double scale_px_per_m, double height_m) {
-  return {std::log(scale_px_per_m), std::log(height_m), 0.0, 0.0};
+  return {std::log(scale_px_per_m), std::log(height_m), 0.0, 0.0, 0.0};
 }
 
 // As little as can be known of a camera.

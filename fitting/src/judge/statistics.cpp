@@ -10,6 +10,7 @@
 
 #include "judge/directions.hpp"
 #include "observe/camera_error.hpp"
+#include "observe/camera_off.hpp"
 #include "observe/decompositions.hpp"
 #include "observe/smoothing.hpp"
 #include "problem/linearise.hpp"
@@ -26,6 +27,7 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   const ArcData& arc = problem.arcs[std::max(0, parameter.arc)];
   const double duration = std::max(arc.duration_s(), 1e-9);
   if (info.unit == "rad") return 1.0;
+  if (info.unit == kDeviations) return 3.0;  // deviations are hardly ever larger
   // A loss that came out as nothing is known if its error is small against the given value's.
   if (info.logarithmic) return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});
   if (info.unit == "s")  // a clock's error is known if it is known to a frame
@@ -213,7 +215,7 @@ Noise noise_of(const Problem& problem, const Linearised& all, const Eigen::Matri
       result.whiteness.correlation_time_s = one.correlation_time_s;
     }
   }
-  found.of_camera = camera_offsets(problem, all);
+  if (!problem.frees_camera()) found.of_camera = camera_offsets(problem, all);
   return found;
 }
 

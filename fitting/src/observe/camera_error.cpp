@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "observe/outline_shift.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/pose.hpp"
@@ -41,10 +43,13 @@ Eigen::Vector3d turn_between(const Eigen::Matrix<double, 2, 3>& before,
   return (slope.transpose() * slope).ldlt().solve(slope.transpose() * wanted).head<3>();
 }
 
+bool can_see(const Camera& camera, const Eigen::Vector3d& here) {
+  return camera.projection == Camera::Projection::orthographic || camera.depth_m(here) > 0.0;
+}
+
 // None of a place that the camera cannot have seen: another tool's slip, which a fit gives up.
 Shift shift_between(const Camera& camera, const Camera& moved, const Eigen::Vector3d& here) {
-  if (camera.projection == Camera::Projection::perspective && !(camera.depth_m(here) > 0.0))
-    return {};
+  if (!can_see(camera, here)) return {};
   try {
     const Eigen::Vector3d there =
         moved.table_from_image(camera.image_from_table<double>(here), here.z());
@@ -103,10 +108,11 @@ std::vector<Seen> seen_in(const ArcData& arc, const data::Scene& scene) {
   return out;
 }
 
+constexpr double kLeastSine = 0.02;  // nearly flat bodies: their azimuth means nothing
+
 // A turn of R = Rz(phi) Rx(theta) Rz(psi) by w: dtheta is its part along the node line, and of the
 // rest spin takes what precession cannot; all of it where no precession was read.
 Eigen::Matrix<double, 1, 5> row_of(const Shift& shift, const Seen& seen) {
-  constexpr double kLeastSine = 0.02;  // nearly flat bodies: their azimuth means nothing
   const double theta = seen.theta.value_or(0.0), phi = seen.phi.value_or(0.0);
   const Eigen::Vector2d node(std::cos(phi), std::sin(phi));
   const Eigen::Vector2d across(-node.y(), node.x());
@@ -120,13 +126,69 @@ Eigen::Matrix<double, 1, 5> row_of(const Shift& shift, const Seen& seen) {
   return out / kPart;
 }
 
-CameraShifts shifts_by(const Camera& camera, const Camera& moved, const std::vector<Seen>& seen,
-                       std::size_t step) {
-  CameraShifts out = CameraShifts::Zero(std::ssize(seen), 5);
-  for (std::size_t i = 0; i < seen.size(); i += step)
-    out.row(static_cast<Eigen::Index>(i)) =
-        row_of(shift_between(camera, moved, seen[i].place_m), seen[i]);
+bool has_outline(const data::Scene& scene, const Seen& seen) {
+  return scene.body && scene.body->kind != data::BodyKind::top && scene.body->radius_m > 0.0 &&
+         (scene.support.kind == data::SupportKind::flat || (seen.theta && seen.phi));
+}
+
+// What each of some cameras shifts a sample by. A known outline does not only turn, it looks larger
+// or smaller as well; spin takes what is left of the turn about the axis.
+std::vector<Eigen::Matrix<double, 1, 5>> rows_of(const data::Scene& scene, const Camera& camera,
+                                                 const std::vector<Camera>& moved,
+                                                 const Seen& seen) {
+  std::vector<Eigen::Matrix<double, 1, 5>> rows;
+  std::vector<Shift> shifts;
+  for (const Camera& other : moved) {
+    shifts.push_back(shift_between(camera, other, seen.place_m));
+    rows.push_back(row_of(shifts.back(), seen));
+  }
+  if (!has_outline(scene, seen) || !can_see(camera, seen.place_m)) return rows;
+  const data::Pose<> pose{seen.place_m, seen.theta.value_or(0.0), seen.phi.value_or(0.0)};
+  const auto by_outline = outline_shifts(scene, pose, camera, moved);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k].head<2>() = by_outline[k].place_m.transpose() / kPart;
+    if (scene.support.kind == data::SupportKind::flat) continue;
+    const double sine = std::max(kLeastSine, std::sin(pose.theta_rad));
+    const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+    rows[k][2] = by_outline[k].theta / kPart;
+    rows[k][3] = by_outline[k].sine_phi / kPart;
+    rows[k][4] =
+        (shifts[k].turn_rad.dot(axis) - std::cos(pose.theta_rad) * by_outline[k].sine_phi / sine) /
+        kPart;
+  }
+  return rows;
+}
+
+std::vector<CameraShifts> shifts_by(const data::Scene& scene, const Camera& camera,
+                                    const std::vector<Camera>& moved, const std::vector<Seen>& seen,
+                                    std::size_t step) {
+  std::vector<CameraShifts> out(moved.size(), CameraShifts::Zero(std::ssize(seen), 5));
+  for (std::size_t i = 0; i < seen.size(); i += step) {
+    const auto rows = rows_of(scene, camera, moved, seen[i]);
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      out[k].row(static_cast<Eigen::Index>(i)) = rows[k];
+  }
   return out;
+}
+
+// Which of some deviations show beside the readings' own errors; a few samples tell.
+std::vector<Camera> those_that_matter(const data::Scene& scene, const Camera& camera,
+                                      const std::vector<Camera>& moved,
+                                      const std::vector<ArcData>& arcs,
+                                      const std::vector<std::vector<Seen>>& seen) {
+  constexpr double kMatters = 3e-3;  // sigmas: of a thousand samples, a tenth of their mean's
+  constexpr std::size_t kLook = 16;
+  std::vector<double> most(moved.size(), 0.0);
+  for (std::size_t a = 0; a < arcs.size(); ++a) {
+    const std::size_t step = std::max<std::size_t>(1, seen[a].size() / kLook);
+    const auto few = shifts_by(scene, camera, moved, seen[a], step);
+    for (std::size_t k = 0; k < moved.size(); ++k)
+      most[k] = std::max(most[k], whitened(arcs[a], few[k]).cwiseAbs().maxCoeff());
+  }
+  std::vector<Camera> some;
+  for (std::size_t k = 0; k < moved.size(); ++k)
+    if (most[k] > kMatters) some.push_back(moved[k]);
+  return some;
 }
 
 }  // namespace
@@ -139,25 +201,47 @@ std::optional<Camera> uncertain_camera(const data::Scene& scene) {
   return camera;
 }
 
-void note_camera_shifts(const Camera& camera, const data::Scene& scene,
+void note_camera_shifts(const Camera& camera, const data::Scene& scene, bool all,
                         std::vector<ArcData>& arcs) {
-  constexpr double kMatters = 3e-3;  // sigmas: of a thousand samples, a tenth of their mean's
-  constexpr std::size_t kLook = 16;  // samples, before all of them are worked out
-  const auto deviations = camera.likely_deviations();
   std::vector<std::vector<Seen>> seen;
   for (const ArcData& arc : arcs) seen.push_back(seen_in(arc, scene));
-  for (Eigen::Index k = 0; k < deviations.cols(); ++k) {
-    const Camera moved = camera.moved(kPart * deviations.col(k));
-    bool matters = false;
-    for (std::size_t a = 0; a < arcs.size() && !matters; ++a) {
-      const std::size_t step = std::max<std::size_t>(1, seen[a].size() / kLook);
-      const Eigen::VectorXd few = whitened(arcs[a], shifts_by(camera, moved, seen[a], step));
-      matters = few.cwiseAbs().maxCoeff() > kMatters;
-    }
-    if (!matters) continue;
-    for (std::size_t a = 0; a < arcs.size(); ++a)
-      arcs[a].camera_shifts.push_back(shifts_by(camera, moved, seen[a], 1));
+  std::vector<Camera> moved;
+  const auto deviations = camera.likely_deviations();
+  for (const auto& deviation : deviations.colwise())
+    moved.push_back(camera.moved(kPart * deviation));
+  if (!all) moved = those_that_matter(scene, camera, moved, arcs, seen);
+  for (std::size_t a = 0; a < arcs.size(); ++a)
+    arcs[a].camera_shifts = shifts_by(scene, camera, moved, seen[a], 1);
+}
+
+data::TrackSample measured_by(const data::Scene& scene, data::TrackSample sample,
+                              const Camera& camera, const Camera& other) {
+  if (!sample.has_metres()) return sample;
+  std::vector<Seen> seen(1);
+  seen[0].place_m.head<2>() = sample.centre_m;
+  if (sample.theta) seen[0].theta = sample.theta->value_rad;
+  if (sample.phi) seen[0].phi = sample.phi->value_rad;
+  set_heights(scene, seen);
+  data::Pose<> pose{seen[0].place_m, seen[0].theta.value_or(0.0), seen[0].phi.value_or(0.0)};
+  if (!can_see(camera, pose.centre_m)) return sample;
+  const Shift shift = shift_between(camera, other, pose.centre_m);
+  const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
+  double turned_rad = 0.0;  // of the precession
+  if (has_outline(scene, seen[0])) {
+    const double phi_rad = pose.phi_rad;
+    pose = seen_by(scene, pose, camera, other);
+    turned_rad = std::remainder(pose.phi_rad - phi_rad, data::kTurn);
+  } else {
+    pose.centre_m.head<2>() += shift.place_m;
   }
+  sample.centre_m = pose.centre_m.head<2>();
+  sample.centre_px = other.image_from_table<double>(pose.centre_m);
+  if (sample.psi)
+    sample.psi->value_rad += shift.turn_rad.dot(axis) - std::cos(pose.theta_rad) * turned_rad;
+  if (!(sample.theta && sample.phi)) return sample;
+  sample.theta->value_rad = pose.theta_rad;
+  sample.phi->value_rad += turned_rad;
+  return sample;
 }
 
 Eigen::VectorXd whitened(const ArcData& arc, const CameraShifts& shifts) {

@@ -247,7 +247,8 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   const std::string& model = predictor.model_name();
   Problem problem = make_problem(predictor, arcs_of(tracks, model, scene, options), scene);
   problem.shortfalls = std::make_shared<Shortfalls>();
-  if (const auto camera = uncertain_camera(scene)) note_camera_shifts(*camera, scene, problem.arcs);
+  if (const auto camera = options.camera != nullptr ? *options.camera : uncertain_camera(scene))
+    note_camera_shifts(*camera, scene, problem.frees_camera(), problem.arcs);
   std::array<double, kChannels> scatter = problem.arcs.front().noise_scale;
   for (const ArcData& whole : problem.arcs) {
     const ArcData arc = whole.keep(consistent_samples(whole));

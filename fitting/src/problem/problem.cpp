@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "observe/angles.hpp"
+#include "observe/camera_error.hpp"
+#include "observe/camera_off.hpp"
 #include "observe/observed.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
@@ -73,6 +75,10 @@ double Transform::inverse(double value) const {
     default:
       return value;
   }
+}
+
+bool Problem::frees_camera() const {
+  return is_camera_off(predictor->parameters().back().name);
 }
 
 int Problem::shared_count() const {
@@ -437,6 +443,21 @@ model::Prediction predicted(const Problem& problem, const ArcData& data,
              : problem.predictor->predict(values, request);
 }
 
+// Residuals of what a camera would have measured that is off by as much less.
+void measure_by_right_camera(const Problem& problem, const ArcData& data,
+                             const Eigen::VectorXd& values, const std::vector<int>& columns,
+                             Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) {
+  const auto first = values.size() - std::ssize(data.camera_shifts);
+  for (std::size_t k = 0; k < data.camera_shifts.size(); ++k) {
+    const Eigen::Index index = first + static_cast<Eigen::Index>(k);
+    const Eigen::VectorXd shift = whitened(data, data.camera_shifts[k]);
+    residuals -= values[index] * shift;
+    for (std::size_t c = 0; jacobian != nullptr && c < columns.size(); ++c)
+      if (problem.free[columns[c]].index == index)
+        jacobian->col(static_cast<Eigen::Index>(c)) -= shift;
+  }
+}
+
 }  // namespace
 
 std::optional<double> falls_at_s(const Problem& problem, const Eigen::VectorXd& u) {
@@ -481,6 +502,8 @@ bool evaluate(const Problem& problem, int arc, const Eigen::VectorXd& u, Eigen::
     prediction.jacobian = std::move(all);
   }
   whiten(data, prediction.values, prediction.jacobian, residuals, jacobian);
+  if (problem.frees_camera())
+    measure_by_right_camera(problem, data, values, columns, residuals, jacobian);
   if (!residuals.allFinite()) {
     if (problem.shortfalls) problem.shortfalls->count(prediction.outcome);
     return false;

@@ -101,6 +101,8 @@ struct Problem {
   std::shared_ptr<Partial> partial;        ///< of a single-arc problem; null: not kept
 
   [[nodiscard]] int shared_count() const;
+  /// Whether what the camera is off by is among the parameters (camera_off.hpp).
+  [[nodiscard]] bool frees_camera() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0
   [[nodiscard]] std::vector<int> columns_of(int arc) const;  ///< free indices seen by an arc
   [[nodiscard]] Eigen::VectorXd start() const;               ///< u of the values in `base`

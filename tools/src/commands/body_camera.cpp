@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -59,10 +60,10 @@ void tell(const BodyCameraCommand& command, const tracking::BodyCamera& found) {
   fmt::print("{}: camera by the body's outline in {} pictures, rms {:.2f} px\n",
              command.output.string(), found.pictures, found.rms_px);
   const bool by_tape = command.camera_height_mm > 0.0;
-  fmt::print("{}{}\n", overhead_words(found),
+  fmt::print("{}{}\n", overhead_words(found.camera),
              by_tape ? "" : "; a height by tape (--camera-height-mm) makes both better");
   fmt::print(
-      "taken to look straight down, to about a degree, and its lens to be without distortion: "
+      "taken to look straight down, to about a degree, and its lens to bend little (k1 0 ± 0.03): "
       "pictures of a board would tell\n");
 }
 
@@ -80,11 +81,24 @@ tracking::BodyCamera camera_by_body(const std::filesystem::path& video, const da
   return tracking::camera_from_body(video, scene, how);
 }
 
-std::string overhead_words(const tracking::BodyCamera& found) {
+std::string overhead_words(const data::Camera& camera) {
+  const auto scale = [&](const data::Camera& by) {
+    const Eigen::Vector3d middle_m = by.table_from_image({by.cx, by.cy});
+    return std::sqrt(std::abs(by.jacobian_px_per_m(middle_m).leftCols<2>().determinant()));
+  };
+  const double scale_px_per_m = scale(camera), height_m = camera.position_m().z();
+  constexpr double kPart = 1e-3;  // of a deviation: as straight as it is there
+  double scale_variance = 0.0, height_variance = 0.0;
+  const auto deviations = camera.likely_deviations();
+  for (const auto& deviation : deviations.colwise()) {
+    const data::Camera moved = camera.moved(kPart * deviation);
+    scale_variance += std::pow((scale(moved) - scale_px_per_m) / kPart, 2);
+    height_variance += std::pow((moved.position_m().z() - height_m) / kPart, 2);
+  }
+  const double factor = std::exp(std::sqrt(height_variance) / height_m);
   return fmt::format("scale {} px/m on the floor, {:.3g} m above it ({:.3g} to {:.3g})",
-                     value_words(found.scale_px_per_m, found.sigma_scale * found.scale_px_per_m),
-                     found.height_m, found.height_m * std::exp(-found.sigma_height),
-                     found.height_m * std::exp(found.sigma_height));
+                     value_words(scale_px_per_m, std::sqrt(scale_variance)), height_m,
+                     height_m / factor, height_m * factor);
 }
 
 std::string way_to_a_camera(const data::Scene& scene) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -26,6 +27,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
+#include "trochoid/fitting/motion_camera.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
 // trochoid run: recording in, folder with track, fit, overlay and report out. Each stage calls what
@@ -48,7 +50,8 @@ struct RunOptions {
 struct Run {
   data::Scene scene;
   std::optional<data::Camera> camera;
-  std::string camera_note;  ///< what the body told of it, or why it did not
+  bool told_by_body = false;  ///< by its outline
+  std::string camera_note;    ///< what the body told of it, or why it did not
   tracking::TrackResult tracked;
   std::optional<data::Fit> fit;
   std::string no_fit_reason;
@@ -115,11 +118,12 @@ void calibrate(Run& run, const RunOptions& options, const fs::path& folder) {
     data::write_camera(found->camera, file);
     run.camera = data::read_camera(file);
     run.scene.camera.file = file.string();
+    run.told_by_body = true;
     run.camera_note = fmt::format(
         "no camera was given; one that looks straight down is taken from the body's own outline "
         "(rms {:.2f} px): {}; pictures of a board or a height by tape (trochoid calibrate) tell it "
         "better",
-        found->rms_px, overhead_words(*found));
+        found->rms_px, overhead_words(found->camera));
   });
 }
 
@@ -183,6 +187,45 @@ void fit(Run& run, const RunOptions& options) {
     if (named) throw;
     run.no_fit_reason = error.what();
   }
+}
+
+void fit_tracks(Run& run, const RunOptions& options) {
+  of_tracks(options.inputs.video.string(),
+            [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
+}
+
+std::optional<fitting::MotionCamera> camera_by_motion(const Run& run, const RunOptions& options) {
+  Progress progress("camera");
+  return fitting::camera_by_motion(run.tracked.file.tracks, *run.fit, run.scene,
+                                   fit_options(options, progress));
+}
+
+// A camera by the body's outline is known to a per cent or so, and its error shows in the motion:
+// that of the model which explains it best tells the camera, and with this one all models are
+// fitted anew. Where the best then explains less than before, all stays as it was.
+void fit_by_sharper_camera(Run& run, const data::Scene& asked, const RunOptions& options,
+                           const fs::path& folder) {
+  auto found = camera_by_motion(run, options);
+  if (!found) return;
+  const Run before = run;
+  const auto keep = [&] {
+    data::write_camera(*run.camera, run.scene.camera.file);
+    keep_track(run, options, folder);
+  };
+  run.scene = asked;
+  run.camera = std::move(found->camera);
+  run.tracked.file.tracks = std::move(found->tracks);
+  run.camera_note = fmt::format(
+      "no camera was given; one is taken from the body's own outline, and from its motion as the "
+      "model has it: {}; pictures of a board (trochoid calibrate) tell it without a model",
+      overhead_words(*run.camera));
+  std::replace(run.tracked.file.notes.begin(), run.tracked.file.notes.end(), before.camera_note,
+               run.camera_note);
+  keep();
+  fit_tracks(run, options);
+  if (run.fit && run.fit->converged >= before.fit->converged) return;
+  run = before;
+  keep();
 }
 
 // The scene as the folder keeps it: model settled, camera beside it.
@@ -354,10 +397,11 @@ void run(const RunOptions& options) {
   pending.told_by_its_name([&] { calibrate(run, options, pending.path()); });
   run.timed("track", [&] { track(run, options); });
   pending.told_by_its_name([&] { keep_track(run, options, pending.path()); });
-  run.timed("fit", [&] {
-    of_tracks(options.inputs.video.string(),
-              [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
-  });
+  const data::Scene asked = run.scene;
+  run.timed("fit", [&] { fit_tracks(run, options); });
+  if (run.told_by_body && run.fit)
+    run.timed("sharper_camera",
+              [&] { fit_by_sharper_camera(run, asked, options, pending.path()); });
   const Verdict verdict =
       pending.told_by_its_name([&] { return write_all(run, options, pending.path()); });
   pending.commit();

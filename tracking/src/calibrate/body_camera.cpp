@@ -53,6 +53,7 @@ class Search {
     prior_.log_focal = std::log(kUsualFocal * std::max(size_px_.width, size_px_.height));
     prior_.focal_sigma = kFocalSigma;
     prior_.turn_sigma_rad = kTurnSigma_rad;
+    prior_.bend_sigma = kBendSigma;
     if (options.height_m) prior_.log_height = std::log(*options.height_m);
   }
 
@@ -71,7 +72,8 @@ class Search {
   // Focal lengths of telephones and camcorders in widths of the picture: 0.7 to 2.5.
   static constexpr double kUsualFocal = 1.3, kFocalSigma = 0.5;
   static constexpr double kTurnSigma_rad = 0.0175;
-  static constexpr std::size_t kFewest = 8;  // pictures
+  static constexpr double kBendSigma = 0.03;  ///< k1 of lenses whose pictures are not seen to bend
+  static constexpr std::size_t kFewest = 8;   // pictures
   /// Part of the recording, as [from, to] in frames.
   struct Part {
     std::int64_t from, to;

@@ -17,8 +17,9 @@ namespace trochoid::tracking {
 namespace {
 
 using Edge = data::OutlinePoint::Edge;
-constexpr int kNumbers = 4, kParts = 5;                   // of an outline
-constexpr int kFx = 0, kFy = 1, kTurn = 9, kShiftZ = 14;  // of Camera::Deviation
+constexpr int kNumbers = 5, kUnasked = 3;                          // turns and k1
+constexpr int kParts = 5;                                          // of an outline
+constexpr int kFx = 0, kFy = 1, kK1 = 4, kTurn = 9, kShiftZ = 14;  // of Camera::Deviation
 
 /// Edges of one picture with the part of the outline that each belongs to.
 class MatchedEdges {
@@ -92,7 +93,8 @@ struct Linearised {
 
 /// What one picture says of the camera, its pose eliminated, and how the pose follows.
 struct Say {
-  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  Eigen::Matrix<double, kNumbers, kNumbers> information =
+      Eigen::Matrix<double, kNumbers, kNumbers>::Zero();
   OverheadNumbers pull = OverheadNumbers::Zero();  ///< of what its edges are off by
   /// Of the edges of each part of the outline, were they a pixel farther out.
   Eigen::Matrix<double, kNumbers, kParts> pull_of_1px =
@@ -139,8 +141,8 @@ class OverheadAdjustment {
       const PoseMotion::Step step = by * PoseMotion::Step::Unit(motion.count(), k);
       out.by_pose.col(k) = (out.off_px - edges.off_px(motion.moved(seen.pose, step), here)) / by;
     }
-    // Height and turns: a few pixels beside the middle, nearly straight so far.
-    const OverheadNumbers by(kShift_px / (scale * body_.radius_m), 0.05, 0.01, 0.01);
+    // Height, turns and k1: a few pixels beside the middle, nearly straight so far.
+    const OverheadNumbers by{kShift_px / (scale * body_.radius_m), 0.05, 0.01, 0.01, 0.02};
     out.by_numbers.resize(out.off_px.size(), kNumbers);
     for (int k = 0; k < kNumbers; ++k) {
       const data::Camera there = camera(fit_.numbers + by[k] * OverheadNumbers::Unit(k));
@@ -196,7 +198,7 @@ class OverheadAdjustment {
   struct Verdict {
     Eigen::Vector2d step;
     Eigen::Matrix2d covariance;
-    Eigen::Matrix2d by_turns;  ///< how it follows the camera's turns
+    Eigen::Matrix<double, 2, kUnasked> by_unasked;  ///< how it follows the camera's turns and k1
   };
 
   /// The covariance is not that of independent edges, which would outweigh any tape: pictures count
@@ -210,20 +212,21 @@ class OverheadAdjustment {
     edges_px[static_cast<Eigen::Index>(Edge::upper_rim)] = std::max(kRim_px, fit_.rms_px);
     constexpr double kWidest = 3.0;  // of either logarithm, where outlines say nothing
     const Eigen::Matrix2d least = std::pow(kWidest, -2) * Eigen::Matrix2d::Identity();
-    Eigen::Matrix2d information = least, scatter = least, turns = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d information = least, scatter = least;
+    Eigen::Matrix<double, 2, kUnasked> mixed = Eigen::Matrix<double, 2, kUnasked>::Zero();
     Eigen::Vector2d pull = Eigen::Vector2d::Zero();
     Eigen::Matrix<double, 2, kParts> outwards = Eigen::Matrix<double, 2, kParts>::Zero();
     for (const Say& say : says) {
       const Eigen::Vector2d own = say.pull.head<2>();
       information += say.information.topLeftCorner<2, 2>();
-      turns += say.information.topRightCorner<2, 2>();
+      mixed += say.information.topRightCorner<2, kUnasked>();
       pull += own, scatter += own * own.transpose();
       outwards += say.pull_of_1px.topRows<2>() * edges_px.asDiagonal();
     }
     const Eigen::Matrix2d inverse = information.inverse();
     const Eigen::Matrix<double, 2, kParts> shift = inverse * outwards;
     return {inverse * pull, inverse * scatter * inverse + shift * shift.transpose(),
-            -inverse * turns};
+            -inverse * mixed};
   }
 
   /// That, and what was known before, the height or not.
@@ -231,9 +234,9 @@ class OverheadAdjustment {
                                    const std::optional<double>& log_height) const {
     const double focal = std::pow(prior_.focal_sigma, -2);
     const Eigen::Vector2d both = Eigen::Vector2d::Ones(), seen = fit_.numbers.head<2>();
-    const double turn = std::pow(prior_.turn_sigma_rad, 2);
     const Eigen::Matrix2d weight =
-        (outlines.covariance + turn * outlines.by_turns * outlines.by_turns.transpose()).inverse();
+        (outlines.covariance + outlines.by_unasked * unasked() * outlines.by_unasked.transpose())
+            .inverse();
     Eigen::Matrix2d information = weight + focal * both * both.transpose();
     Eigen::Vector2d pull = weight * outlines.step + focal * (prior_.log_focal - seen.sum()) * both;
     if (log_height) {
@@ -242,7 +245,7 @@ class OverheadAdjustment {
       pull[kLogHeight] += height * (*log_height - seen[kLogHeight]);
     }
     const Eigen::Matrix2d covariance = information.inverse();
-    return {covariance * pull, covariance, covariance * weight * outlines.by_turns};
+    return {covariance * pull, covariance, covariance * weight * outlines.by_unasked};
   }
 
   /// One step of Gauss and Newton, no longer than its linearisation holds.
@@ -272,11 +275,16 @@ class OverheadAdjustment {
     return std::sqrt(squares_px2 / weight);
   }
 
+  // Variances of what the outlines are not asked for.
+  [[nodiscard]] Eigen::Matrix3d unasked() const {
+    const double turn = prior_.turn_sigma_rad, bend = prior_.bend_sigma;
+    return Eigen::Vector3d(turn * turn, turn * turn, bend * bend).asDiagonal();
+  }
+
   void keep(const Verdict& verdict) {
-    const double turn = std::pow(prior_.turn_sigma_rad, 2);
-    const Eigen::Matrix2d mixed = turn * verdict.by_turns;
-    fit_.covariance << verdict.covariance, mixed, mixed.transpose(),
-        turn * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix3d variances = unasked();
+    const Eigen::Matrix<double, 2, kUnasked> mixed = verdict.by_unasked * variances;
+    fit_.covariance << verdict.covariance, mixed, mixed.transpose(), variances;
   }
 
   void keep_own_height(const Verdict& alone) {
@@ -303,11 +311,12 @@ class OverheadAdjustment {
 }  // namespace
 
 data::Camera overhead_camera(const OverheadNumbers& numbers, const cv::Size& size_px) {
-  data::Camera::Deviation turn = data::Camera::Deviation::Zero();
-  turn.segment<2>(kTurn) = numbers.segment<2>(kTurnX);
+  data::Camera::Deviation by = data::Camera::Deviation::Zero();
+  by.segment<2>(kTurn) = numbers.segment<2>(kTurnX);
+  by[kK1] = numbers[kBend];
   return data::Camera::overhead(size_px.width, size_px.height, std::exp(numbers[kLogScale]),
                                 std::exp(numbers[kLogHeight]))
-      .moved(turn);
+      .moved(by);
 }
 
 data::Camera overhead_camera(const OverheadFit& fit, const cv::Size& size_px) {
@@ -318,6 +327,7 @@ data::Camera overhead_camera(const OverheadFit& fit, const cv::Size& size_px) {
   for (const int focal : {kFx, kFy}) by.row(focal).head<2>().setConstant(camera.fx);
   by(kShiftZ, kLogHeight) = std::exp(fit.numbers[kLogHeight]);
   by.block<2, 2>(kTurn, kTurnX).setIdentity();
+  by(kK1, kBend) = 1.0;
   camera.covariance = by * fit.covariance * by.transpose();
   camera.metres_by_radius = true;
   return camera;

@@ -13,9 +13,10 @@
 namespace trochoid::tracking {
 
 /// A camera above the middle of the picture: logarithms of its scale on the floor [px/m] and of its
-/// height [m], and how far it is turned from looking straight down, about its own x and y [rad].
-using OverheadNumbers = Eigen::Vector4d;
-enum OverheadNumber { kLogScale, kLogHeight, kTurnX, kTurnY };
+/// height [m], how far it is turned from looking straight down, about its own x and y [rad], and
+/// its lens's k1.
+using OverheadNumbers = Eigen::Vector<double, 5>;
+enum OverheadNumber { kLogScale, kLogHeight, kTurnX, kTurnY, kBend };
 
 [[nodiscard]] data::Camera overhead_camera(const OverheadNumbers& numbers, const cv::Size& size_px);
 
@@ -24,7 +25,8 @@ struct OverheadPrior {
   double log_focal = 0.0, focal_sigma = 0.0;  ///< focal length [px], its sigma relative
   std::optional<double> log_height;           ///< [m]
   double height_sigma = 0.02;                 ///< relative
-  double turn_sigma_rad = 0.0;                ///< of each turn; the outlines are not asked for them
+  /// Of each turn and of k1; the outlines are not asked for them.
+  double turn_sigma_rad = 0.0, bend_sigma = 0.0;
 };
 
 /// The outline of a body in one picture: edges, and a pose near the one that they show.
@@ -35,7 +37,7 @@ struct SeenOutline {
 
 struct OverheadFit {
   OverheadNumbers numbers;
-  Eigen::Matrix4d covariance;
+  Eigen::Matrix<double, 5, 5> covariance;
   double rms_px = 0.0;  ///< of the edges about the outlines, outliers apart
   /// What outlines and focal length tell of the height, without what was known of it: logarithm
   /// [m], near `numbers`, and its sigma.
@@ -48,7 +50,8 @@ struct OverheadFit {
 /// Scale and height of an overhead camera from outlines of a body of known size, each with a pose
 /// of its own (bundle adjustment [Triggs2000] with the poses eliminated, Tukey's weights). The
 /// covariance takes the pictures for independent but not the edges of one, and allows for edges
-/// that all lie farther out than they should, as models of edges do, and for the turns.
+/// that all lie farther out than they should, as models of edges do, and for the turns and the
+/// lens.
 /// @param body  a disc or ring of known size.  @param start  within a few per cent of the scale.
 /// @throws NumericalError if the outlines determine no camera.
 [[nodiscard]] OverheadFit fit_overhead(const data::Body& body, const data::Support& support,

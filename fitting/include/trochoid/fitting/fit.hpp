@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "trochoid/data/camera.hpp"
 #include "trochoid/data/fit.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/data/track.hpp"
@@ -36,6 +37,8 @@ struct FitOptions {
   std::uint64_t seed = 1;
   int threads = 0;         ///< 0 = all cores; the result does not depend on it
   double tolerance = 0.0;  ///< integrator tolerance; 0 = chosen so that its error is < 1 % of sigma
+  /// By which the tracks were measured, with what it leaves open; null: what the scene's file says.
+  const data::Camera* camera = nullptr;
   Strategy strategy = Strategy::automatic;
   std::map<std::string, double> start;  ///< given start by parameter name; overrides the scene's
   std::string start_path = "given";     ///< what data::Fit::start_path calls it
