@@ -1,5 +1,9 @@
 #include "trochoid/fitting/motion_camera.hpp"
 
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -57,6 +61,8 @@ data::Fit fit_with(std::span<const data::Track> tracks, const data::Fit& near, d
   how.camera = &camera;
   how.start = start_at(near, *plain);
   how.strategy = Strategy::single;
+  const data::FitParameter* velocity = near.find("vx_m_s");
+  how.rolls_at_first = velocity != nullptr && velocity->status == data::ParameterStatus::derived;
   how.profile = false;
   how.bootstrap = 0;
   return fit(tracks, *free_camera, scene, how);
@@ -67,6 +73,16 @@ data::Scene with_usual_losses(data::Scene scene) {
   for (const Term& term : ladder_of(scene, false).terms)
     if (term.usual) term.switch_on(scene);
   return scene;
+}
+
+std::map<std::string, double> sigmas_of_state(const data::Fit& fit, const data::Scene& scene) {
+  std::map<std::string, double> sigmas;
+  const auto predictor = model::make_predictor(scene);
+  for (const model::ParameterInfo& info : predictor->parameters())
+    if (const data::FitParameter* found = fit.find(info.name);
+        found != nullptr && info.role == model::ParameterInfo::Role::initial)
+      sigmas[info.name] = found->sigma;
+  return sigmas;
 }
 
 bool explains(const data::Fit& fit) {
@@ -83,7 +99,7 @@ std::optional<MotionCamera> camera_by_motion(std::span<const data::Track> tracks
   const data::Scene scene = with_usual_losses(scene_as_fitted(given));
   const auto told = uncertain_camera(scene);
   if (!told) return std::nullopt;
-  MotionCamera now{*told, {tracks.begin(), tracks.end()}};
+  MotionCamera now{*told, {tracks.begin(), tracks.end()}, {}};
   const auto by = told->likely_deviations();
   Eigen::VectorXd off = Eigen::VectorXd::Zero(by.cols());
   data::Fit motion = given_fit;
@@ -95,6 +111,7 @@ std::optional<MotionCamera> camera_by_motion(std::span<const data::Track> tracks
     if (!(off.cwiseAbs().maxCoeff() < kLikely)) return std::nullopt;
     const Eigen::ArrayXd sigma = found.covariance.diagonal().array().sqrt();
     if ((found.off.array().abs() / sigma).maxCoeff() < kSettled) {
+      now.sigmas = sigmas_of_state(motion, scene);
       now.camera.covariance =
           by * (found.covariance + found.off * found.off.transpose()) * by.transpose();
       return now;
@@ -103,6 +120,31 @@ std::optional<MotionCamera> camera_by_motion(std::span<const data::Track> tracks
     now.tracks = all_measured_by(scene, tracks, *told, now.camera);
   }
   return std::nullopt;
+}
+
+void allow_for_camera(const MotionCamera& camera, data::Fit& fit) {
+  constexpr double kWorthWords = 1.3;
+  double most = 1.0;
+  std::string widest;
+  for (data::FitParameter& parameter : fit.parameters) {
+    const auto wide = camera.sigmas.find(parameter.name);
+    if (wide == camera.sigmas.end() || parameter.status != data::ParameterStatus::free) continue;
+    const double times = wide->second / parameter.sigma;
+    if (!(times > 1.0) || !std::isfinite(times)) continue;
+    parameter.sigma = wide->second;
+    const auto& names = fit.covariance_names;
+    const auto place = std::find(names.begin(), names.end(), parameter.name) - names.begin();
+    if (place < std::ssize(names)) {
+      fit.covariance.row(place) *= times;
+      fit.covariance.col(place) *= times;
+    }
+    if (times > most) most = times, widest = parameter.name;
+  }
+  if (most > kWorthWords)
+    fit.warnings.push_back(fmt::format(
+        "error bars of the state allow for losses that the camera, told by this motion, may stand "
+        "in for, above all that of {}: {:.2g} times as wide",
+        widest, most));
 }
 
 }  // namespace trochoid::fitting

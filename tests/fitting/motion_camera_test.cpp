@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -206,6 +207,29 @@ TEST_F(FilmedByAnotherCamera, WhatItShowedIsMeasuredByTheRightOneAsTheBodyIs) {
             kOfOutline * (seen - truth).head<2>().norm());
   EXPECT_NEAR(again.theta->value_rad, truth[2], kOfOutline * (seen - truth).tail<2>().norm());
   EXPECT_NEAR(again.phi->value_rad, truth[3], kOfOutline * (seen - truth).tail<2>().norm());
+}
+
+TEST_F(FilmedByAnotherCamera, WhatLossesItMayStandInForIsInTheErrorBarsOfTheState) {
+  const data::Track measured = track();
+  const std::span tracks(&measured, 1);
+  auto found = camera_by_motion(tracks, fitting::fit(tracks, scene_), scene_);
+  ASSERT_TRUE(found);
+  ASSERT_TRUE(found->sigmas.contains("theta_rad"));
+  EXPECT_FALSE(found->sigmas.contains("rolling_friction_m"));
+  data::write_camera(found->camera, file_);
+  data::Fit after = fitting::fit(found->tracks, scene_);
+  const double theta = after.find("theta_rad")->sigma, x = after.find("x_m")->sigma;
+  found->sigmas["theta_rad"] = 3.0 * theta;
+  found->sigmas["x_m"] = 0.5 * x;
+  allow_for_camera(*found, after);
+  EXPECT_DOUBLE_EQ(after.find("theta_rad")->sigma, 3.0 * theta);
+  EXPECT_DOUBLE_EQ(after.find("x_m")->sigma, x);
+  const auto place =
+      std::find(after.covariance_names.begin(), after.covariance_names.end(), "theta_rad") -
+      after.covariance_names.begin();
+  EXPECT_NEAR(after.covariance(place, place), 9.0 * theta * theta, 1e-6 * theta * theta);
+  EXPECT_THAT(after.warnings,
+              testing::Contains(testing::HasSubstr("that of theta_rad: 3 times as wide")));
 }
 
 TEST_F(FilmedByAnotherCamera, AMotionThatIsNotExplainedTellsNone) {

@@ -205,7 +205,7 @@ std::optional<fitting::MotionCamera> camera_by_motion(const Run& run, const RunO
 // fitted anew. Where the best then explains less than before, all stays as it was.
 void fit_by_sharper_camera(Run& run, const data::Scene& asked, const RunOptions& options,
                            const fs::path& folder) {
-  auto found = camera_by_motion(run, options);
+  const auto found = camera_by_motion(run, options);
   if (!found) return;
   const Run before = run;
   const auto keep = [&] {
@@ -213,8 +213,8 @@ void fit_by_sharper_camera(Run& run, const data::Scene& asked, const RunOptions&
     keep_track(run, options, folder);
   };
   run.scene = asked;
-  run.camera = std::move(found->camera);
-  run.tracked.file.tracks = std::move(found->tracks);
+  run.camera = found->camera;
+  run.tracked.file.tracks = found->tracks;
   run.camera_note = fmt::format(
       "no camera was given; one is taken from the body's own outline, and from its motion as the "
       "model has it: {}; pictures of a board (trochoid calibrate) tell it without a model",
@@ -223,7 +223,8 @@ void fit_by_sharper_camera(Run& run, const data::Scene& asked, const RunOptions&
                run.camera_note);
   keep();
   fit_tracks(run, options);
-  if (run.fit && run.fit->converged >= before.fit->converged) return;
+  if (run.fit && run.fit->converged >= before.fit->converged)
+    return fitting::allow_for_camera(*found, *run.fit);
   run = before;
   keep();
 }

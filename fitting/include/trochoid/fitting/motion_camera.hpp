@@ -1,6 +1,8 @@
 #pragma once
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "trochoid/data/camera.hpp"
@@ -15,6 +17,8 @@ namespace trochoid::fitting {
 struct MotionCamera {
   data::Camera camera;  ///< its covariance is what the motion leaves open
   std::vector<data::Track> tracks;
+  /// Of the state at the start, by name, with the camera and all usual losses free at once.
+  std::map<std::string, double> sigmas;
 };
 
 /// Outlines tell a camera to a per cent; a motion whose law is known is thrown off by far less.
@@ -29,5 +33,9 @@ struct MotionCamera {
                                                            const data::Fit& fit,
                                                            const data::Scene& scene,
                                                            const FitOptions& options = {});
+
+/// A camera may have been bent by a loss that a fit of its tracks does without: widens the error
+/// bars of that fit's state to what they are with the camera and all usual losses free at once.
+void allow_for_camera(const MotionCamera& camera, data::Fit& fit);
 
 }  // namespace trochoid::fitting
