@@ -227,10 +227,11 @@ data::TrackSample measured_by(const data::Scene& scene, data::TrackSample sample
   const Shift shift = shift_between(camera, other, pose.centre_m);
   const Eigen::Vector3d axis = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
   double turned_rad = 0.0;  // of the precession
-  if (has_outline(scene, seen[0])) {
-    const double phi_rad = pose.phi_rad;
-    pose = seen_by(scene, pose, camera, other);
-    turned_rad = std::remainder(pose.phi_rad - phi_rad, data::kTurn);
+  const auto there =
+      has_outline(scene, seen[0]) ? seen_by(scene, pose, camera, other) : std::nullopt;
+  if (there) {
+    turned_rad = std::remainder(there->phi_rad - pose.phi_rad, data::kTurn);
+    pose = *there;
   } else {
     pose.centre_m.head<2>() += shift.place_m;
   }

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "trochoid/data/angle.hpp"
-#include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
 
 namespace trochoid::fitting {
@@ -130,8 +129,8 @@ std::vector<OutlineShift> outline_shifts(const data::Scene& scene, const data::P
   return shifts;
 }
 
-data::Pose<> seen_by(const data::Scene& scene, const data::Pose<>& pose, const data::Camera& camera,
-                     const data::Camera& other) {
+std::optional<data::Pose<>> seen_by(const data::Scene& scene, const data::Pose<>& pose,
+                                    const data::Camera& camera, const data::Camera& other) {
   constexpr int kMost = 20;
   constexpr double kSettled = 1e-7;  // m and rad
   const ShownOutline outline(scene, pose, camera);
@@ -141,7 +140,7 @@ data::Pose<> seen_by(const data::Scene& scene, const data::Pose<>& pose, const d
     there = outline.moved(there, step);
     if (step.cwiseAbs().maxCoeff() < kSettled) return there;
   }
-  throw NumericalError("no pose before the other camera has that outline");
+  return std::nullopt;
 }
 
 }  // namespace trochoid::fitting

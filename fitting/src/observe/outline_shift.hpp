@@ -25,9 +25,11 @@ struct OutlineShift {
                                                        const data::Camera& camera,
                                                        std::span<const data::Camera> others);
 
-/// Where another camera has that body, to all orders.
-/// @throws NumericalError where it does not see it.
-[[nodiscard]] data::Pose<> seen_by(const data::Scene& scene, const data::Pose<>& pose,
-                                   const data::Camera& camera, const data::Camera& other);
+/// Where another camera has that body, to all orders; nothing where no pose before it has that
+/// outline, or any has.
+[[nodiscard]] std::optional<data::Pose<>> seen_by(const data::Scene& scene,
+                                                  const data::Pose<>& pose,
+                                                  const data::Camera& camera,
+                                                  const data::Camera& other);
 
 }  // namespace trochoid::fitting

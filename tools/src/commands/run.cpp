@@ -194,10 +194,15 @@ void fit_tracks(Run& run, const RunOptions& options) {
             [&] { in_scene(options.inputs.scene, [&] { fit(run, options); }); });
 }
 
+// What is enough for the motion may be too little for a camera as well.
 std::optional<fitting::MotionCamera> camera_by_motion(const Run& run, const RunOptions& options) {
   Progress progress("camera");
-  return fitting::camera_by_motion(run.tracked.file.tracks, *run.fit, run.scene,
-                                   fit_options(options, progress));
+  try {
+    return fitting::camera_by_motion(run.tracked.file.tracks, *run.fit, run.scene,
+                                     fit_options(options, progress));
+  } catch (const TrackError&) {
+    return std::nullopt;
+  }
 }
 
 // A camera by the body's outline is known to a per cent or so, and its error shows in the motion:
