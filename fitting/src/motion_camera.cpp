@@ -2,13 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "choose/ladder.hpp"
+#include "judge/widen.hpp"
 #include "observe/camera_error.hpp"
 #include "observe/camera_off.hpp"
 
@@ -131,13 +131,7 @@ void allow_for_camera(const MotionCamera& camera, data::Fit& fit) {
     if (wide == camera.sigmas.end() || parameter.status != data::ParameterStatus::free) continue;
     const double times = wide->second / parameter.sigma;
     if (!(times > 1.0) || !std::isfinite(times)) continue;
-    parameter.sigma = wide->second;
-    const auto& names = fit.covariance_names;
-    const auto place = std::find(names.begin(), names.end(), parameter.name) - names.begin();
-    if (place < std::ssize(names)) {
-      fit.covariance.row(place) *= times;
-      fit.covariance.col(place) *= times;
-    }
+    widen(parameter, times, fit);
     if (times > most) most = times, widest = parameter.name;
   }
   if (most > kWorthWords)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "judge/statistics.hpp"
+#include "judge/widen.hpp"
 #include "observe/observed.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -45,16 +46,11 @@ Estimate friction_of(const Problem& problem, int arc, int friction) {
 
 // The arcs' frictions differ by more than their errors: the common one is their mean, no better
 // known than they agree.
-void widen(double times, data::Fit& fit) {
+void widen_friction(double times, data::Fit& fit) {
   for (data::FitParameter& parameter : fit.parameters) {
     if (parameter.name != "friction") continue;
-    parameter.sigma *= times;
+    widen(parameter, times, fit);
     parameter.note += fmt::format("; widened {:.2g} times: the arcs differ", times);
-  }
-  for (Eigen::Index i = 0; i < fit.covariance.rows(); ++i) {
-    if (fit.covariance_names[static_cast<std::size_t>(i)] != "friction") continue;
-    fit.covariance.row(i) *= times;
-    fit.covariance.col(i) *= times;
   }
 }
 
@@ -84,7 +80,7 @@ void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
   const double dof = static_cast<double>(estimates.size()) - 1.0;
   const double p = chi2_upper_tail(chi2, dof);
   constexpr double kDoubtful = 0.01;
-  if (p <= kDoubtful) widen(std::sqrt(chi2 / dof), fit);
+  if (p <= kDoubtful) widen_friction(std::sqrt(chi2 / dof), fit);
   fit.warnings.push_back(fmt::format(
       "one friction coefficient {} the {} arcs (chi-square {:.3g} for {:.0f}, p = {:.2g}); alone: "
       "{}",
