@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
 
 namespace trochoid::tracking {

@@ -8,7 +8,7 @@
 
 #include "calibrate/overhead_fit.hpp"
 #include "drawn_clip.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/outline.hpp"
@@ -45,7 +45,7 @@ OverheadPrior no_prior() {
 std::vector<SeenOutline> rolling(double noise_px, double outside_px, unsigned seed) {
   const data::Camera camera = overhead_camera(numbers(kScale_px_per_m, kHeight_m), kSize);
   const data::Support floor{data::SupportKind::floor, {}};
-  const PoseMotion motion(disc(), floor, camera);
+  const data::PoseMotion motion(disc(), floor, camera);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   std::vector<SeenOutline> all;

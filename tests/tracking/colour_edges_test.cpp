@@ -155,13 +155,13 @@ struct ByColour {
 
 ByColour seen_by_colour(const ThinDisc& disc, const Photograph& picture,
                         const data::Pose<>& predicted) {
-  const PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const data::PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
   const ColourWindow colour = colour_window(picture.luma, picture.chroma, {0, 0, 160, 140},
                                             disc.body, disc.camera, predicted);
   ByColour seen{outline_samples(disc.body, predicted, disc.camera, motion, 2.0), {}};
   constexpr double kBlurPx = 0.6, kReachPx = 3.0;
   seen.edges =
-      find_colour_edges(colour, {seen.outline, Moments(), PoseMotion::Step()}, kBlurPx, kReachPx);
+      find_colour_edges(colour, {seen.outline, Moments(), data::PoseMotion::Step()}, kBlurPx, kReachPx);
   return seen;
 }
 
@@ -174,7 +174,7 @@ TEST(ColourEdges, AnOutlineOfWhichNothingIsSeenHasNone) {
                                             disc.at({80.3, 70.2}, 0.3));
   const std::vector<OutlineSample> nothing;
   EXPECT_TRUE(
-      find_colour_edges(colour, {nothing, Moments(), PoseMotion::Step()}, 0.6, 3.0).empty());
+      find_colour_edges(colour, {nothing, Moments(), data::PoseMotion::Step()}, 0.6, 3.0).empty());
 }
 
 // The centre of a disc predicted 0.4 px beside its place.
@@ -401,7 +401,7 @@ TEST(Contour, DistancesAreThoseFromTheCirclesOfARing) {
   ring.kind = data::BodyKind::ring;
   ring.radius_m = 0.036, ring.inner_radius_m = 0.026, ring.thickness_m = 0.004;
   const auto camera = data::Camera::overhead(160, 140, 1000.0, 1.0);
-  const PoseMotion motion(ring, {data::SupportKind::flat, {}}, camera);
+  const data::PoseMotion motion(ring, {data::SupportKind::flat, {}}, camera);
   data::Pose<> pose;
   const Eigen::Vector2d centre(79.5, 69.5);
   pose.centre_m = camera.table_from_image(centre, 0.002);
@@ -426,7 +426,7 @@ TEST(Contour, DistancesAreThoseFromTheCirclesOfARing) {
 // quite another direction than the point asked about.
 TEST(Contour, TheNearestPointOfAFlatEllipseIsFound) {
   const ThinDisc disc;
-  const PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const data::PoseMotion motion(disc.body, {data::SupportKind::floor, {}}, disc.camera);
   const Eigen::Vector2d centre(80.3, 70.2);
   const auto outline =
       outline_samples(disc.body, disc.at(centre, std::acos(0.2), 0.4), disc.camera, motion, 1.5);

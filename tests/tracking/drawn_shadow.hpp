@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "find/cast_shadow.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 

@@ -24,7 +24,7 @@ data::Body flat_disc() {
 TEST(Exposure, ASlidingDiscSweepsByItsWayAlongTheNormal) {
   const data::Body body = flat_disc();
   const auto camera = data::Camera::from_scale(200, 200, 1000.0);
-  const PoseMotion motion(body, {data::SupportKind::flat, {}}, camera);
+  const data::PoseMotion motion(body, {data::SupportKind::flat, {}}, camera);
   data::Pose<> middle, before;
   middle.centre_m = camera.table_from_image({100.0, 100.0}, 0.001);
   before.centre_m = middle.centre_m - Eigen::Vector3d(0.024, 0.0, 0.0);

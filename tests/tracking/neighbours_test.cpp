@@ -1,6 +1,6 @@
 #include "link/neighbours.hpp"
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
 #include "link/one_side.hpp"
 

@@ -438,7 +438,7 @@ TEST(Crossings, ReadEveryPixelBesideTheOutlineOnceAtItsDistance) {
   body.radius_m = 0.03;
   body.thickness_m = 1e-6;
   const auto camera = data::Camera::from_scale(120, 120, 1000.0);
-  const PoseMotion motion(body, {data::SupportKind::flat, {}}, camera);
+  const data::PoseMotion motion(body, {data::SupportKind::flat, {}}, camera);
   data::Pose<> pose;
   pose.centre_m = camera.table_from_image(centre_px, body.half_thickness_m());
   // A picture of its own pixel numbers.

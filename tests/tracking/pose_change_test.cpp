@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

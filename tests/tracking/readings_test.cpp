@@ -1,6 +1,6 @@
 #include "link/readings.hpp"
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
 #include "pose/pose_start.hpp"
 
@@ -161,7 +161,7 @@ TEST(OtherReadings, TheWholeIsFoundAgainFromTheFaceThatWasOutlinedLikeIt) {
   data::Body body;
   body.radius_m = 0.03, body.thickness_m = 0.012;
   const data::Camera camera = data::Camera::overhead(640, 480, 2000.0, 3.0);
-  const PoseMotion motion(body, {data::SupportKind::floor, {}}, camera);
+  const data::PoseMotion motion(body, {data::SupportKind::floor, {}}, camera);
   constexpr double kParallax_rad = 0.01, kParallax_m = 1e-4;  // about what the body's size subtends
   for (const double theta : {0.5, 0.9, 1.2}) {
     data::Pose<> pose;

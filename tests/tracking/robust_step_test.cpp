@@ -29,14 +29,14 @@ std::vector<EdgeEquation> round_a_circle(double noise_px, double common_px, std:
 }
 
 RobustSolution solved(std::vector<EdgeEquation> equations,
-                      const PoseMotion::Step& prior = PoseMotion::Step::Constant(2, 30.0)) {
+                      const data::PoseMotion::Step& prior = data::PoseMotion::Step::Constant(2, 30.0)) {
   RobustSolution solution;
   EXPECT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
   find_uncertainty(equations, prior, solution);
   return solution;
 }
 
-const PoseMotion::Step kShiftsAndTurn = Eigen::Vector3d(30.0, 30.0, 0.5);
+const data::PoseMotion::Step kShiftsAndTurn = Eigen::Vector3d(30.0, 30.0, 0.5);
 
 // All edges of the lit side 0.05 px too far out, those of the dark side as much too far in, move
 // the centre by 0.05 px and leave no residual: whatever the noise, it is no better known than that.

@@ -9,7 +9,7 @@
 #include "find/body_search.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "link/linking.hpp"
 #include "link/path_motion.hpp"
 #include "link/track_assembly.hpp"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "calibrate/overhead_fit.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "pose/pose_start.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
@@ -198,7 +198,7 @@ class Search {
   [[nodiscard]] std::vector<SeenOutline> outlines(const TrackResult& seen,
                                                   const OverheadNumbers& numbers) const {
     constexpr std::size_t kMost = 40, kFewestEdges = 20;
-    const PoseMotion motion(*scene_.body, scene_.support, overhead_camera(numbers, size_px_));
+    const data::PoseMotion motion(*scene_.body, scene_.support, overhead_camera(numbers, size_px_));
     EdgesByFrame edges = edges_by_frame(*seen.edges);
     std::vector<SeenOutline> all;
     for (const data::TrackSample& sample : seen.file.tracks.front().samples) {
@@ -262,7 +262,7 @@ class Search {
   void refuse_mirrored(const OverheadFit& fit, std::vector<SeenOutline> seen) const {
     constexpr double kClearly = 0.85;  // of the rms: 0.7 to 0.8 where it was so, else 0.92 and more
     const data::Camera camera = overhead_camera(fit.numbers, size_px_);
-    const PoseMotion motion(*scene_.body, scene_.support, camera);
+    const data::PoseMotion motion(*scene_.body, scene_.support, camera);
     for (SeenOutline& one : seen) one.pose = mirrored(camera, motion, one.pose);
     double rms_px = 0.0;
     try {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
 #include "trochoid/data/parallel.hpp"
@@ -128,7 +128,7 @@ class OverheadAdjustment {
 
   [[nodiscard]] Linearised linearised(const SeenOutline& seen) const {
     const data::Camera here = camera(fit_.numbers);
-    const PoseMotion motion(body_, support_, here);
+    const data::PoseMotion motion(body_, support_, here);
     const MatchedEdges edges(body_, seen, here);
     Linearised out{edges.off_px(seen.pose, here), {}, {}, edges.parts()};
     // Differences over a third of a pixel: well above how the outline is sampled.
@@ -138,7 +138,7 @@ class OverheadAdjustment {
     for (int k = 0; k < motion.count(); ++k) {
       const bool turns = motion.rotation() >= 0 && k >= motion.rotation();
       const double by = kShift_px / (turns ? scale * body_.radius_m : scale);
-      const PoseMotion::Step step = by * PoseMotion::Step::Unit(motion.count(), k);
+      const data::PoseMotion::Step step = by * data::PoseMotion::Step::Unit(motion.count(), k);
       out.by_pose.col(k) = (out.off_px - edges.off_px(motion.moved(seen.pose, step), here)) / by;
     }
     // Height, turns and k1: a few pixels beside the middle, nearly straight so far.
@@ -153,7 +153,7 @@ class OverheadAdjustment {
 
   [[nodiscard]] Say say_of(const Linearised& edges, double scatter_px) const {
     constexpr double kTukey = 4.0;
-    const PoseMotion motion(body_, support_, camera(fit_.numbers));
+    const data::PoseMotion motion(body_, support_, camera(fit_.numbers));
     const int count = motion.count();
     Eigen::MatrixXd poses = Eigen::MatrixXd::Zero(count, count),
                     mixed = Eigen::MatrixXd::Zero(count, kNumbers);
@@ -294,7 +294,7 @@ class OverheadAdjustment {
 
   void move(const std::vector<Say>& says, const OverheadNumbers& by, double share) {
     fit_.numbers += by;
-    const PoseMotion motion(body_, support_, camera(fit_.numbers));
+    const data::PoseMotion motion(body_, support_, camera(fit_.numbers));
     for (std::size_t i = 0; i < seen_.size(); ++i)
       seen_[i].pose =
           motion.moved(seen_[i].pose, share * says[i].pose_step + says[i].pose_by_numbers * by);

@@ -32,7 +32,7 @@ struct MomentOutline {
   // @param blur2_px2 of a border at rest, @param smear the body's motion from end to end of the
   // exposure, or empty, @param part of it that the moment stands for.
   MomentOutline(const std::vector<OutlineSample>& outline, double blur2_px2,
-                const PoseMotion::Step& smear, double part)
+                const data::PoseMotion::Step& smear, double part)
       : borders{Contour(outline, Contour::Of::rim), Contour(outline, Contour::Of::bore)},
         faces{Contour(outline, Contour::Of::near_rim), Contour(outline, Contour::Of::near_bore)} {
     for (std::size_t which = 0; which < borders.size(); ++which)
@@ -66,8 +66,8 @@ using Taps = Eigen::Array<double, kTapsPx.size(), 1>;
 struct Cover {
   Taps covered = Taps::Zero(), density = Taps::Zero();
   Taps wall = Taps::Zero();  // of what is covered
-  Eigen::Array<double, kTapsPx.size(), PoseMotion::kMost> change =
-      Eigen::Array<double, kTapsPx.size(), PoseMotion::kMost>::Zero();
+  Eigen::Array<double, kTapsPx.size(), data::PoseMotion::kMost> change =
+      Eigen::Array<double, kTapsPx.size(), data::PoseMotion::kMost>::Zero();
 };
 
 // A pixel of the colour planes near one border.
@@ -75,7 +75,7 @@ struct Pixel {
   double value = 0.0;                   // colour, from what has none
   double covered = 0.0, density = 0.0;  // as a share of the body's colour
   double wall = 0.0;                    // likewise, of its wall
-  PoseMotion::Step change{};
+  data::PoseMotion::Step change{};
 
   // So far from the border that it shows a level.
   [[nodiscard]] bool is_clear() const {
@@ -136,7 +136,7 @@ class ColourFit {
   [[nodiscard]] std::optional<ColourEdge> edge_of(const ColourStretch& stretch) const;
 
   const std::vector<OutlineSample>& outline_;
-  const PoseMotion::Step& smear_;
+  const data::PoseMotion::Step& smear_;
   double part_;  // of the exposure, that a moment stands for
   double blur2_px2_;
   MomentOutline middle_;
@@ -307,7 +307,7 @@ void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw
     const ColourMixing& mixing = colour.mixing_in(stretch.shade);
     Pixel& pixel = pixels_[stretch.end++];
     pixel.value = from.value;
-    pixel.change = PoseMotion::Step::Zero(parameters);
+    pixel.change = data::PoseMotion::Step::Zero(parameters);
     for (Eigen::Index k = 0; k < from.cover.covered.size(); ++k) {
       const double covered = from.cover.covered[k];
       const double slope = mixing.slope(covered) / kTapsPx.size();
@@ -433,7 +433,7 @@ std::optional<ColourEdge> ColourFit::edge_of(const ColourStretch& stretch) const
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double sum = 0.0, square = 0.0, left = 0.0;
-  PoseMotion::Step motion = PoseMotion::Step::Zero(sample.motion.size());
+  data::PoseMotion::Step motion = data::PoseMotion::Step::Zero(sample.motion.size());
   for (std::size_t i = stretch.first; i < stretch.end; ++i) {
     const Pixel& p = pixels_[i];
     const double wall_share = p.covered > 0.0 ? p.wall / p.covered : 0.0;

@@ -12,7 +12,7 @@ namespace trochoid::tracking {
 /// What the colour planes show of the silhouette about one of its samples.
 struct ColourEdge {
   std::size_t sample;       ///< of the outline
-  PoseMotion::Step motion;  ///< how far it moves along its normal per unit of each parameter
+  data::PoseMotion::Step motion;  ///< how far it moves along its normal per unit of each parameter
   double blur_px;           ///< of the edge in the planes
   ProfileEdge edge;
 };
@@ -21,7 +21,7 @@ struct ColourEdge {
 struct ExposedOutline {
   const std::vector<OutlineSample>& middle;
   const Moments& moments;         ///< empty: it hardly moves
-  const PoseMotion::Step& smear;  ///< the body's motion from end to end; empty: not known
+  const data::PoseMotion::Step& smear;  ///< the body's motion from end to end; empty: not known
 };
 
 /// The silhouette in the colour planes, pixel by pixel as they are coded: how much of each the body

@@ -199,7 +199,7 @@ class CylinderFinder final : public BodyFinder {
   data::Camera camera_;
   double exposure_fraction_;
   bool alike_, pivoted_;
-  PoseMotion motion_;
+  data::PoseMotion motion_;
   OutlineFitter fitter_;
   bool looks_again_;
   std::unique_ptr<CylinderFinder> lying_;

@@ -6,7 +6,7 @@
 
 #include "find/usual_frames.hpp"
 #include "geometry/pose_change.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
@@ -44,7 +44,7 @@ Pose turning_on(const Three<Pose>& past, double t) {
   next.theta_rad = std::clamp(theta.quadratic(t), 0.0, data::kPi);
   const Eigen::Vector3d late = (c.centre_m - b.centre_m) / (past.t2 - past.t1);
   const double between = 0.5 * (phi_c + next.phi_rad) - 0.5 * (phi_b + phi_c);
-  next.centre_m = c.centre_m + (t - past.t2) * turned_about_vertical(late, between);
+  next.centre_m = c.centre_m + (t - past.t2) * data::turned_about_vertical(late, between);
   return next;
 }
 
@@ -55,7 +55,7 @@ Pose swinging_on(const Three<Pose>& past, double t) {
                                   quantity(past.v0), quantity(past.v1), quantity(past.v2)};
   };
   Pose next = past.v2;
-  set_axis(of(axis_of).quadratic(t).normalized(), next);
+  set_axis(of(data::axis_of).quadratic(t).normalized(), next);
   next.phi_rad = nearest(next.phi_rad, past.v2.phi_rad, data::kTurn);
   next.centre_m = of([](const Pose& p) { return p.centre_m; }).quadratic(t);
   return next;

@@ -137,7 +137,7 @@ Sweep between(const Sweep& from, const Sweep& to, double part) {
   return sweep;
 }
 
-Moments moments_of(const data::Body& body, const data::Camera& camera, const PoseMotion& motion,
+Moments moments_of(const data::Body& body, const data::Camera& camera, const data::PoseMotion& motion,
                    const ExposureMotion& exposure, const Pose& middle, int parts) {
   Moments moments;
   for (int k = 0; k < parts; ++k) {

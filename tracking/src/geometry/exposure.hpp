@@ -43,7 +43,7 @@ struct Sweep {
 /// Outlines at the middles of so many equal parts of the exposure.
 using Moments = std::vector<std::vector<OutlineSample>>;
 [[nodiscard]] Moments moments_of(const data::Body& body, const data::Camera& camera,
-                                 const PoseMotion& motion, const ExposureMotion& exposure,
+                                 const data::PoseMotion& motion, const ExposureMotion& exposure,
                                  const data::Pose<>& middle, int parts);
 
 /// Sweeps of all samples of the outline in the middle, each within as many parts as there are

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 
 namespace trochoid::tracking {
@@ -51,7 +51,7 @@ Eigen::Vector3d PoseChange::axis_turning_on(const Pose& pose, double share) cons
 Eigen::Vector3d PoseChange::shift_m(double share, Centre centre) const {
   if (centre == Centre::straight) return share * shift_m_;
   // From the middle of the one way to the middle of the other.
-  return share * turned_about_vertical(shift_m_, 0.5 * (1.0 + share) * precession_rad_);
+  return share * data::turned_about_vertical(shift_m_, 0.5 * (1.0 + share) * precession_rad_);
 }
 
 bool is_steep(const data::Pose<>& pose) {

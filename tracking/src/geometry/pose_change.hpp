@@ -11,7 +11,7 @@ namespace trochoid::tracking {
 ///           (either pose is steep), along the chord between the two axes instead;
 ///   centre  straight on, or with a velocity that turns with the precession;
 ///   spin    not at all: it is read anew in every picture.
-/// The support is not enforced: PoseMotion::settled.
+/// The support is not enforced: data::PoseMotion::settled.
 class PoseChange {
  public:
   using Pose = data::Pose<>;

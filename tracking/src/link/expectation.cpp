@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "geometry/pose_change.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/quantile.hpp"

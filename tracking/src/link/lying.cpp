@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 
@@ -49,7 +49,7 @@ bool axis_stays(const std::vector<Glimpse>& glimpses, std::size_t i) {
 }
 
 Pose lying(Pose pose) {
-  pose.theta_rad = lying_theta_rad(pose.theta_rad);
+  pose.theta_rad = data::lying_theta_rad(pose.theta_rad);
   pose.phi_rad = 0.0;
   return pose;
 }

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "geometry/pose_change.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/quantile.hpp"
 

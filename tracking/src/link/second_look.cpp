@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "geometry/pose_change.hpp"
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

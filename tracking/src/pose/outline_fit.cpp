@@ -112,7 +112,7 @@ double steepest_alike(const data::Body& body) {
 
 // Where several attitudes explain a picture about as well, the one chosen is no better known than
 // they are apart.
-void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
+void spread_over(const data::PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
   // From start to start the support of one attitude differs by up to a tenth.
   // Evenness differs by more, and would leave out attitudes that the edges alone do not tell apart.
   constexpr double kAsGood = 0.9;
@@ -120,7 +120,7 @@ void spread_over(const PoseMotion& motion, const std::vector<Fitted>& others, Fi
   double count = 1.0;
   for (const Fitted& other : others) {
     if (other.support_px < kAsGood * chosen.support_px) continue;
-    const PoseMotion::Step off = motion.step_between(chosen.refined.pose, other.refined.pose);
+    const data::PoseMotion::Step off = motion.step_between(chosen.refined.pose, other.refined.pose);
     square += off * off.transpose();
     count += 1.0;
   }
@@ -175,7 +175,7 @@ double outline_length_px(const Scenery& scenery, const data::Pose<>& pose) {
 
 // How far the edges of a fit lie from where a pose would put them, rms [px].
 double moved_px(const Scenery& scenery, const Refined& refined, const data::Pose<>& from) {
-  const PoseMotion::Step step = scenery.motion.step_between(from, refined.pose);
+  const data::PoseMotion::Step step = scenery.motion.step_between(from, refined.pose);
   double sum = 0.0;
   for (const OutlineSample& sample : refined.samples) sum += std::pow(sample.motion.dot(step), 2);
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(refined.samples.size())));
@@ -392,7 +392,7 @@ OutlineFitter::OutlineFitter(data::Body body, data::Support support, data::Camer
 }
 
 std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) const {
-  const PoseMotion motion(body_, support_, camera_);
+  const data::PoseMotion motion(body_, support_, camera_);
   const bool alike = body_.faces_look_alike() && support_.kind != data::SupportKind::pivot;
   const std::vector<data::Pose<>> starts =
       view.predicted   ? std::vector{motion.settled(*view.predicted)}
@@ -416,9 +416,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
       .colour = std::move(colour),
       .most_looks = most_looks_,
       .visit = view.visit,
-      .smear = moving ? PoseMotion::Step(view.exposure_fraction *
+      .smear = moving ? data::PoseMotion::Step(view.exposure_fraction *
                                          motion.step_between(*view.previous, starts.front()))
-                      : PoseMotion::Step(),
+                      : data::PoseMotion::Step(),
       // Levels that are light mix linearly, whatever their colours.
       .tints = camera_.transfer == data::Transfer::linear
                    ? std::nullopt

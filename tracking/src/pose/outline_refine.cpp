@@ -375,8 +375,8 @@ double seen_px(const Search& search, const Round& round, const Refined& refined)
   return sum;
 }
 
-PoseMotion::Step prior_of(const PoseMotion& motion) {
-  PoseMotion::Step sd(motion.count());
+data::PoseMotion::Step prior_of(const data::PoseMotion& motion) {
+  data::PoseMotion::Step sd(motion.count());
   for (int i = 0; i < motion.count(); ++i) sd[i] = motion.scale(i);
   return sd;
 }
@@ -387,7 +387,7 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
                               const Search& search) {
   Refined out;
   out.pose = start;
-  const PoseMotion::Step prior = prior_of(scenery.motion);
+  const data::PoseMotion::Step prior = prior_of(scenery.motion);
   // Edges this share of the blur apart may belong together, whatever they claim.
   constexpr double kLeastScale = 0.15, kLeastExactScale = 0.05;
   const double least_scale_px = (search.exact ? kLeastExactScale : kLeastScale) * search.blur_px;

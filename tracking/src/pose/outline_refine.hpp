@@ -18,12 +18,12 @@ inline constexpr double kUsualBlurPx = 0.72;
 struct Scenery {
   const data::Body& body;
   const data::Camera& camera;
-  const PoseMotion& motion;
+  const data::PoseMotion& motion;
   LightWindow picture, plate;
   ColourWindow colour;
   double most_looks;
   Visit visit = Visit::only;
-  PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
+  data::PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
   std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
   const ShadingMemory* shading = nullptr;    ///< what other frames show; may be null

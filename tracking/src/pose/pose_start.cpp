@@ -16,7 +16,7 @@ namespace {
 constexpr size_t kMostStarts = 10;
 
 // Puts the centre on the ray through a pixel at the height the support wants.
-std::optional<data::Pose<>> on_ray(const data::Camera& camera, const PoseMotion& motion,
+std::optional<data::Pose<>> on_ray(const data::Camera& camera, const data::PoseMotion& motion,
                                    data::Pose<> pose, const Eigen::Vector2d& centre_px) {
   pose = motion.settled(pose);
   try {
@@ -55,7 +55,7 @@ std::vector<data::Pose<>> attitudes(double step_rad) {
 struct SilhouetteSearch {
   const data::Body& body;
   const data::Camera& camera;
-  const PoseMotion& motion;
+  const data::PoseMotion& motion;
   const EdgeMap& map;
   double radius_px;
 };
@@ -196,7 +196,7 @@ std::vector<data::Pose<>> best_distinct(std::vector<PlaceCandidate> found, doubl
 
 // How large the body appears about a pixel [px].
 double radius_in_picture(const data::Body& body, const data::Camera& camera,
-                         const PoseMotion& motion, const Eigen::Vector2d& at_px) {
+                         const data::PoseMotion& motion, const Eigen::Vector2d& at_px) {
   const auto level = on_ray(camera, motion, {}, at_px);
   if (!level) return 0.0;
   const Eigen::Matrix<double, 2, 3> J = camera.jacobian_px_per_m(level->centre_m);
@@ -206,7 +206,7 @@ double radius_in_picture(const data::Body& body, const data::Camera& camera,
 }  // namespace
 
 std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::Support& support,
-                                            const data::Camera& camera, const PoseMotion& motion,
+                                            const data::Camera& camera, const data::PoseMotion& motion,
                                             const OutlineView& view) {
   const Detection& detection = *view.detection;
   constexpr double kCellsPerRadius = 12.0;
@@ -229,7 +229,7 @@ std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::
                        radius_px);
 }
 
-data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
+data::Pose<> mirrored(const data::Camera& camera, const data::PoseMotion& motion,
                       const data::Pose<>& pose) {
   const Eigen::Vector3d towards = direction_to(camera, pose.centre_m);
   const Eigen::Vector3d k = data::symmetry_axis(pose.theta_rad, pose.phi_rad);
@@ -275,7 +275,7 @@ struct View {
 
 // The body with its near face tilted otherwise, and the point so far ahead of its centre seen where
 // a point of the scene is.
-std::optional<data::Pose<>> tilted(const data::Camera& camera, const PoseMotion& motion,
+std::optional<data::Pose<>> tilted(const data::Camera& camera, const data::PoseMotion& motion,
                                    const View& view, data::Pose<> pose, double facing, Side side,
                                    const Eigen::Vector3d& at_m, double ahead_m) {
   const double way = side == Side::same ? 1.0 : -1.0;
@@ -293,7 +293,7 @@ std::optional<data::Pose<>> tilted(const data::Camera& camera, const PoseMotion&
 }  // namespace
 
 std::optional<data::Pose<>> face_outlined_like(const data::Body& body, const data::Camera& camera,
-                                               const PoseMotion& motion, const data::Pose<>& pose,
+                                               const data::PoseMotion& motion, const data::Pose<>& pose,
                                                Side side) {
   const double h = body.half_thickness_m();
   const View view(camera, pose);
@@ -304,7 +304,7 @@ std::optional<data::Pose<>> face_outlined_like(const data::Body& body, const dat
 }
 
 std::optional<data::Pose<>> outlined_like_face(const data::Body& body, const data::Camera& camera,
-                                               const PoseMotion& motion, const data::Pose<>& pose) {
+                                               const data::PoseMotion& motion, const data::Pose<>& pose) {
   const double h = body.half_thickness_m();
   const View view(camera, pose);
   if (!(view.facing > 0.0 && view.leaning() > 0.0)) return std::nullopt;

@@ -2,7 +2,7 @@
 #include <optional>
 #include <vector>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "pose/edge_map.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
 
@@ -15,11 +15,11 @@ namespace trochoid::tracking {
 [[nodiscard]] std::vector<data::Pose<>> starts_from_edges(const data::Body& body,
                                                           const data::Support& support,
                                                           const data::Camera& camera,
-                                                          const PoseMotion& motion,
+                                                          const data::PoseMotion& motion,
                                                           const OutlineView& view);
 
 /// The other attitude with (nearly) the same silhouette: the axis mirrored at the line of sight.
-[[nodiscard]] data::Pose<> mirrored(const data::Camera& camera, const PoseMotion& motion,
+[[nodiscard]] data::Pose<> mirrored(const data::Camera& camera, const data::PoseMotion& motion,
                                     const data::Pose<>& pose);
 
 /// On which side of the line of sight a body tilts, of another attitude.
@@ -30,14 +30,14 @@ enum class Side { same, mirrored };
 /// Nothing where there is none; about a pivot on the same side only.
 [[nodiscard]] std::optional<data::Pose<>> face_outlined_like(const data::Body& body,
                                                              const data::Camera& camera,
-                                                             const PoseMotion& motion,
+                                                             const data::PoseMotion& motion,
                                                              const data::Pose<>& pose, Side side);
 
 /// The reverse, on the same side: the attitude whose whole outline is as that of the near face
 /// alone is at this pose. The lower edge of its wall has been taken for that of its face.
 [[nodiscard]] std::optional<data::Pose<>> outlined_like_face(const data::Body& body,
                                                              const data::Camera& camera,
-                                                             const PoseMotion& motion,
+                                                             const data::PoseMotion& motion,
                                                              const data::Pose<>& pose);
 
 }  // namespace trochoid::tracking

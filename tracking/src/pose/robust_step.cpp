@@ -18,9 +18,9 @@ namespace {
 // Unknowns: per group the error of the edge model as a function of direction, given at kKnots
 // directions and blended between them; then the pose and the nuisances common to the outline.
 constexpr int kCommon = 7, kKnots = 8;
-static_assert(PoseMotion::kMost + kCommon + kGroups * kKnots <= ArrowSystem::kMost);
+static_assert(data::PoseMotion::kMost + kCommon + kGroups * kKnots <= ArrowSystem::kMost);
 constexpr int kRow = 12;  // two knots, the pose, four of those common to the outline; even
-static_assert(2 + PoseMotion::kMost + 4 <= kRow);
+static_assert(2 + data::PoseMotion::kMost + 4 <= kRow);
 using Vector = ArrowSystem::Vector;
 
 // Where the pose begins among the unknowns.
@@ -131,7 +131,7 @@ class Accumulating {
   std::array<double, kRow> right_;
 };
 
-ArrowSystem prior_information(const PoseMotion::Step& prior_sd, bool directions) {
+ArrowSystem prior_information(const data::PoseMotion::Step& prior_sd, bool directions) {
   const int n = static_cast<int>(prior_sd.size()), first = pose_at(directions);
   ArrowSystem system(directions ? kGroups : 0, directions ? kKnots : 0, n + kCommon);
   for (int i = 0; i < first; ++i) system(i, i) = 1.0;
@@ -340,7 +340,7 @@ std::vector<EquationRow> rows_of(const std::vector<EdgeEquation>& equations, boo
 
 }  // namespace
 
-bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
                     double least_scale_px, bool directions, RobustSolution& out) {
   constexpr size_t kFewest = 8;
   if (equations.size() < kFewest) return false;
@@ -369,7 +369,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step
   return true;
 }
 
-void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+void find_uncertainty(const std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
                       RobustSolution& solution) {
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(true);

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "geometry/pose_motion.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 
@@ -14,7 +14,7 @@ inline constexpr int kGroups = 4;  ///< outer silhouette, bore, the body's own e
 /// on outer rims, -1 on bores), `polarity` a shift towards the brighter side (the sign of the
 /// contrast).
 struct EdgeEquation {
-  PoseMotion::Step motion;
+  data::PoseMotion::Step motion;
   double swell = 1.0, polarity = 1.0;
   /// Contrast over mean level: how far the edge moves if the transfer curve is not the one assumed.
   double tone = 0.0;
@@ -47,7 +47,7 @@ struct EdgeEquation {
 };
 
 struct RobustSolution {
-  PoseMotion::Step step;
+  data::PoseMotion::Step step;
   double scale = 1.0;  ///< of the errors, over what the edges claim; at least 1
   double swell_px = 0.0, polarity_px = 0.0;
   Eigen::Vector2d colour_shift_px = Eigen::Vector2d::Zero();
@@ -68,12 +68,12 @@ struct RobustSolution {
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
 /// `prior_sd` per parameter. False if fewer than 8 equations.
 /// @param directions allow for what the edge models may be wrong by in every direction.
-bool solve_robustly(std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
                     double least_scale_px, bool directions, RobustSolution& out);
 
 /// How well a solution found with `directions` is known; infinitely badly if its equations do not
 /// determine it. The equations are as solve_robustly left them.
-void find_uncertainty(const std::vector<EdgeEquation>& equations, const PoseMotion::Step& prior_sd,
+void find_uncertainty(const std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
                       RobustSolution& solution);
 
 }  // namespace trochoid::tracking

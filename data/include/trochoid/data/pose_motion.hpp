@@ -6,7 +6,7 @@
 #include "trochoid/data/pose.hpp"
 #include "trochoid/data/scene.hpp"
 
-namespace trochoid::tracking {
+namespace trochoid::data {
 
 /// @returns `v` after a turn about the vertical of the table.
 [[nodiscard]] inline Eigen::Vector3d turned_about_vertical(const Eigen::Vector3d& v,
@@ -24,46 +24,47 @@ class PoseMotion {
   /// Per unit of each parameter: velocity of the centre (rows 0-2), rotation vector (rows 3-5).
   using Velocities = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMost>;
 
-  PoseMotion(const data::Body& body, const data::Support& support, const data::Camera& camera);
+  PoseMotion(const Body& body, const Support& support, const Camera& camera);
 
   [[nodiscard]] int count() const { return count_; }
   /// Index of the rotation about the node line; the one about e2 follows. -1: the attitude is
   /// fixed.
   [[nodiscard]] int rotation() const { return rotation_; }
   /// The axis goes through a pivot.
-  [[nodiscard]] bool pivoted() const { return support_.kind == data::SupportKind::pivot; }
-  /// That pivot.
-  [[nodiscard]] const Eigen::Vector3d& pivot_m() const { return *support_.pivot_m; }
+  [[nodiscard]] bool pivoted() const { return support_ == SupportKind::pivot; }
+  /// That pivot; the origin of the table where the scene names none.
+  [[nodiscard]] const Eigen::Vector3d& pivot_m() const { return pivot_m_; }
   /// Standard deviation [m or rad] of what a parameter could be at most; keeps the fit regular
   /// where the picture says nothing.
   [[nodiscard]] double scale(int parameter) const;
-  [[nodiscard]] Velocities velocities(const data::Pose<>& pose) const;
-  [[nodiscard]] data::Pose<> moved(const data::Pose<>& pose, const Step& step) const;
+  [[nodiscard]] Velocities velocities(const Pose<>& pose) const;
+  [[nodiscard]] Pose<> moved(const Pose<>& pose, const Step& step) const;
   /// The small motion that leads from one pose to another, to first order.
-  [[nodiscard]] Step step_between(const data::Pose<>& from, const data::Pose<>& to) const;
+  [[nodiscard]] Step step_between(const Pose<>& from, const Pose<>& to) const;
   /// Puts a pose where the support wants it: height on the floor, flat, axis through the pivot.
-  [[nodiscard]] data::Pose<> settled(data::Pose<> pose) const;
+  [[nodiscard]] Pose<> settled(Pose<> pose) const;
 
  private:
   double radius_m_, half_thickness_m_;
-  data::Support support_;
+  SupportKind support_;
+  Eigen::Vector3d pivot_m_;
   int count_ = 0, rotation_ = -1;
   bool depth_free_ = false;
 };
 
 /// e2 of the node frame: steepest ascent in the plane of the disc.
-[[nodiscard]] Eigen::Vector3d ascent(const data::Pose<>& pose);
-[[nodiscard]] Eigen::Vector3d node_line(const data::Pose<>& pose);
-[[nodiscard]] Eigen::Vector3d axis_of(const data::Pose<>& pose);
+[[nodiscard]] Eigen::Vector3d ascent(const Pose<>& pose);
+[[nodiscard]] Eigen::Vector3d node_line(const Pose<>& pose);
+[[nodiscard]] Eigen::Vector3d axis_of(const Pose<>& pose);
 /// theta and phi of a direction; phi is kept where the axis is vertical.
-void set_axis(const Eigen::Vector3d& axis, data::Pose<>& pose);
+void set_axis(const Eigen::Vector3d& axis, Pose<>& pose);
 
 /// Tilt of a body that lies on the face it is nearer to lying on: 0 or pi [rad].
 [[nodiscard]] double lying_theta_rad(double theta_rad);
 
 /// Whether a body is held at its own middle: its pivot lies within half its thickness of the centre
 /// of this pose [m].
-[[nodiscard]] bool is_on_a_pin(const data::Body& body, const data::Support& support,
-                               const data::Pose<>& pose);
+[[nodiscard]] bool is_on_a_pin(const Body& body, const Support& support,
+                               const Pose<>& pose);
 
-}  // namespace trochoid::tracking
+}  // namespace trochoid::data
