@@ -286,6 +286,24 @@ TEST(Rivals, WithATermThatUsuallyActsWidenBarsTheMoreTheLessSpeaksAgainstThem) {
               std::sqrt((1.0 - weight) * 0.2 * 0.2 + weight * (2.7 * 2.7 + 1.0)), 1e-12);
 }
 
+// A made clip's friction set in over 0.28(6) mm/s by a body that rolled at first, over 0.7(3) by
+// one that might slip, and over 1 in truth.
+TEST(Rivals, OfTheSameTermsThatSlipAtFirstWidenTheErrorBarsThoughResidualsHangTogether) {
+  Rungs rungs{rung_of({1}, {loss("slip_regularisation_m_s", 0.3, 0.06)}, 100.0, 100.0),
+              rung_of({1}, {loss("slip_regularisation_m_s", 0.7, 0.3)}, 92.0, 100.0)};
+  rungs[0].rolls_at_first = true;
+  rungs[0].fit.whiteness_p = 1e-6;
+  data::Fit chosen = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], chosen);
+  // Half of the odds are for the other one: (0.4^2 + 0.3^2 - 0.06^2) / 2 further variance.
+  EXPECT_NEAR(chosen.parameters[0].sigma, std::sqrt(0.06 * 0.06 + 0.1232), 1e-12);
+
+  rungs[1].rolls_at_first = true;  // just another minimum
+  chosen = rungs[0].fit;
+  allow_for_rivals(rungs, rungs[0], chosen);
+  EXPECT_EQ(chosen.parameters[0].sigma, 0.06);
+}
+
 TEST(Rivals, ThatAreOtherMinimaOfTheSameModelWidenErrorBarsWithinBounds) {
   Rungs rungs{rung_of({1}, {loss("pivoting_friction_m", 5.0, 0.1)}, 100.0, 100.0),
               rung_of({1}, {loss("pivoting_friction_m", 25.0, 0.1)}, 102.0, 108.0)};

@@ -81,7 +81,7 @@ void predict_held_back_by_near_ones(const Contest& contest, Rungs& rungs, const 
 
 // A slip that friction ends within a few samples is not seen, so the chosen rung may as well roll
 // at first. Under friction that sets in softly this is tried only here, at the end: earlier it
-// would make many more sets of losses look alike.
+// would make many more sets of losses look alike. As it was it stays as a rival.
 void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& chosen) {
   if (chosen.rolls_at_first || softness_is_open(chosen)) return;
   const auto own =
@@ -89,6 +89,7 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
   if (own == rungs.end()) return;
   const double aicc = chosen.aicc, bic = chosen.bic;
   const int parameters = chosen.parameters;
+  Rung slips = chosen;
   let_roll_at_first(contest.tracks, contest.options, *own);
   if (!chosen.rolls_at_first) return;
   // The others, too, have the velocity to save, and may come into question then.
@@ -104,6 +105,8 @@ void let_chosen_roll_at_first(const Contest& contest, Rungs& rungs, const Rung& 
     rung.bic += chosen.bic - bic;
     rung.parameters += chosen.parameters - parameters;
   }
+  slips.name += ", slipping at first";
+  rungs.push_back(std::move(slips));
 }
 
 RivalGrounds rival_grounds(const Contest& contest, const Rung& chosen) {

@@ -71,20 +71,22 @@ struct Standing {
         acts(adds_only(likely(grounds), rung, chosen)),
         open(larger && adds_only(grounds.usual, rung, chosen) &&
              leaves_open(rung, chosen, grounds.losses)),
-        independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent) {}
+        independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent),
+        slips(chosen.rolls_at_first && !rung.rolls_at_first && rung.terms == chosen.terms) {}
   bool larger;       // has all of the chosen rung's terms, and further ones or another minimum
   bool too_large;    // there is strong evidence against it, for that
   bool acts;         // its further terms are usual ones, or other laws of such
   bool open;         // usual ones, and nothing beside them tells the chosen losses from them
   bool independent;  // what the chosen rung leaves hangs together next to nothing
+  bool slips;        // the chosen rung, but that the body may slip at first
 };
 
 // Where residuals hang together a further term may only follow the tracker's errors; but a rung
 // with one counts where BIC speaks for it, though not strongly, all the same, or where the term is
-// usual and which loss acts is open.
+// usual and which loss acts is open. A velocity of its own at the start is no further term.
 bool counts(const Rung& rung, const Rung& chosen, const Standing& standing) {
-  return in_question(rung, chosen) &&
-         (!standing.larger || standing.independent || standing.open || rung.bic < chosen.bic);
+  return in_question(rung, chosen) && (!standing.larger || standing.independent || standing.open ||
+                                       standing.slips || rung.bic < chosen.bic);
 }
 
 // By how much a rung is the likelier one, as a difference of -2 ln likelihood. By BIC, what usually

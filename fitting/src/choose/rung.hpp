@@ -89,11 +89,12 @@ struct RivalGrounds {
 /// tracker's errors: of those with further terms only such count there for which BIC speaks, or
 /// whose usual terms leave open whether a loss of the chosen one acts at all, and of these bars
 /// other than those of coefficients grow up to a bound. What leaves that open counts without AICc's
-/// charge for its terms. A loss that the chosen rung has grows no further than to nothing. A loss
-/// that a rung lacks is zero there. Warns where a bar grows noticeably. Rungs with further terms
-/// against which BIC's evidence is strong, for their size, widen all bars up to that bound, but for
-/// those that add nothing but usual terms, or the other law of one, which count by AICc; what one of
-/// them would change beyond that is said.
+/// charge for its terms. That the body may slip at first where the chosen rung rolls counts anyhow.
+/// A loss that the chosen rung has grows no further than to nothing. A loss that a rung lacks is
+/// zero there. Warns where a bar grows noticeably. Rungs with further terms against which BIC's
+/// evidence is strong, for their size, widen all bars up to that bound, but for those that add
+/// nothing but usual terms, or the other law of one, which count by AICc; what one of them would
+/// change beyond that is said.
 void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
                       const RivalGrounds& grounds = {});
 
