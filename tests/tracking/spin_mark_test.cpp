@@ -65,6 +65,7 @@ TEST_P(MarkThatTurns, IsReadInTheMiddleOfItsExposure) {
     const auto reading =
         read_marks(photographed(body, camera, psi_rad, GetParam()), body, camera, lying(psi_rad));
     ASSERT_TRUE(reading) << psi_rad;
+    EXPECT_EQ(reading->bright, kMark_levels > kDisc_levels);
     const double off_rad = std::remainder(reading->psi_rad - psi_rad, 2.0 * std::numbers::pi);
     constexpr double kFar_rad = 0.02;
     EXPECT_LT(std::abs(off_rad), kFar_rad) << psi_rad;

@@ -64,6 +64,15 @@ TEST(SpinSequence, GapsAreNoReason) {
   EXPECT_EQ(body.forgotten(), std::vector<std::size_t>{21});
 }
 
+// Glints had hidden a bright mark for seven frames, and left a dark corner in two of them.
+TEST(SpinSequence, ADarkMarkWhereAllOthersAreBrightIsForgottenUnlessItGoesOnWithThem) {
+  Spinning body;
+  for (std::size_t i = 0; i < kGlimpses; ++i) body.pose(i).bright_marks = i != 5 && i != 20;
+  for (const std::size_t i : {17U, 18U, 19U, 21U, 22U, 23U}) body.pose(i).sigma_psi_rad.reset();
+  body.pose(20).pose.psi_rad += 1.3;
+  EXPECT_EQ(body.forgotten(), std::vector<std::size_t>{20});
+}
+
 TEST(SpinSequence, AnImpactThatChangesTheSpinIsNone) {
   for (const int frame : {3, 4, 5, 6, 8, kGlimpses / 2, kGlimpses - 4})
     EXPECT_TRUE(Spinning(-90.0, frame).forgotten().empty()) << frame;

@@ -1,6 +1,7 @@
 #include "link/spin_sequence.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -21,8 +22,13 @@ class SpinSequence {
   explicit SpinSequence(const std::vector<Glimpse>& glimpses) {
     for (std::size_t i = 0; i < glimpses.size(); ++i)
       if (glimpses[i].posed() && glimpses[i].seen->pose->sigma_psi_rad)
-        readings_.push_back({i, glimpses[i].frame->t_s, glimpses[i].pose()});
+        readings_.push_back(
+            {i, glimpses[i].frame->t_s, glimpses[i].pose(), glimpses[i].seen->pose->bright_marks});
     if (readings_.size() > 1) frame_s_ = data::usual_step_s(readings_, &Reading::t_s);
+    for (const Reading& reading : readings_) {
+      ++count_[reading.upper()];
+      bright_[reading.upper()] += reading.bright;
+    }
   }
 
   /// Frames whose spin is off.
@@ -38,6 +44,9 @@ class SpinSequence {
     std::size_t frame;
     double t_s;
     data::Pose<> pose;
+    bool bright;
+
+    [[nodiscard]] std::size_t upper() const { return pose.theta_rad < 0.5 * data::kPi ? 1 : 0; }
   };
 
   /// About the body's own axis, modulo a turn: what precession turns the node line by, from which
@@ -99,8 +108,17 @@ class SpinSequence {
     return even(k) || (k >= 1 && even(k - 1)) || (k >= 2 && even(k - 2));
   }
 
+  /// Whether a mark looks otherwise than nearly all that are seen of its face.
+  [[nodiscard]] bool strange(std::size_t k) const {
+    constexpr double kFew = 0.2;
+    const Reading& reading = readings_[k];
+    const int bright = bright_[reading.upper()], all = count_[reading.upper()];
+    return (reading.bright ? bright : all - bright) < kFew * all;
+  }
+
   [[nodiscard]] bool contradicted(std::size_t k) const {
     if (goes_on(k)) return false;
+    if (strange(k)) return true;
     constexpr double kNext_frames = 3.0, kMost = 0.75;
     constexpr double kFar_rad = 1.0;  // no error of a mark that is the right one
     constexpr int kFewest = 3;
@@ -118,6 +136,7 @@ class SpinSequence {
   }
 
   std::vector<Reading> readings_;
+  std::array<int, 2> count_{}, bright_{};  // of the lower and the upper face's readings
   double frame_s_ = 1.0;
 };
 

@@ -445,6 +445,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
                                 : read_marks(view.luma, body_, camera_, m.pose)) {
     m.pose.psi_rad = marks->psi_rad;
     m.sigma_psi_rad = spin_sigma_rad(m, *marks);
+    m.bright_marks = marks->bright;
   }
   return m;
 }

@@ -275,6 +275,7 @@ std::optional<MarkReading> read_marks(const cv::Mat& luma, const data::Body& bod
   const double per_pixel = std::max(1.0, kFaceRings * kFaceSpokes / area_px2);
   reading.sigma_rad =
       std::sqrt((unlike + 0.1) * per_pixel / (contrast * contrast * turn_power(best.marks)));
+  reading.bright = best.sums[static_cast<size_t>(peak.at)] > 0.0F;
   reading.radius_px = 0.5 * (band.from_m + band.to_m) * px_per_m;
   return reading;
 }

@@ -13,6 +13,7 @@ struct MarkReading {
   double psi_rad = 0.0;    ///< spin, modulo a turn: the angle from the node line to body x
   double sigma_rad = 0.0;  ///< from the noise of the picture and the likeness of the marks alone
   double radius_px = 0.0;  ///< about how far from the axis the marks appear
+  bool bright = false;     ///< the marks are brighter than their face
 };
 
 /// Reads the spin of a posed body from the known marks of the face towards the camera: the face is

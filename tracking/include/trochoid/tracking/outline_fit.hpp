@@ -43,6 +43,7 @@ struct PoseMeasurement {
   double sigma_theta_rad = 0.0;    ///< infinite when the image does not tell
   double sigma_phi_rad = 0.0;
   std::optional<double> sigma_psi_rad;
+  bool bright_marks = false;  ///< those that psi was read from look brighter than their face
   /// Of these, what does not come from the scatter of this frame's edges.
   PoseSpread common;
   /// Variance by which the scatter has been multiplied because parts of the outline contradict each
