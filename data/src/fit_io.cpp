@@ -44,6 +44,7 @@ void arc_keys(Visit&& visit) {
   visit("from_s", &FitArc::from_s);
   visit("to_s", &FitArc::to_s);
   visit("samples", &FitArc::samples);
+  visit("noise_scale", &FitArc::noise_scale);
 }
 
 template <class Visit>

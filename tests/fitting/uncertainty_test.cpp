@@ -220,6 +220,51 @@ TEST(SeveralRecordings, WithoutCovariancesHaveEachItsOwnNoise) {
                                                    "noise of its positions, 2e-05 m")));
 }
 
+// What one states of its noise was taken for both: 241 of 962 positions "far off".
+TEST(SeveralRecordings, HaveEachItsOwnNoiseWhateverTheyState) {
+  constexpr double kOverstated = 10.0;
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::Fit honest = fit(tracks, scene);
+  for (data::TrackSample& sample : tracks[1].samples)
+    sample.covariance_m2 *= kOverstated * kOverstated;
+  const data::Fit both = fit(tracks, scene);
+  EXPECT_EQ(both.verdict, data::FitVerdict::good) << both.verdict_words;
+  EXPECT_THAT(both.verdict_words, testing::HasSubstr(" to 0.99 times the stated"));
+  EXPECT_NEAR(both.arcs[1].noise_scale * kOverstated, honest.arcs[1].noise_scale, 0.1);
+  EXPECT_NEAR(both.find("l_m")->sigma, honest.find("l_m")->sigma, 0.05 * honest.find("l_m")->sigma);
+  EXPECT_LT(pull(both, "l_m", 0.1), kFar);
+}
+
+TEST(SeveralRecordings, ThatDoNotShareWhatTheyShouldAreDoubtfulAndToldApart) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),
+                                  thesis_track(25.0, 1e-3, 13)};
+  for (data::TrackSample& sample : tracks[2].samples) sample.centre_m *= 1.02;
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::Fit all = fit(tracks, scene);
+  EXPECT_EQ(all.verdict, data::FitVerdict::doubtful) << all.verdict_words;
+  EXPECT_THAT(all.verdict_words, testing::HasSubstr("above all track 3: for l_m = 0.10"));
+}
+
+TEST(Prior, ThatContradictsTheTrackMakesTheFitDoubtful) {
+  const data::Track track = thesis_track(25.0, 1e-3, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  const double alone = fit_of(track, scene).find("l_m")->value;
+  scene.fit.prior["l_m"] = {alone + 5e-4, 5e-4};
+  const data::Fit agreed = fit_of(track, scene);
+  EXPECT_EQ(agreed.verdict, data::FitVerdict::good) << agreed.verdict_words;
+  EXPECT_THAT(agreed.warnings, testing::Not(testing::Contains(testing::HasSubstr("prior"))));
+
+  scene.fit.prior["l_m"] = {alone + 5e-3, 5e-4};
+  const data::Fit torn = fit_of(track, scene);
+  EXPECT_EQ(torn.verdict, data::FitVerdict::doubtful) << torn.verdict_words;
+  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("the prior l_m = 0.1046"));
+  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("which alone says about 0.0996"));
+}
+
 TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
   std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
   data::Scene scene;

@@ -55,7 +55,7 @@ TEST(Prediction, SaysNothingOfASpinThatIsNotSeenOrNotPredicted) {
 TEST(Prediction, TheGivenPlaceOfAPivotIsNotJudged) {
   data::TrackFile file;
   file.tracks = {{.object = 0, .samples = {seen(1.0, 2.0)}}};
-  EXPECT_TRUE(residuals(file, turning(), 1.0).at(0).empty());
+  EXPECT_TRUE(residuals(file, turning()).at(0).empty());
 }
 
 // A disc nearly flat with a strong loss, down within a second, and recorded for two.
@@ -178,7 +178,7 @@ TEST_P(ReplayOf, AFitThatExplainsItsTrackIsAsNearToItAsTheNoise) {
   const data::Fit fit = fit_job(file.tracks, scene, {}, false);
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_NEAR(fit.noise_scale, 1.0, 0.2);
-  EXPECT_LT(rms_m(residuals(file, replay(fit, file), 1.0).at(0)), 1.2 * kNoise_m);
+  EXPECT_LT(rms_m(residuals(file, replay(fit, file)).at(0)), 1.2 * kNoise_m);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "judge/counting.hpp"
 #include "observe/decompositions.hpp"
@@ -68,6 +69,12 @@ bool explains_path(const Squares& sum) {
 struct Misfit {
   double times = 0.0;  // residuals over noise
   Channel channel = Channel::position;
+  int track = -1;  // of several
+
+  [[nodiscard]] std::string words() const {
+    const std::string what = kChannelWords[static_cast<int>(channel)];
+    return track < 0 ? "its " + what : fmt::format("track {}'s {}", track + 1, what);
+  }
 };
 
 bool seen(const Problem& problem, Channel channel) {
@@ -86,14 +93,26 @@ double typical_noise(const Problem& problem, Channel channel) {
   return median(std::move(sigmas));
 }
 
-// Of the worst channel. A path that is followed is doubtful at most: trackers know little of their
-// common errors. The noise is the larger one of the track's own sigmas and the scatter of
+// What a channel's residuals are in one track, over its sigmas or the scatter of its samples.
+double times_noise(const Problem& problem, int track, Channel channel) {
+  constexpr double kFine = 1.04;  // nobody asks whether the samples scatter as much
+  double noise = 0.0, scatter = 1.0;
+  for (const ArcData& arc : problem.arcs) {
+    if (arc.track != track) continue;
+    noise = std::max(noise, noise_scale(arc, channel));
+    if (noise_scale(arc, channel) > kFine)
+      scatter = std::max(scatter, excess_scatter(arc, channel));
+  }
+  return noise / scatter;
+}
+
+// Of the worst channel and track. A path that is followed is doubtful at most: trackers know little
+// of their common errors. The noise is the larger one of the track's own sigmas and the scatter of
 // its samples about a smooth curve.
 Misfit misfit(const Problem& problem, const Squares& sum) {
   constexpr double kFollowed_rad = 0.2;
   // Within 1 % of the motion, and not so far off that only the model can be to blame.
   constexpr double kFollowed = 1e-4, kAnyTracker = 8.0;
-  constexpr double kFine = 1.04;  // nobody asks whether the samples scatter as much
   int rows = 0;
   for (const ArcData& arc : problem.arcs)
     for (const Reading& reading : arc.readings)
@@ -101,23 +120,24 @@ Misfit misfit(const Problem& problem, const Squares& sum) {
   const double path = std::sqrt(sum.residual / std::max(1.0, std::max<double>(rows, sum.scatter)));
   const bool path_followed =
       is_tracked(problem) && sum.ok && path < kAnyTracker && sum.residual < kFollowed * sum.motion;
+  std::set<int> tracks;
+  for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
   Misfit worst;
   for (int c = 0; c < kChannels; ++c) {
     const auto channel = static_cast<Channel>(c);
-    double noise = 0.0, scatter = 1.0;
-    for (const ArcData& arc : problem.arcs) {
-      noise = std::max(noise, arc.noise_scale[c]);
-      if (arc.noise_scale[c] > kFine) scatter = std::max(scatter, excess_scatter(arc, channel));
-    }
-    double times = noise / scatter;
+    double times = 0.0;
+    int track = -1;
+    for (const int each : tracks)
+      if (const double of_it = times_noise(problem, each, channel); of_it > times)
+        times = of_it, track = tracks.size() > 1 ? each : -1;
     if (channel == Channel::position && path_followed) times = std::min(times, kHopeless);
     // Where the angle is all there is, being followed is not enough.
     const bool whole = problem.predictor->model_name() == "pivot" && times >= kAnyTracker;
     if (channel != Channel::position && !whole && typical_noise(problem, channel) < kFollowed_rad)
       continue;
-    if (seen(problem, channel) && times > worst.times) worst = {times, channel};
+    if (seen(problem, channel) && times > worst.times) worst = {times, channel, track};
   }
-  if (sum.ok && !path_followed && path > worst.times) worst = {path, Channel::position};
+  if (sum.ok && !path_followed && path > worst.times) worst = {path, Channel::position, -1};
   return worst;
 }
 
@@ -249,6 +269,18 @@ void refuse(FitOutcome outcome, FitVerdict verdict, std::string words, data::Fit
   fit.verdict_words = fit.reason;
 }
 
+// Times the stated noise, of several tracks from the least to the largest.
+std::string noise_words(const Problem& problem) {
+  constexpr double kAlike = 1.1;
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (const ArcData& arc : problem.arcs) {
+    least = std::min(least, main_noise_scale(arc));
+    most = std::max(most, main_noise_scale(arc));
+  }
+  return most < kAlike * least ? fmt::format("{:.2g}", most)
+                               : fmt::format("{:.2g} to {:.2g}", least, most);
+}
+
 void accept(const Problem& problem, const Solution& solution, const Uncertainty& error,
             const Misfit& worst, const GivenUp& lost, data::Fit& fit) {
   constexpr double kMany = 0.01;
@@ -266,19 +298,19 @@ void accept(const Problem& problem, const Solution& solution, const Uncertainty&
     words = "the model follows the track, but does not explain it: " + lost.words();
   else if (doubtful)
     words = fmt::format(
-        "the model follows the track, but does not explain it: the residuals of its {} are {:.2g} "
+        "the model follows the track, but does not explain it: the residuals of {} are {:.2g} "
         "times their noise, the model lacks something, or a better minimum exists, and the error "
         "bars are too small",
-        kChannelWords[static_cast<int>(worst.channel)], worst.times);
+        worst.words(), worst.times);
   else if (correlated)
     words += fmt::format(
         "{}; what is left hangs together over {:.2g} s, and the error bars are widened {:.2g} "
         "times for that",
-        stated ? fmt::format(" to {:.2g} times its stated noise", fit.noise_scale) : "",
+        stated ? fmt::format(" to {} times its stated noise", noise_words(problem)) : "",
         error.whiteness.correlation_time_s, widened);
   else
     words += fmt::format(", and what is left looks like noise{}",
-                         stated ? fmt::format(" ({:.2g} times the stated)", fit.noise_scale) : "");
+                         stated ? fmt::format(" ({} times the stated)", noise_words(problem)) : "");
   const std::vector<std::string> open = undetermined(fit);
   fit.verdict = doubtful        ? FitVerdict::doubtful
                 : !open.empty() ? FitVerdict::weak
@@ -303,17 +335,17 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
                   "the best path found leaves most of the motion unexplained", fit);
   if (worst.times > kHopeless)
     return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
-                  fmt::format("the model does not explain the track: the residuals of its {} are "
+                  fmt::format("the model does not explain the track: the residuals of {} are "
                               "{:.2g} times their noise",
-                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                              worst.words(), worst.times),
                   fit);
   // Where there are many valleys another one may explain what this one does not.
   if (cut_short && !is_tracked(problem) && worst.times * worst.times > chi2_gate(problem.rows()))
     return refuse(FitOutcome::unexplained, FitVerdict::unexplained,
                   fmt::format("the search ended at its limit, and the best path it found does not "
-                              "explain the track: the residuals of its {} are {:.2g} times their "
+                              "explain the track: the residuals of {} are {:.2g} times their "
                               "noise",
-                              kChannelWords[static_cast<int>(worst.channel)], worst.times),
+                              worst.words(), worst.times),
                   fit);
   constexpr double kTooMany = 0.1;
   const GivenUp lost = given_up(problem, solution);

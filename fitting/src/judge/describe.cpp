@@ -160,11 +160,12 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
   fit.aicc = score.aicc;
   fit.bic = score.bic;
   // Over a first guess it says nothing, where any track states its noise.
-  const auto stated = std::find_if(problem.arcs.begin(), problem.arcs.end(),
-                                   [](const ArcData& arc) { return !arc.sigma_unknown; });
-  const ArcData& first = stated != problem.arcs.end() ? *stated : problem.arcs[0];
-  const bool positions = first.observables[0] == model::Observable::x_m;
-  fit.noise_scale = noise_scale(first, positions ? Channel::position : Channel::psi);
+  const bool stated = std::any_of(problem.arcs.begin(), problem.arcs.end(),
+                                  [](const ArcData& arc) { return !arc.sigma_unknown; });
+  fit.noise_scale = 0.0;
+  for (const ArcData& arc : problem.arcs)
+    if (!(stated && arc.sigma_unknown))
+      fit.noise_scale = std::max(fit.noise_scale, main_noise_scale(arc));
   fit.whiteness_p = error.whiteness.p_value;
   fit.correlation_time_s = error.whiteness.correlation_time_s;
   fit.rank = error.rank;
@@ -176,8 +177,8 @@ void describe_quality(const Problem& problem, const Eigen::VectorXd& u, const Un
 
 void describe_arcs(const Problem& problem, data::Fit& fit) {
   for (const ArcData& arc : problem.arcs)
-    fit.arcs.push_back(
-        {arc.track, arc.object, arc.t_s.front(), arc.t_s.back(), static_cast<int>(arc.t_s.size())});
+    fit.arcs.push_back({arc.track, arc.object, arc.t_s.front(), arc.t_s.back(),
+                        static_cast<int>(arc.t_s.size()), main_noise_scale(arc)});
   fit.time_origin_s = problem.arcs.front().start_s;
 }
 

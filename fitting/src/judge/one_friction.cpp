@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -71,9 +72,11 @@ void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
     weights += 1.0 / (one.sigma * one.sigma);
     sum += one.value / (one.sigma * one.sigma);
     const ArcData& arc = problem.arcs[static_cast<std::size_t>(one.arc)];
-    list +=
-        fmt::format("{}{:.3g} ± {:.2g} (object {}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
-                    one.value, one.sigma, arc.object, arc.t_s.front(), arc.t_s.back());
+    // Two digits of the error bar and as many places of the value.
+    const int places = std::clamp(1 - static_cast<int>(std::floor(std::log10(one.sigma))), 0, 12);
+    list += fmt::format("{}{:.{}f} ± {:.{}f} (object {}, {:.3g} to {:.3g} s)",
+                        list.empty() ? "" : ", ", one.value, places, one.sigma, places, arc.object,
+                        arc.t_s.front(), arc.t_s.back());
   }
   for (const Estimate& one : estimates)
     chi2 += std::pow((one.value - sum / weights) / one.sigma, 2);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "judge/contradictions.hpp"
 #include "judge/counting.hpp"
 
 namespace trochoid::fitting {
@@ -146,6 +147,8 @@ void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Un
   // A body that slips at first makes the halves differ, too: that it slips says more.
   doubt_if_an_end_is_missed(problem, u, error, fit);
   doubt_if_drifting(problem, error, fit);
+  doubt_if_priors_contradict(problem, u, error, fit);
+  doubt_if_tracks_differ(problem, u, error, fit);
 }
 
 }  // namespace trochoid::fitting

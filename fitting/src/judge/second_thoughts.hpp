@@ -15,7 +15,8 @@ namespace trochoid::fitting {
 ///   - at least half of the first or last positions of an arc stand out, eight of them or three
 ///     times as many as hang together: the body moves there as the model does not let it, and the
 ///     state at the first sample is the model's path followed back to it. Of three or more a
-///     tracker may have missed, and a warning tells.
+///     tracker may have missed, and a warning tells;
+///   - a prior, or one of several tracks, contradicts the rest (contradictions.hpp).
 /// @param u  a minimum, by which the problem's weights are set.
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       data::Fit& fit);

@@ -65,6 +65,11 @@ struct ArcData {
 [[nodiscard]] inline double noise_scale(const ArcData& arc, Channel channel) {
   return arc.noise_scale[static_cast<std::size_t>(channel)];
 }
+/// That of positions, or where an arc has none of the spin angle.
+[[nodiscard]] inline double main_noise_scale(const ArcData& arc) {
+  const bool positions = arc.observables[0] == model::Observable::x_m;
+  return noise_scale(arc, positions ? Channel::position : Channel::psi);
+}
 
 /// Which measurements a model can use.
 struct ChannelChoice {

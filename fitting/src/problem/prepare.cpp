@@ -249,13 +249,14 @@ Problem prepare(std::span<const data::Track> tracks, const model::Predictor& pre
   problem.shortfalls = std::make_shared<Shortfalls>();
   if (const auto camera = options.camera != nullptr ? *options.camera : uncertain_camera(scene))
     note_camera_shifts(*camera, scene, problem.frees_camera(), problem.arcs);
-  std::array<double, kChannels> scatter = problem.arcs.front().noise_scale;
+  std::map<int, std::array<double, kChannels>> scatter;  // by track
   for (const ArcData& whole : problem.arcs) {
     const ArcData arc = whole.keep(consistent_samples(whole));
+    auto& most = scatter.try_emplace(arc.track, arc.noise_scale).first->second;
     for (int c = 0; c < kChannels; ++c)
-      scatter[c] = std::max(scatter[c], excess_scatter(arc, static_cast<Channel>(c)));
+      most[c] = std::max(most[c], excess_scatter(arc, static_cast<Channel>(c)));
   }
-  for (ArcData& arc : problem.arcs) arc.noise_scale = scatter;
+  for (ArcData& arc : problem.arcs) arc.noise_scale = scatter.at(arc.track);
   suit_to_data(problem, scene);
   if (options.rolls_at_first) tie_to_spin(scene, problem);
   if (problem.free.empty())

@@ -35,36 +35,61 @@ double length(const Reading& reading, const Eigen::VectorXd& residuals) {
                                               : std::abs(residuals[reading.row]);
 }
 
-// What a channel's scale is shared with: trackers misjudge their noise alike in all recordings, a
-// first guess is wrong for each by itself.
 constexpr int kAll = -1;
-int sharing(const ArcData& arc, Channel channel) {
-  return arc.sigma_unknown && channel == Channel::position ? arc.track : kAll;
+
+// Whether a recording tells what its positions scatter by; a first guess is wrong by any factor.
+bool tells_noise(const ArcData& arc, Channel channel) {
+  return !arc.sigma_unknown || channel != Channel::position;
 }
 
-// Lengths of a channel's residuals in the recordings that share its scale.
-std::vector<double> lengths_of(const Problem& problem, const RawResiduals& raw, Channel channel,
-                               int shared_by) {
-  std::vector<double> lengths;
+// Of the residuals of a channel in one recording, or in all that tell their noise.
+struct Lengths {
+  std::vector<double> values;
+  double used = 0.0;  // degrees of freedom that the parameters take of them
+};
+
+// What one recording alone determines is its own; what is common takes of each by its share.
+Lengths lengths_of(const Problem& problem, const RawResiduals& raw, Channel channel, int track) {
+  const auto among = [&](const ArcData& arc) {
+    return track == kAll ? tells_noise(arc, channel) : arc.track == track;
+  };
+  Lengths lengths;
+  std::map<int, double> rows, of_channel;  // by track
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
-    if (sharing(problem.arcs[arc], channel) != shared_by) continue;
-    for (const Reading& reading : problem.arcs[arc].readings)
-      if (reading.channel == channel) lengths.push_back(length(reading, raw.per_arc[arc]));
+    const ArcData& data = problem.arcs[arc];
+    rows[data.track] += data.rows;
+    if (!among(data)) continue;
+    for (const Reading& reading : data.readings) {
+      if (reading.channel != channel) continue;
+      lengths.values.push_back(length(reading, raw.per_arc[arc]));
+      of_channel[data.track] += rows_of(channel);
+    }
+  }
+  for (const auto& [of, count] : of_channel) {
+    double own = 0.0;
+    for (const FreeParameter& parameter : problem.free)
+      own += parameter.arc >= 0 && problem.arcs[parameter.arc].track == of;
+    lengths.used += own * count / rows[of] + problem.shared_count() * count / problem.rows();
   }
   return lengths;
 }
 
+struct Scale {
+  double value = 1.0;
+  double dof = 0.0;  // that it is known from
+};
+
 // Scale from the weighted squares of the inliers, nothing where too few are read; robust start from
 // the median.
-std::optional<double> scale_of(const Problem& problem, const std::vector<double>& lengths,
-                               bool planar) {
-  if (lengths.size() < 5) return std::nullopt;
+std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
+  const std::vector<double>& values = lengths.values;
+  if (values.size() < 5) return std::nullopt;
   // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
-  double scale = median(lengths) / (planar ? 1.1774 : 0.6745);
+  double scale = median(values) / (planar ? 1.1774 : 0.6745);
   for (int round = 0; round < 5; ++round) {
     double squares = 0.0;
     int inliers = 0;
-    for (const double d : lengths)
+    for (const double d : values)
       if (d <= kInlier * scale) {
         squares += d * d;
         ++inliers;
@@ -78,10 +103,35 @@ std::optional<double> scale_of(const Problem& problem, const std::vector<double>
                            (std::sqrt(2.0 * data::kPi) * std::erf(kInlier / std::numbers::sqrt2));
     scale = std::sqrt(squares / std::max(1.0, kept * inliers));
   }
-  const double rows = static_cast<double>(lengths.size()) * (planar ? 2.0 : 1.0);
-  const double share = rows / std::max(1.0, static_cast<double>(problem.rows()));
-  const double used = share * static_cast<double>(problem.free.size());
-  return std::max(scale * std::sqrt(rows / std::max(1.0, rows - used)), 1e-12);
+  const double rows = static_cast<double>(values.size()) * (planar ? 2.0 : 1.0);
+  const double dof = std::max(1.0, rows - lengths.used);
+  return Scale{std::max(scale * std::sqrt(rows / dof), 1e-12), dof};
+}
+
+// Trackers misjudge their noise alike in recordings that are alike: what the others say counts as
+// if it were so many readings of this one.
+double beside_others(const Scale& own, const Scale& all) {
+  constexpr double kOthers = 8.0;  // degrees of freedom
+  return std::sqrt((own.dof * own.value * own.value + kOthers * all.value * all.value) /
+                   (own.dof + kOthers));
+}
+
+// The scale of a channel in each recording.
+std::map<int, double> scales_by_track(const Problem& problem, const RawResiduals& raw,
+                                      Channel channel) {
+  const bool planar = channel == Channel::position;
+  const auto all = scale_of(lengths_of(problem, raw, channel, kAll), planar);
+  std::map<int, bool> tells;
+  for (const ArcData& arc : problem.arcs) tells[arc.track] = tells_noise(arc, channel);
+  std::map<int, double> scales;
+  for (const auto& [track, told] : tells) {
+    const auto own = scale_of(lengths_of(problem, raw, channel, track), planar);
+    if (own && told && all)
+      scales[track] = tells.size() > 1 ? beside_others(*own, *all) : own->value;
+    else if (own || (told && all))
+      scales[track] = own ? own->value : all->value;
+  }
+  return scales;
 }
 
 // Scales of all arcs' channels. A motion that is wrong may leave nothing in one of them, as a body
@@ -90,25 +140,21 @@ std::optional<double> scale_of(const Problem& problem, const std::vector<double>
 std::vector<std::array<double, kChannels>> noise_scales(const Problem& problem,
                                                         const RawResiduals& raw) {
   constexpr double kLeastBesideOthers = 0.01;  // what trackers state differs by ten times at most
-  std::map<std::pair<int, int>, std::optional<double>> known;  // by channel and who shares it
+  std::array<std::map<int, double>, kChannels> known;
+  for (int c = 0; c < kChannels; ++c)
+    known[c] = scales_by_track(problem, raw, static_cast<Channel>(c));
   std::vector<std::array<double, kChannels>> scales;
   for (const ArcData& arc : problem.arcs) {
-    std::array<std::optional<double>, kChannels> of_arc;
     double most = 0.0;
-    for (int c = 0; c < kChannels; ++c) {
-      const auto channel = static_cast<Channel>(c);
-      const int shared_by = sharing(arc, channel);
-      const auto [at, is_new] = known.try_emplace({c, shared_by});
-      if (is_new)
-        at->second = scale_of(problem, lengths_of(problem, raw, channel, shared_by),
-                              channel == Channel::position);
-      of_arc[c] = at->second;
-      most = std::max(most, of_arc[c].value_or(0.0));
-    }
+    for (const auto& by_track : known)
+      if (const auto at = by_track.find(arc.track); at != by_track.end())
+        most = std::max(most, at->second);
     const double least = std::min(1.0, kLeastBesideOthers * most);
     scales.emplace_back();
-    for (int c = 0; c < kChannels; ++c)
-      scales.back()[c] = of_arc[c] ? std::max(*of_arc[c], least) : 1.0;
+    for (int c = 0; c < kChannels; ++c) {
+      const auto at = known[c].find(arc.track);
+      scales.back()[c] = at != known[c].end() ? std::max(at->second, least) : 1.0;
+    }
   }
   return scales;
 }

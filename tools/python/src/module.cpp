@@ -259,7 +259,8 @@ void add_fit_parts(py::module_& module) {
       .def_readonly("object", &FitArc::object)
       .def_readonly("from_s", &FitArc::from_s)
       .def_readonly("to_s", &FitArc::to_s)
-      .def_readonly("samples", &FitArc::samples);
+      .def_readonly("samples", &FitArc::samples)
+      .def_readonly("noise_scale", &FitArc::noise_scale);
   py::class_<ModelScore>(module, "ModelScore", "A model that was tried.")
       .def_readonly("model", &ModelScore::model)
       .def_readonly("chi2", &ModelScore::chi2)

@@ -100,6 +100,7 @@ PredictedArc replay_arc(const std::string& model, const data::Fit& fit, const da
   replayed.from_s = arc.from_s;
   replayed.to_s = arc.to_s;
   replayed.has_tilt = models_tilt(model);
+  if (fit.converged) replayed.noise_scale = arc.noise_scale;
   replayed.t_s = grid_of(track, arc);
   model::PredictRequest request;
   request.t_s = replayed.t_s;
@@ -221,7 +222,7 @@ std::optional<double> spin_residual_rad(const data::TrackSample& sample, int obj
 }
 
 std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
-                                             const PredictedPath& path, double noise_scale) {
+                                             const PredictedPath& path) {
   std::vector<std::vector<Residual>> all;
   for (const data::Track& track : tracks.tracks) {
     std::vector<Residual>& list = all.emplace_back();
@@ -229,12 +230,12 @@ std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
     for (const data::TrackSample& sample : track.samples) {
       const auto pose = path.at(track.object, sample.t_s);
       if (!sample.has_metres() || !pose) continue;
-      Residual residual{.frame = sample.frame, .t_s = sample.t_s, .value_m = {}, .sigma_m = {}};
+      const double scale = path.arc_at(track.object, sample.t_s)->noise_scale;
+      Residual residual{sample.frame, sample.t_s, {}, {}, scale};
       residual.value_m = sample.centre_m - pose->centre_m.head<2>();
-      residual.sigma_m =
-          sample.has_covariance()
-              ? Eigen::Vector2d(noise_scale * sample.covariance_m2.diagonal().cwiseSqrt())
-              : Eigen::Vector2d(kNaN, kNaN);
+      residual.sigma_m = sample.has_covariance()
+                             ? Eigen::Vector2d(scale * sample.covariance_m2.diagonal().cwiseSqrt())
+                             : Eigen::Vector2d(kNaN, kNaN);
       list.push_back(residual);
     }
   }

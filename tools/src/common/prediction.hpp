@@ -21,6 +21,9 @@ struct PredictedArc {
   std::vector<double> t_s;
   std::vector<data::Pose<>> pose;
   bool has_tilt = false;  ///< pose.theta_rad and phi_rad are predicted; else they are 0
+  /// Of the track's sigmas; 1 unless the fit converged: what does not explain a track must not look
+  /// as if it did for the sigmas it would need.
+  double noise_scale = 1.0;
 };
 
 struct PredictedPath {
@@ -61,12 +64,12 @@ struct Residual {
   std::int64_t frame = -1;
   double t_s = 0.0;
   Eigen::Vector2d value_m;
-  Eigen::Vector2d sigma_m;  ///< of the track times the fit's noise scale; NaN when unknown
+  Eigen::Vector2d sigma_m;  ///< of the track times the arc's noise scale; NaN when unknown
+  double noise_scale;       ///< that scale
 };
 /// One list per track of the file, in its order.
 [[nodiscard]] std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,
-                                                           const PredictedPath& path,
-                                                           double noise_scale);
+                                                           const PredictedPath& path);
 /// Root mean square of the residuals per axis [m]; NaN for an empty list.
 [[nodiscard]] double rms_m(const std::vector<Residual>& residuals);
 

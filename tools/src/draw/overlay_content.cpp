@@ -106,8 +106,7 @@ OverlayContent::OverlayContent(const OverlayInput& input, int width_px, int heig
     prediction_ = replay(*input.fit, tracks_, input.fit_track);
   for (const data::Track& track : tracks_.tracks) collect(track);
   if (has_prediction()) {
-    auto lists =
-        residuals(tracks_, prediction_, input.fit->converged ? input.fit->noise_scale : 1.0);
+    auto lists = residuals(tracks_, prediction_);
     for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].residuals = std::move(lists[i]);
   }
   collect_times();

@@ -37,7 +37,7 @@ void measure_residuals(ReportFacts& facts) {
       for (int axis = 0; axis < 2; ++axis) {
         sum_m2 += std::pow(residual.value_m[axis], 2);
         ++count;
-        const double sigma_m = residual.sigma_m[axis] / facts.noise_scale;
+        const double sigma_m = residual.sigma_m[axis] / residual.noise_scale;
         if (!(sigma_m > 0.0)) continue;
         sum_sigma2 += std::pow(residual.value_m[axis] / sigma_m, 2);
         ++with_sigma;
@@ -89,9 +89,7 @@ ReportFacts gather(const ReportInput& input) {
   facts.median_sigma_m = data::median(std::move(sigmas_m));
   if (input.fit && !input.fit->parameters.empty()) {
     facts.prediction = replay(*input.fit, input.tracks, input.fit_track);
-    // What does not explain the track must not look as if it did for the sigmas it would need.
-    if (input.fit->converged) facts.noise_scale = input.fit->noise_scale;
-    facts.residuals = residuals(input.tracks, facts.prediction, facts.noise_scale);
+    facts.residuals = residuals(input.tracks, facts.prediction);
     measure_residuals(facts);
     facts.rms_spin_rad = rms_spin_rad(input.tracks, facts.prediction);
   }

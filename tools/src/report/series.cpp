@@ -86,9 +86,13 @@ class ObjectSeries {
   [[nodiscard]] double expected(std::size_t i, int axis) const {
     return poses_[i] ? poses_[i]->centre_m[axis] * kMmPerM : kNaN;
   }
+  [[nodiscard]] double noise_scale(std::size_t i) const {
+    const PredictedArc* arc = facts_.prediction.arc_at(track_.object, rows_[i].t_s);
+    return arc != nullptr ? arc->noise_scale : 1.0;
+  }
   [[nodiscard]] double sigma_mm(std::size_t i, int axis) const {
     if (rows_[i].sample == nullptr || !rows_[i].sample->has_covariance()) return kNaN;
-    return facts_.noise_scale * std::sqrt(rows_[i].sample->covariance_m2(axis, axis)) * kMmPerM;
+    return noise_scale(i) * std::sqrt(rows_[i].sample->covariance_m2(axis, axis)) * kMmPerM;
   }
 
   static json line(const char* label, const char* kind, const char* colour, json values) {
@@ -140,7 +144,7 @@ class ObjectSeries {
         "spin residual [mrad]", "x",
         [&](std::size_t i) { return off(i) ? *off(i) * kMradPerRad : kNaN; },
         [&](std::size_t i) {
-          return off(i) ? facts_.noise_scale * rows_[i].sample->psi->sigma_rad * kMradPerRad : kNaN;
+          return off(i) ? noise_scale(i) * rows_[i].sample->psi->sigma_rad * kMradPerRad : kNaN;
         });
   }
 

@@ -73,6 +73,9 @@ struct FitArc {
   double from_s = 0.0;  ///< time of the first sample [s]
   double to_s = 0.0;    ///< time of the last sample [s]
   int samples = 0;      ///< > 0
+  /// Factor by which its track's sigmas were re-estimated, of positions if there are any; over a
+  /// first guess where the track came without them.
+  double noise_scale = 1.0;
 };
 
 /// A direction of parameter space the data do not see.
@@ -148,9 +151,7 @@ struct Fit {
   Eigen::MatrixXd covariance;
   double chi2 = 0.0;  ///< of the residuals over their sigmas, robustly weighted, >= 0
   int dof = 0;        ///< degrees of freedom: measurements less free parameters
-  /// Factor by which the tracks' sigmas were re-estimated, of positions if there are any; over a
-  /// first guess where no track came with them.
-  double noise_scale = 1.0;
+  double noise_scale = 1.0;  ///< the arcs' largest, of tracks with sigmas of their own if any has
   double aicc = 0.0, bic = 0.0;     ///< information criteria, correlated residuals allowed for
   double whiteness_p = 0.0;         ///< p-value of the residuals being white, 0..1
   double correlation_time_s = 0.0;  ///< over which residuals hang together [s]; 0 if white

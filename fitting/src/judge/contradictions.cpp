@@ -1,0 +1,165 @@
+#include "judge/contradictions.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "judge/counting.hpp"
+#include "judge/whiteness.hpp"
+#include "observe/decompositions.hpp"
+#include "problem/linearise.hpp"
+
+namespace trochoid::fitting {
+
+using data::FitVerdict;
+
+namespace {
+
+// Said in the verdict where that was good, in a warning where there is worse, or it is no reason to
+// doubt.
+void tell(const std::string& what, const std::string& doubt, bool grave, data::Fit& fit) {
+  const bool passed = fit.verdict == FitVerdict::good ||
+                      fit.verdict == FitVerdict::good_correlated || fit.verdict == FitVerdict::weak;
+  if (!passed || !grave) {
+    fit.warnings.push_back(what);
+    return;
+  }
+  fit.verdict = FitVerdict::doubtful;
+  fit.verdict_words = "the model follows the track, but does not explain it: " + what + doubt;
+}
+
+// What a prior and the tracks say of one parameter.
+struct Contrast {
+  double apart = 0.0;             // standard deviations of both together
+  double value = 0.0, sigma = 0;  // by the tracks alone
+};
+
+// @param leverage  share of what is known of the parameter that the prior brings, 0..1.
+// @param inflation  of the tracks' variance.
+Contrast contrast_of(const data::Prior& prior, double value, double leverage, double inflation) {
+  const double ratio = leverage / (1.0 - leverage);  // the tracks' variance over the prior's
+  const double pulled = value - prior.value;
+  return {std::abs(pulled) * (1.0 + ratio) / (prior.sigma * std::sqrt(1.0 + inflation * ratio)),
+          value + pulled * ratio, prior.sigma * std::sqrt(inflation * ratio)};
+}
+
+// Rows of the residuals of one track.
+std::vector<int> rows_of_track(const Problem& problem, const Linearised& all, int track) {
+  std::vector<int> rows;
+  for (int row = 0; row < std::ssize(all.arc); ++row)
+    if (all.arc[row] >= 0 && problem.arcs[all.arc[row]].track == track) rows.push_back(row);
+  return rows;
+}
+
+// What one track asks of the parameters that it shares with others, its own left free.
+struct Demand {
+  int track = 0;
+  int seen = 0;                    // of the shared ones
+  double gain = 0.0;               // of chi-square, if they were its own
+  int parameter = 0;               // that would move farthest if the others stayed
+  double step = 0.0, sigma = 0.0;  // of that
+};
+
+Demand demand_of(const Problem& problem, const Linearised& all, int track) {
+  constexpr double kLeastSeen = 1e-6;  // of what the track sees before its own are free
+  const std::vector<int> rows = rows_of_track(problem, all, track);
+  std::vector<int> own, shared;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const int arc = problem.free[i].arc;
+    if (arc < 0) shared.push_back(i);
+    if (arc >= 0 && problem.arcs[arc].track == track) own.push_back(i);
+  }
+  const LeastSquares by_own(all.jacobian(rows, own));
+  const Eigen::MatrixXd before = all.jacobian(rows, shared);
+  const Eigen::MatrixXd left = before - all.jacobian(rows, own) * by_own.solve_each(before);
+  const Eigen::VectorXd r = all.residuals(rows);
+  Demand demand{.track = track};
+  Eigen::MatrixXd unit(left.rows(), 0);
+  double farthest = -1.0;
+  for (Eigen::Index i = 0; i < left.cols(); ++i) {
+    const double length = left.col(i).norm();
+    if (!(length > kLeastSeen * before.col(i).norm())) continue;
+    unit.conservativeResize(Eigen::NoChange, unit.cols() + 1);
+    unit.rightCols<1>() = left.col(i) / length;
+    const double bars = -unit.rightCols<1>().dot(r);
+    if (std::abs(bars) <= farthest) continue;
+    farthest = std::abs(bars);
+    demand.parameter = shared[static_cast<std::size_t>(i)];
+    demand.step = bars / length, demand.sigma = 1.0 / length;
+  }
+  if (unit.cols() == 0) return demand;
+  const LeastSquares by_shared(unit);
+  demand.seen = static_cast<int>(by_shared.rank(kLeastSeen));
+  demand.gain = (unit * by_shared.solve(r)).squaredNorm();
+  return demand;
+}
+
+}  // namespace
+
+void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u,
+                                const Uncertainty& error, data::Fit& fit) {
+  constexpr double kWorthWords = 3.0, kTooFar = 5.0;
+  constexpr double kPriorAlone = 1e-9;
+  if (problem.frees_camera()) return;  // likely deviations, which say so themselves
+  Linearised all;
+  int row = problem.rows() - 1;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const FreeParameter& parameter = problem.free[i];
+    if (!parameter.prior) continue;
+    ++row;
+    if (parameter.held) continue;
+    if (all.arc.empty()) all = linearise(problem, u);
+    const Eigen::VectorXd at_row = Eigen::VectorXd::Unit(all.jacobian.rows(), row);
+    const double leverage = all.jacobian.row(row).dot(LeastSquares(all.jacobian).solve(at_row));
+    if (!(leverage < 1.0 - kPriorAlone)) continue;
+    const data::Prior& prior = *parameter.prior;
+    const Contrast says =
+        contrast_of(prior, problem.value(i, u), leverage, error.chi2_inflation[i]);
+    if (!(says.apart > kWorthWords)) continue;
+    const std::string words = fmt::format(
+        "the prior {} = {:.6g} ± {:.2g} and the track, which alone says about {:.6g} ± {:.2g}, are "
+        "{:.2g} standard deviations apart",
+        problem.name(i), prior.value, prior.sigma, says.value, says.sigma, says.apart);
+    tell(words, ": one of them is wrong, or the model, and the error bars are too small",
+         says.apart > kTooFar, fit);
+  }
+}
+
+void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
+                            const Uncertainty& error, data::Fit& fit) {
+  constexpr double kByChance = 1e-6;
+  constexpr double kOfATracker = 20.0;  // as of a drift (second_thoughts.cpp)
+  std::set<int> tracks;
+  for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
+  if (tracks.size() < 2 || problem.shared_count() == 0 || problem.predictor->model_name() == "puck")
+    return;
+  const Linearised all = linearise(problem, u);
+  double gain = 0.0;
+  int dof = -problem.shared_count();
+  Demand odd;
+  for (const int track : tracks) {
+    const Demand demand = demand_of(problem, all, track);
+    gain += demand.gain / (error.widened * error.widened);
+    dof += demand.seen;
+    const auto bars = [](const Demand& d) {
+      return d.sigma > 0.0 ? std::abs(d.step / d.sigma) : 0.0;
+    };
+    if (bars(demand) > bars(odd)) odd = demand;
+  }
+  if (dof < 1 || chi2_upper_tail(gain, dof) > kByChance) return;
+  const std::string words = fmt::format(
+      "the tracks ask for different values of what they share (chi-square would fall by {:.3g} "
+      "times its noise for {} parameters more), above all track {}: for {} = {:.4g} ± {:.2g} "
+      "rather "
+      "than {:.4g}",
+      gain, dof, odd.track + 1, problem.name(odd.parameter),
+      problem.value(odd.parameter, u) + odd.step, error.widened * odd.sigma,
+      problem.value(odd.parameter, u));
+  tell(words, "; fit each alone to see which does not belong",
+       !is_tracked(problem) || gain > kOfATracker * dof, fit);
+}
+
+}  // namespace trochoid::fitting
