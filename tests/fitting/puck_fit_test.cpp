@@ -94,6 +94,25 @@ TEST(PuckFit, DividesTheTrackAtImpactAndRest) {
   EXPECT_LT(friction->sigma, 0.01 * kFriction);
 }
 
+// A tracker's slip of 40 sigma was taken for two impacts, with a stretch of six samples in between.
+TEST(PuckFit, DividesNoTrackAtSamplesThatTheTrackerMissed) {
+  Throw thrown(1);
+  thrown.slide({1.0, 0.3}, 0.3).slide({-0.2, 0.5}, 0.6);
+  data::Track track = thrown.track();
+  const data::Fit clean = fitting::fit(std::span(&track, 1), puck_scene());
+  for (const std::size_t i : {20U, 45U, 47U, 90U})
+    track.samples[i].centre_m.y() += 40.0 * kPuckSigma_m;
+  const data::Fit fit = fitting::fit(std::span(&track, 1), puck_scene());
+  ASSERT_EQ(fit.arcs.size(), clean.arcs.size());
+  for (std::size_t i = 0; i < fit.arcs.size(); ++i) {
+    EXPECT_NEAR(fit.arcs[i].from_s, clean.arcs[i].from_s, 2.0 * kPuckFrame_s);
+    EXPECT_NEAR(fit.arcs[i].to_s, clean.arcs[i].to_s, 2.0 * kPuckFrame_s);
+  }
+  const data::FitParameter &friction = *fit.find("friction"), &of_clean = *clean.find("friction");
+  EXPECT_LT(std::abs(friction.value - kFriction), 4.0 * friction.sigma);
+  EXPECT_LT(friction.sigma, 1.2 * of_clean.sigma);
+}
+
 // "The last positions of track 1" were those before an impact in its middle.
 TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
   Throw thrown(4);

@@ -65,6 +65,11 @@ class Polynomial {
     coefficients_ =
         inverse_size_.asDiagonal() * cholesky_.solve(inverse_size_.asDiagonal() * right_);
   }
+  [[nodiscard]] Eigen::RowVector2d value(double t) const {
+    Eigen::RowVector2d sum = coefficients_.row(Degree);
+    for (int k = Degree - 1; k >= 0; --k) sum = sum * ((t - t0_) / scale_) + coefficients_.row(k);
+    return sum;
+  }
   [[nodiscard]] double residual() const {
     return std::max(0.0, squares_ - coefficients_.cwiseProduct(right_).sum());
   }
@@ -85,6 +90,51 @@ class Polynomial {
   Eigen::Matrix<double, Degree + 1, 2> coefficients_;
   Eigen::LDLT<Square> cholesky_;
 };
+
+// How far a sample lies from the parabola of its neighbours, over what this leaves of them at most
+// or their noise. One of the neighbours may be passed over.
+double standing_out(const Path& path, int at, int passed_over) {
+  constexpr int kBeside = 4;
+  const int first = std::max(0, at - kBeside), last = std::min(path.size(), at + kBeside + 1);
+  Polynomial<2> parabola(path.t_s[at], path.t_s[last - 1] - path.t_s[first]);
+  const Eigen::RowVector2d origin = path.xy.row(at);
+  const auto counts = [&](int i) { return i != at && i != passed_over; };
+  for (int i = first; i < last; ++i)
+    if (counts(i)) parabola.add(path.t_s[i], path.xy.row(i) - origin);
+  parabola.solve();
+  double most_m = path.sigma_m;
+  for (int i = first; i < last; ++i)
+    if (counts(i))
+      most_m = std::max(most_m, (path.xy.row(i) - origin - parabola.value(path.t_s[i])).norm());
+  return parabola.value(path.t_s[at]).norm() / most_m;
+}
+
+// A tracker's slip, of one sample or two near each other; where the body was struck its neighbours
+// are on no parabola.
+bool is_glitch(const Path& path, int at) {
+  constexpr int kOnEitherSide = 2, kReach = 4;
+  constexpr double kFar = 10.0;
+  if (at < kOnEitherSide || at + kOnEitherSide >= path.size()) return false;
+  for (int other = std::max(0, at - kReach); other <= std::min(path.size() - 1, at + kReach);
+       ++other)  // with at itself none is passed over
+    if (standing_out(path, at, other) > kFar) return true;
+  return false;
+}
+
+// Beside a glitch a cut would pay.
+Path without_glitches(const Path& path) {
+  std::vector<int> kept;
+  Path clean;
+  for (int i = 0; i < path.size(); ++i) {
+    if (is_glitch(path, i)) continue;
+    kept.push_back(i);
+    clean.t_s.push_back(path.t_s[i]);
+    clean.sample.push_back(path.sample[i]);
+  }
+  clean.xy = path.xy(kept, Eigen::all);
+  clean.sigma_m = path.sigma_m;
+  return clean;
+}
 
 // Cuts 0 = c0 < c1 < ... = n of the cheapest division into pieces, at every stride-th sample.
 std::vector<int> cheapest_cuts(const Path& path, int stride) {
@@ -180,7 +230,7 @@ bool slides_freely(const Path& path, int first, int last) {
 }  // namespace
 
 std::vector<SampleRange> sliding_ranges(const data::Track& track, SampleRange range) {
-  const Path path = path_of(track, range);
+  const Path path = without_glitches(path_of(track, range));
   std::vector<SampleRange> ranges;
   if (path.size() < kShortest) return ranges;
   constexpr int kMostCandidates = 400;
