@@ -151,13 +151,35 @@ void check_items(const Campaign& campaign, const std::vector<const CampaignItem*
   if (wrong > 0) throw InputError(first);
 }
 
+namespace {
+
+fs::path fit_of(const Campaign& campaign, const CampaignItem& item) {
+  return folder_of(campaign, item.name) / (recording_name(item.video) + ".fit.json");
+}
+
+// Whether what the run left is there still: its report, and its fit unless it had none.
+bool holds_answer(const Campaign& campaign, const CampaignItem& item) {
+  const fs::path folder = folder_of(campaign, item.name);
+  const auto run = read_json_object(folder / kRunFile);
+  if (!run || !fs::exists(folder / "report.html")) return false;
+  if (run->value("no_fit_reason", "") != "") return true;
+  try {
+    (void)data::read_fit(fit_of(campaign, item));
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+}  // namespace
+
 std::optional<CampaignRecord> current_record(const Campaign& campaign, const CampaignItem& item) {
   const auto json = read_json_object(record_path(campaign, item));
   if (!json) return std::nullopt;
   try {
     CampaignRecord record = record_of(*json);
-    const bool kept = !record.done || fs::exists(folder_of(campaign, item.name) / kRunFile);
-    if (kept && record.key == key_of(campaign, item)) return record;
+    if (record.key == key_of(campaign, item) && (!record.done || holds_answer(campaign, item)))
+      return record;
   } catch (const Json::exception&) {  // not ours, or an older version's: as if never run
   }
   return std::nullopt;
@@ -194,19 +216,13 @@ std::vector<CampaignLine> collect(const Campaign& campaign) {
       line.record = std::move(*record);
       line.known = true;
     }
-    const fs::path folder = folder_of(campaign, item.name);
-    const fs::path fit = folder / (recording_name(item.video) + ".fit.json");
     if (line.record.done) {
-      if (const auto run = read_json_object(folder / kRunFile)) {
+      if (const auto run = read_json_object(folder_of(campaign, item.name) / kRunFile)) {
         line.frames = run->value("frames", std::int64_t{0});
         line.found = run->value("found", std::int64_t{0});
       }
-      std::error_code code;
-      try {
-        if (fs::exists(fit, code)) line.fit = data::read_fit(fit);
-      } catch (const InputError& error) {  // one damaged file is no reason to lose the summary
-        line.record.message = error.what();
-      }
+      const fs::path fit = fit_of(campaign, item);
+      if (std::error_code code; fs::exists(fit, code)) line.fit = data::read_fit(fit);
     }
     lines.push_back(std::move(line));
   }

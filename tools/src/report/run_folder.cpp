@@ -7,6 +7,7 @@
 
 #include "common/fitted_scene.hpp"
 #include "common/json_object.hpp"
+#include "common/provenance.hpp"
 #include "common/recording_name.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -131,7 +132,10 @@ ReportInput read_run_folder(const fs::path& folder) {
   input.tracks = data::read_track(*track);
   input.title = input.tracks.source.empty() ? track->filename().string() : input.tracks.source;
   input.checksums[track->filename().string()] = data::sha256_of_file(*track);
-  if (const auto fit = file_ending(folder, ".fit.json")) input.fit = data::read_fit(*fit);
+  if (const auto fit = file_ending(folder, ".fit.json")) {
+    input.fit = data::read_fit(*fit);
+    check_made_from(*input.fit, *fit, *track);
+  }
   if (fs::exists(folder / "scene.toml", code)) {
     input.scene = data::read_scene(folder / "scene.toml");
     input.scene->camera.file = fs::path(input.scene->camera.file).filename().string();
