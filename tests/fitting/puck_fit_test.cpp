@@ -126,6 +126,16 @@ TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
               testing::Contains(testing::HasSubstr("last positions of the stretch from 0.2")));
 }
 
+TEST(PuckFit, SaysWhichTrackCountsForNothing) {
+  Throw thrown(6), resting(7);
+  thrown.slide({1.0, 0.3}, 0.3);
+  resting.slide({0.0, 0.0}, 0.3);
+  const std::vector<data::Track> tracks{resting.track(), thrown.track()};
+  const data::Fit fit = fitting::fit(tracks, puck_scene());
+  ASSERT_TRUE(fit.converged) << fit.reason;
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("track 1 counts for nothing")));
+}
+
 TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
   Throw thrown(5);
   thrown.slide({1.0, 0.3}, 0.3).slide({-0.2, 0.6}, 0.2).slide({0.7, -0.4}, 0.3);

@@ -281,7 +281,7 @@ TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
   EXPECT_THAT(refusal(), testing::HasSubstr("track 2: its 2 numbers cannot determine"));
   tracks[1] = thesis_track(25.0, 1e-3, 12);
   tracks[1].samples.resize(4);
-  EXPECT_THAT(fit(tracks, scene).reason, testing::HasSubstr("track 2: no start"));
+  EXPECT_THAT(fit(tracks, scene).reason, testing::HasSubstr("track 2: its 4 samples are too few"));
   tracks[1] = tracks[0];
   EXPECT_THAT(refusal(),
               testing::HasSubstr("track 2 is the same as track 1; a recording counts once"));

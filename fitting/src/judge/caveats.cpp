@@ -117,6 +117,17 @@ void tell_idle_priors(const Problem& problem, const data::Scene& scene, data::Fi
         "[fit] prior: model '{}' has no '{}', the prior counts for nothing", fit.model, name));
 }
 
+void tell_unused_tracks(const Problem& problem, std::span<const data::Track> tracks,
+                        data::Fit& fit) {
+  for (int track = 0; track < std::ssize(tracks); ++track)
+    if (std::none_of(problem.arcs.begin(), problem.arcs.end(),
+                     [&](const ArcData& arc) { return arc.track == track; }))
+      fit.warnings.push_back(
+          fmt::format("track {} counts for nothing: it has no stretch in which the puck slides "
+                      "freely, slowing down",
+                      track + 1));
+}
+
 namespace {
 
 // Pictures a second by a track's times and frame numbers; 0 where it has none.

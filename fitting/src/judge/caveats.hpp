@@ -30,6 +30,10 @@ void heed_doubts(const Problem& problem, const Solution& solution, const data::S
 /// Priors of what the model does not have.
 void tell_idle_priors(const Problem& problem, const data::Scene& scene, data::Fit& fit);
 
+/// Tracks of which no stretch was fitted: a puck may slide in some and not in others.
+void tell_unused_tracks(const Problem& problem, std::span<const data::Track> tracks,
+                        data::Fit& fit);
+
 /// A recording's own rate and one that is given for its camera may differ: then only what the
 /// latter says of its own error is taken.
 void tell_other_rate(const data::Scene& scene, std::span<const data::Track> tracks, data::Fit& fit);

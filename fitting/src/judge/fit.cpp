@@ -353,6 +353,7 @@ data::Fit OneFit::described(Bars bars) {
   tell_idle_pivot(problem_, scene_, fit);
   tell_unlikely_body(scene_, fit);
   tell_other_rate(scene_, tracks_, fit);
+  tell_unused_tracks(problem_, tracks_, fit);
   tell_given_up(problem_, fit);
   tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);

@@ -168,6 +168,10 @@ std::string Shortfalls::words() const {
     all += by_outcome[i];
     if (by_outcome[i] > by_outcome[commonest]) commonest = i;
   }
+  constexpr int kFew = 24;  // a search begins with as many
+  if (track >= 0 && samples < kFew)
+    return fmt::format("track {}: its {} samples are too few to find its motion from; leave it out",
+                       track + 1, samples.load());
   const std::string where = track >= 0 ? fmt::format("track {}: ", track + 1) : "";
   if (departed > all)
     return fmt::format(

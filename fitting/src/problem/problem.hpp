@@ -48,6 +48,7 @@ struct Shortfalls {
   std::array<std::atomic<int>, model::kOutcomes> by_outcome{};  ///< in the order of model::Outcome
   std::atomic<int> departed{0};  ///< starts whose path left the track's within a part of it
   std::atomic<int> track{-1};    ///< of several, the one that no start explains
+  std::atomic<int> samples{0};   ///< of that one
   void count(model::Outcome outcome) { ++by_outcome[static_cast<std::size_t>(outcome)]; }
   /// A sentence; which reason was the commonest.
   [[nodiscard]] std::string words() const;

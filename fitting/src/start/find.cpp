@@ -395,7 +395,10 @@ Found find(Problem& problem, const SearchRequest& asked) {
   Found best;
   for (int arc = 0; arc < arcs; ++arc) {
     if (!found[arc].solution.usable) {
-      if (problem.shortfalls) problem.shortfalls->track = problem.arcs[arc].track;
+      if (problem.shortfalls) {
+        problem.shortfalls->track = problem.arcs[arc].track;
+        problem.shortfalls->samples = static_cast<int>(problem.arcs[arc].t_s.size());
+      }
       return found[arc];
     }
     alone[arc].set_base(found[arc].solution.u);
