@@ -44,7 +44,9 @@ bool tells_separator(std::string_view line) {
 void check_columns(const std::vector<std::string>& columns, const std::string& place) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty())
-      throw InputError(fmt::format("{}: column {} has no name", place, i + 1));
+      throw InputError(fmt::format(
+          "{}: column {} has no name; give it one, or leave it out (pandas: index=False)", place,
+          i + 1));
     const auto starts_as_name = [](char c) {
       return std::isalpha(static_cast<unsigned char>(c)) || c == '_';
     };

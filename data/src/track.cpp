@@ -60,8 +60,10 @@ void check_sample(const TrackSample& sample, const TrackSample* previous,
   if (!std::isfinite(sample.t_s))
     throw InputError(fmt::format("{}: t_s = {} is not a finite time", place, sample.t_s));
   if (previous && !(sample.t_s > previous->t_s))
-    throw InputError(fmt::format("{}: t_s = {} does not increase (previous {}); sort the track",
-                                 place, sample.t_s, previous->t_s));
+    throw InputError(fmt::format(
+        "{}: t_s = {} does not increase (previous {}); {}", place, sample.t_s, previous->t_s,
+        sample.t_s < previous->t_s ? "sort the track"
+                                   : "leave one of the rows out, or write times with more digits"));
   // Two rows of one frame: two tracks in one, or a tracker that saw two bodies.
   if (previous && sample.frame >= 0 && sample.frame <= previous->frame)
     throw InputError(fmt::format(

@@ -287,6 +287,8 @@ INSTANTIATE_TEST_SUITE_P(
                      ":2:", "4 cells where the header names 3"},
         RefusedTrack{"Unsorted", "t_s,x_m,y_m\n0.25,1,2\n0.20,1,2\n",
                      ":3:", "t_s = 0.2 does not increase (previous 0.25); sort the track"},
+        RefusedTrack{"SameTimeTwice", "t_s,x_m,y_m\n0.25,1,2\n0.25,1,2\n",
+                     ":3:", "(previous 0.25); leave one of the rows out, or write times with"},
         RefusedTrack{"EqualTimes", "t_s,x_m,y_m\n1,1,2\n1,1,2\n", ":3:", "does not increase"},
         RefusedTrack{"NaN", "t_s,x_m,y_m\n0,nan,2\n", ":2:", "x_m = 'nan' is not a finite number"},
         RefusedTrack{"Infinity", "t_s,x_m,y_m\n0,1,-inf\n", ":2:", "y_m = '-inf'"},

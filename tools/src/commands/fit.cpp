@@ -190,9 +190,9 @@ std::string advice(const data::Fit& fit, const data::Scene& scene,
                    const fitting::FitOptions& options) {
   if (fit.outcome != data::FitOutcome::unexplained) return "";
   std::string words;
-  const bool pivot_assumed = fit.model.starts_with("top") && !scene.support.pivot_m &&
-                             !scene.fit.free_pivot && !options.free_pivot;
-  if (pivot_assumed) words += "; the pivot was taken to be at x = y = 0, --free-pivot fits it";
+  if (fit.model.starts_with("top") && !scene.fit.free_pivot && !options.free_pivot)
+    words += fmt::format("; the pivot was taken to be {}, --free-pivot fits it",
+                         scene.support.pivot_m ? "where the scene has it" : "at x = y = 0");
   if (fit.comparison.empty()) words += "; --compare tries what the model lacks";
   return words;
 }
