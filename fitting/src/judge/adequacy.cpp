@@ -361,6 +361,11 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   accept(problem, solution, error, worst, lost, fit);
 }
 
+bool says_explained(const data::Fit& fit) {
+  return fit.verdict == FitVerdict::good || fit.verdict == FitVerdict::good_correlated ||
+         fit.verdict == FitVerdict::weak;
+}
+
 bool explains(const Problem& problem, const Solution& solution) {
   const Squares sum = squares(problem, solution);
   return explains_path(sum) && misfit(problem, sum).times <= kDoubtful;

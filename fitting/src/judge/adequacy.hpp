@@ -35,6 +35,9 @@ struct Squares {
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
 
+/// Whether a fit's verdict is one of a track that is explained: good, good_correlated or weak.
+[[nodiscard]] bool says_explained(const data::Fit& fit);
+
 /// Whether a path is neither unexplained nor doubtful for its residuals.
 [[nodiscard]] bool explains(const Problem& problem, const Solution& solution);
 

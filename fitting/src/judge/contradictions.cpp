@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "judge/adequacy.hpp"
 #include "judge/counting.hpp"
 #include "judge/whiteness.hpp"
 #include "observe/decompositions.hpp"
@@ -14,20 +15,16 @@
 
 namespace trochoid::fitting {
 
-using data::FitVerdict;
-
 namespace {
 
 // Said in the verdict where that was good, in a warning where there is worse, or it is no reason to
 // doubt.
 void tell(const std::string& what, const std::string& doubt, bool grave, data::Fit& fit) {
-  const bool passed = fit.verdict == FitVerdict::good ||
-                      fit.verdict == FitVerdict::good_correlated || fit.verdict == FitVerdict::weak;
-  if (!passed || !grave) {
+  if (!says_explained(fit) || !grave) {
     fit.warnings.push_back(what);
     return;
   }
-  fit.verdict = FitVerdict::doubtful;
+  fit.verdict = data::FitVerdict::doubtful;
   fit.verdict_words = "the model follows the track, but does not explain it: " + what + doubt;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "judge/adequacy.hpp"
 #include "judge/contradictions.hpp"
 #include "judge/counting.hpp"
 
@@ -56,17 +57,12 @@ MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u, Gli
   return worst;
 }
 
-bool passed(const data::Fit& fit) {
-  return fit.verdict == FitVerdict::good || fit.verdict == FitVerdict::good_correlated ||
-         fit.verdict == FitVerdict::weak;
-}
-
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6, kNotWhite = 0.01;
   // Rendered recordings of rolling rings and discs came to 7.
   constexpr double kOfATracker = 20.0;
   const Drift& drift = error.drift;
-  if (!passed(fit) || error.whiteness.p_value > kNotWhite) return;
+  if (!says_explained(fit) || error.whiteness.p_value > kNotWhite) return;
   if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
   if (is_tracked(problem) && drift.gain < kOfATracker) return;
   fit.verdict = FitVerdict::doubtful;
@@ -110,7 +106,7 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
                                const Uncertainty& error, data::Fit& fit) {
   constexpr int kWorthWords = 3, kNoTracker = 8;
   constexpr double kIndependent = 3.0;  // one in 460 stands out by chance
-  if (!passed(fit)) return;
+  if (!says_explained(fit)) return;
   const auto too_many = [&](const MissedEnd& end) {
     const ArcData& arc = problem.arcs[end.arc];
     const double step_s =
