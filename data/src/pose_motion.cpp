@@ -32,14 +32,14 @@ double lying_theta_rad(double theta_rad) {
   return theta_rad > 0.5 * kPi ? kPi : 0.0;
 }
 
-PoseMotion::PoseMotion(const Body& body, const Support& support,
-                       const Camera& camera)
-    : radius_m_(body.radius_m), half_thickness_m_(body.half_thickness_m()),
+PoseMotion::PoseMotion(const Body& body, const Support& support, const Camera& camera)
+    : radius_m_(body.radius_m),
+      half_thickness_m_(body.half_thickness_m()),
       support_(support.kind),
       pivot_m_(support.pivot_m.value_or(Eigen::Vector3d::Zero())) {
   // An orthographic picture does not show how high a free body is.
-  depth_free_ = support.kind == SupportKind::none &&
-                camera.projection == Camera::Projection::perspective;
+  depth_free_ =
+      support.kind == SupportKind::none && camera.projection == Camera::Projection::perspective;
   switch (support.kind) {
     case SupportKind::floor:
       count_ = 4;

@@ -128,7 +128,6 @@ void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u
 void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
                             const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6;
-  constexpr double kOfATracker = 20.0;  // as of a drift (second_thoughts.cpp)
   std::set<int> tracks;
   for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
   if (tracks.size() < 2 || problem.shared_count() == 0 || problem.predictor->model_name() == "puck")

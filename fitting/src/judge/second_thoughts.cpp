@@ -59,8 +59,6 @@ MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u, Gli
 
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6, kNotWhite = 0.01;
-  // Rendered recordings of rolling rings and discs came to 7.
-  constexpr double kOfATracker = 20.0;
   const Drift& drift = error.drift;
   if (!says_explained(fit) || error.whiteness.p_value > kNotWhite) return;
   if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;

@@ -91,10 +91,11 @@ class Polynomial {
   Eigen::LDLT<Square> cholesky_;
 };
 
+constexpr int kBeside = 4;  // samples on either side that a glitch is judged by
+
 // How far a sample lies from the parabola of its neighbours, over what this leaves of them at most
 // or their noise. One of the neighbours may be passed over.
 double standing_out(const Path& path, int at, int passed_over) {
-  constexpr int kBeside = 4;
   const int first = std::max(0, at - kBeside), last = std::min(path.size(), at + kBeside + 1);
   Polynomial<2> parabola(path.t_s[at], path.t_s[last - 1] - path.t_s[first]);
   const Eigen::RowVector2d origin = path.xy.row(at);
@@ -112,11 +113,11 @@ double standing_out(const Path& path, int at, int passed_over) {
 // A tracker's slip, of one sample or two near each other; where the body was struck its neighbours
 // are on no parabola.
 bool is_glitch(const Path& path, int at) {
-  constexpr int kOnEitherSide = 2, kReach = 4;
+  constexpr int kOnEitherSide = 2;
+  // Nearer ones are not worth a cut (cheapest_cuts); a kink's own corner comes to 5.
   constexpr double kFar = 10.0;
   if (at < kOnEitherSide || at + kOnEitherSide >= path.size()) return false;
-  for (int other = std::max(0, at - kReach); other <= std::min(path.size() - 1, at + kReach);
-       ++other)  // with at itself none is passed over
+  for (int other = at - kBeside; other <= at + kBeside; ++other)  // at itself: none passed over
     if (standing_out(path, at, other) > kFar) return true;
   return false;
 }

@@ -24,6 +24,8 @@ class PoseMotion {
   /// Per unit of each parameter: velocity of the centre (rows 0-2), rotation vector (rows 3-5).
   using Velocities = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMost>;
 
+  /// @param body  a disc or ring, radius_m > 0.
+  /// @param camera  without a support, only one with perspective shows how high the body is.
   PoseMotion(const Body& body, const Support& support, const Camera& camera);
 
   [[nodiscard]] int count() const { return count_; }
@@ -37,7 +39,9 @@ class PoseMotion {
   /// Standard deviation [m or rad] of what a parameter could be at most; keeps the fit regular
   /// where the picture says nothing.
   [[nodiscard]] double scale(int parameter) const;
+  /// At a pose: m/s and rad/s for a parameter that changes by one a second.
   [[nodiscard]] Velocities velocities(const Pose<>& pose) const;
+  /// The pose after a step from this one, put where the support wants it; psi stays.
   [[nodiscard]] Pose<> moved(const Pose<>& pose, const Step& step) const;
   /// The small motion that leads from one pose to another, to first order.
   [[nodiscard]] Step step_between(const Pose<>& from, const Pose<>& to) const;
@@ -52,11 +56,13 @@ class PoseMotion {
   bool depth_free_ = false;
 };
 
-/// e2 of the node frame: steepest ascent in the plane of the disc.
+/// e2 of the node frame: steepest ascent in the plane of the disc; unit length, table frame.
 [[nodiscard]] Eigen::Vector3d ascent(const Pose<>& pose);
+/// e1 of it: the level line in the plane of the disc; unit length.
 [[nodiscard]] Eigen::Vector3d node_line(const Pose<>& pose);
+/// symmetry_axis() of a pose; unit length.
 [[nodiscard]] Eigen::Vector3d axis_of(const Pose<>& pose);
-/// theta and phi of a direction; phi is kept where the axis is vertical.
+/// Gives a pose theta and phi of a direction of unit length; phi is kept where that is vertical.
 void set_axis(const Eigen::Vector3d& axis, Pose<>& pose);
 
 /// Tilt of a body that lies on the face it is nearer to lying on: 0 or pi [rad].
@@ -64,7 +70,6 @@ void set_axis(const Eigen::Vector3d& axis, Pose<>& pose);
 
 /// Whether a body is held at its own middle: its pivot lies within half its thickness of the centre
 /// of this pose [m].
-[[nodiscard]] bool is_on_a_pin(const Body& body, const Support& support,
-                               const Pose<>& pose);
+[[nodiscard]] bool is_on_a_pin(const Body& body, const Support& support, const Pose<>& pose);
 
 }  // namespace trochoid::data
