@@ -22,8 +22,8 @@ void TableReader::refuse_unknown() const {
     if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
     const auto line = key.source().begin.line;
     throw SceneError(where_, line,
-                     fmt::format("{} is not a key of {}; did you mean {}?", in_quotes(name), name_,
-                                 nearest(name, known_)));
+                     fmt::format("{} is not a key of {}{}", in_quotes(name), name_,
+                                 guess_meant(name, known_, "; it has " + join(known_, ", "))));
   }
 }
 
@@ -65,8 +65,8 @@ std::size_t TableReader::choice(const char* key, const toml::node& node,
     fail_at(node, fmt::format("{} must be one of {}", key, join(words, ", ")));
   const auto found = std::find(words.begin(), words.end(), *word);
   if (found == words.end())
-    fail_at(node, fmt::format("{} = {} must be one of {}; did you mean {}?", key, in_quotes(*word),
-                              join(words, ", "), nearest(*word, words)));
+    fail_at(node, fmt::format("{} = {} must be one of {}{}", key, in_quotes(*word),
+                              join(words, ", "), guess_meant(*word, words)));
   return static_cast<std::size_t>(found - words.begin());
 }
 

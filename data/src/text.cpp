@@ -66,13 +66,17 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string nearest(std::string_view word, std::span<const std::string> candidates) {
+std::string guess_meant(std::string_view word, std::span<const std::string> candidates,
+                        const std::string& otherwise) {
   const std::string_view clipped = word.substr(0, 64);
   const auto closer = [&](const std::string& a, const std::string& b) {
     return edit_distance(clipped, a) < edit_distance(clipped, b);
   };
   const auto best = std::min_element(candidates.begin(), candidates.end(), closer);
-  return best == candidates.end() ? std::string() : *best;
+  if (best == candidates.end() ||
+      2 * edit_distance(clipped, *best) > std::max(clipped.size(), best->size()))
+    return otherwise;
+  return fmt::format("; did you mean {}?", *best);
 }
 
 std::string join(std::span<const std::string> words, std::string_view separator) {

@@ -14,8 +14,11 @@ namespace trochoid::data {
 /// The same without the quotes, for sentences made by a parser.
 [[nodiscard]] std::string one_line(std::string_view text, std::size_t limit = 200);
 
-/// The candidate with the smallest edit distance to `word`; empty if there is none.
-[[nodiscard]] std::string nearest(std::string_view word, std::span<const std::string> candidates);
+/// "; did you mean radius_m?" where a candidate is `word` but for a slip (an edit distance of at
+/// most half of the longer one's length); else `otherwise`.
+[[nodiscard]] std::string guess_meant(std::string_view word,
+                                      std::span<const std::string> candidates,
+                                      const std::string& otherwise = "");
 
 [[nodiscard]] std::string join(std::span<const std::string> words, std::string_view separator);
 [[nodiscard]] std::string_view trimmed(std::string_view text);

@@ -262,6 +262,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         RefusedScene{"UnknownKey", "[body]\nradius_m = 1\nradus_m = 2",
                      ":3:", "'radus_m' is not a key of [body]; did you mean radius_m?"},
+        RefusedScene{"KeyLikeNoOther", "[camera]\nlens = 1\n",
+                     ":2:", "'lens' is not a key of [camera]; it has file, "},
         RefusedScene{"UnknownTable", "\n[bodi]\nradius_m = 1", ":2:", "did you mean body?"},
         RefusedScene{
             "UnknownMarkKey",

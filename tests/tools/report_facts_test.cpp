@@ -37,9 +37,8 @@ TEST(Report, OneSampleWithoutMetresDoesNotTurnTheOthersIntoPixels) {
   EXPECT_THAT(figure, testing::Not(testing::HasSubstr("nan")));
 }
 
-// A puck that slides at 1 m/s with next to no friction, seen a micrometre off by turns, and once
-// by 1 m.
-TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
+// A puck that slides at 1 m/s with next to no friction, seen a micrometre off by turns.
+ReportInput sliding_puck() {
   ReportInput input;
   input.tracks.tracks.emplace_back();
   for (int i = 0; i < 20; ++i) {
@@ -48,7 +47,6 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
     sample.covariance_m2 = 1e-12 * Eigen::Matrix2d::Identity();
     input.tracks.tracks.front().samples.push_back(sample);
   }
-  input.tracks.tracks.front().samples[7].centre_m.x() += 1.0;
   data::Fit fit;
   fit.model = "puck";
   fit.converged = true;
@@ -60,6 +58,12 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   fit.parameters.front().value = 1.0;
   fit.arcs = {{.track = 0, .object = 0, .from_s = 0.0, .to_s = 0.2, .samples = 20}};
   input.fit = fit;
+  return input;
+}
+
+TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
+  ReportInput input = sliding_puck();
+  input.tracks.tracks.front().samples[7].centre_m.x() += 1.0;
   const ReportFacts facts = gather(input);
   EXPECT_EQ(facts.far_off, 1);
   // The other 19 are off across the path only.
@@ -70,6 +74,15 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   input.fit->arcs = {{.track = 0, .object = 0, .from_s = 0.05, .to_s = 0.15, .samples = 11}};
   EXPECT_THAT(judge(gather(input)).sentence,
               testing::StartsWith("The path of 11 of the 20 positions, over 0.1 s"));
+}
+
+TEST(Report, AFitFromWhosePathMostPositionsLieFarIsOfAnotherTrack) {
+  ReportInput input = sliding_puck();
+  for (data::TrackSample& sample : input.tracks.tracks.front().samples)
+    if (sample.frame > 2) sample.centre_m.y() += 0.1;
+  const Verdict verdict = judge(gather(input));
+  EXPECT_EQ(verdict.grade, "bad");
+  EXPECT_THAT(verdict.sentence, testing::StartsWith("17 of 20 positions lie far off the path"));
 }
 
 }  // namespace

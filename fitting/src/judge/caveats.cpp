@@ -204,6 +204,18 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
                     body.thickness_m, body.thickness_m / body.radius_m));
 }
 
+void tell_unlikely_friction(data::Fit& fit) {
+  constexpr double kMost = 2.0;
+  const data::FitParameter* friction = fit.find("friction");
+  if (friction == nullptr || friction->status == data::ParameterStatus::fixed ||
+      !(friction->value - friction->sigma > kMost))
+    return;
+  fit.warnings.push_back(
+      fmt::format("friction = {:.3g}: hardly any two surfaces have one above {:g}; are x_m, y_m in "
+                  "metres, and t_s in seconds?",
+                  friction->value, kMost));
+}
+
 void tell_given_up(const Problem& problem, data::Fit& fit) {
   constexpr double kLittle = 0.1;
   int given_up = 0, all = 0;

@@ -46,6 +46,9 @@ void tell_camera(const Problem& problem, const Uncertainty& error, const data::S
 /// Slips of units that a fit would follow without a word.
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);
 
+/// A fitted friction no pair of surfaces has: the track's positions or times are in other units.
+void tell_unlikely_friction(data::Fit& fit);
+
 /// Positions and angles that were all but given up (reweight): their number is no longer what the
 /// fit stands on.
 void tell_given_up(const Problem& problem, data::Fit& fit);

@@ -217,6 +217,12 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
   if (options.bootstrap > 0)
     fit.bootstrap = bootstrap(problem, solution, error.whiteness.correlation_time_s,
                               options.bootstrap, options.seed, options.threads);
+  constexpr int kFewFits = 20;
+  if (const int fits = options.bootstrap - fit.bootstrap.failed;
+      options.bootstrap > 0 && fits < kFewFits)
+    fit.warnings.push_back(
+        fmt::format("bootstrap: {} of {} fits came out, too few for a spread; ask for {} and more",
+                    fits, options.bootstrap, 10 * kFewFits));
   if ((options.profile || options.bootstrap > 0) && !kept_parameters(problem).empty())
     fit.warnings.push_back(
         "profiles and bootstrap keep the scale and the frame rate as they are, for comparing clips "
@@ -357,6 +363,7 @@ data::Fit OneFit::described(Bars bars) {
   tell_given_up(problem_, fit);
   tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
+  tell_unlikely_friction(fit);
   judge(problem_, solution_, error, cut_short_, fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);

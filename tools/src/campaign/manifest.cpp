@@ -8,6 +8,7 @@
 #include <set>
 
 #include "campaign/campaign.hpp"
+#include "common/progress.hpp"
 #include "common/recording_name.hpp"
 #include "common/track_options.hpp"
 #include "trochoid/data/error.hpp"
@@ -110,6 +111,18 @@ std::string unique_name(const fs::path& video, std::set<std::string>& taken) {
   return name;
 }
 
+/// What is listed already, by the same files and options; patterns may overlap.
+const CampaignItem* alike(const Campaign& campaign, const CampaignItem& item) {
+  const auto same = [&](const CampaignItem& other) {
+    return other.video.lexically_normal() == item.video.lexically_normal() &&
+           other.scene.lexically_normal() == item.scene.lexically_normal() &&
+           other.camera.lexically_normal() == item.camera.lexically_normal() &&
+           other.options == item.options;
+  };
+  const auto found = std::find_if(campaign.items.begin(), campaign.items.end(), same);
+  return found == campaign.items.end() ? nullptr : &*found;
+}
+
 void add_recordings(const toml::table& table, const fs::path& base, Campaign& campaign,
                     std::set<std::string>& taken) {
   std::set<std::string_view> known{"video", "scene", "camera"};
@@ -131,7 +144,7 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
          fmt::format("video = '{}' matches no file", text("video")));
   for (const fs::path& video : videos) {
     CampaignItem item{
-        .name = unique_name(video, taken),
+        .name = {},
         .video = video,
         .scene = filled_in(text("scene"), video, base),
         .camera = filled_in(text("camera"), video, base),
@@ -145,6 +158,12 @@ void add_recordings(const toml::table& table, const fs::path& base, Campaign& ca
           fail(campaign.manifest, *table.get(option.key),
                fmt::format("effort = '{}': it is quick, normal or exact", item.options.back()));
       }
+    if (const CampaignItem* same = alike(campaign, item)) {
+      note(fmt::format("{}: {} is named before, in {}, to be run in the same way; it is run once",
+                       item.declared, video.string(), same->declared));
+      continue;
+    }
+    item.name = unique_name(video, taken);
     campaign.items.push_back(std::move(item));
   }
 }

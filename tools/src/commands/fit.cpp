@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +11,7 @@
 
 #include "commands.hpp"
 #include "common/fit_job.hpp"
+#include "common/odd_units.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
 #include "common/provenance.hpp"
@@ -22,7 +22,6 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/moment.hpp"
-#include "trochoid/data/quantile.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 // trochoid fit: tracks and a scene in, fit.json and a table of parameters out. No physics here.
@@ -86,41 +85,6 @@ void print(const data::Fit& fit) {
   print_comparison(fit.comparison);
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
   print_notes(fit);
-}
-
-// Positions farther from the middle of the path than a laboratory is wide: most of them, if they
-// are not in metres; a few, if the tracker erred.
-void tell_far_positions(const std::string& path, const data::Track& track) {
-  constexpr double kWide_m = 20.0, kFew = 0.2;
-  std::vector<double> x_m, y_m;
-  for (const data::TrackSample& sample : track.samples)
-    if (sample.has_metres()) x_m.push_back(sample.centre_m.x()), y_m.push_back(sample.centre_m.y());
-  if (x_m.empty()) return;
-  const std::size_t seen = x_m.size();
-  const Eigen::Vector2d middle_m(data::median(std::move(x_m)), data::median(std::move(y_m)));
-  std::vector<double> far_s;
-  for (const data::TrackSample& sample : track.samples)
-    if (sample.has_metres() && (sample.centre_m - middle_m).stableNorm() > kWide_m)
-      far_s.push_back(sample.t_s);
-  if (far_s.empty()) return;
-  const bool few = static_cast<double>(far_s.size()) <= kFew * static_cast<double>(seen);
-  note(fmt::format("{}: {} of {} positions are more than {:g} m from the middle of the path{}",
-                   path, far_s.size(), seen, kWide_m,
-                   few ? fmt::format(", the first at t = {:.4g} s; where the tracker erred, leave "
-                                     "the row out",
-                                     far_s.front())
-                       : "; are x_m, y_m in metres?"));
-}
-
-// No unit can be told from numbers alone, but these are no laboratory's.
-void tell_odd_units(const std::string& path, const data::Track& track) {
-  constexpr double kSparse_s = 1.0;
-  if (track.samples.size() < 2) return;
-  tell_far_positions(path, track);
-  const double step_s = (track.samples.back().t_s - track.samples.front().t_s) /
-                        static_cast<double>(track.samples.size() - 1);
-  if (step_s >= kSparse_s)
-    note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 
 /// No fit is written over what its track was measured in, which is named without a folder.

@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 struct SimulateOptions {
   std::string scene;
   fs::path fit, output, plots, animation;
-  std::size_t arc = 0;
+  std::optional<std::size_t> arc;
   std::optional<double> until_s, rate_hz, tolerance;
   std::string model, integrator;
   bool list = false, steady = false, thesis = false, json = false;
@@ -140,11 +140,28 @@ void check_rows(const std::string& scene, const data::RunSettings& run) {
         scene, run.until_s, run.rate_hz, 1.0 / run.until_s));
 }
 
-data::Scene wanted_scene(const SimulateOptions& options) {
-  data::Scene scene = options.fit.empty() ? load_scene(options.scene)
-                                          : fitted_scene(data::read_fit(options.fit), options.arc);
-  apply_overrides(options, scene);
-  return scene;
+/// What to run: a scene, which may be a fit's.
+struct Wanted {
+  data::Scene scene;
+  std::optional<data::Fit> fit;
+};
+
+Wanted wanted(const SimulateOptions& options) {
+  Wanted wanted;
+  if (!options.fit.empty()) wanted.fit = data::read_fit(options.fit);
+  wanted.scene =
+      wanted.fit ? fitted_scene(*wanted.fit, options.arc.value_or(0)) : load_scene(options.scene);
+  apply_overrides(options, wanted.scene);
+  return wanted;
+}
+
+/// What a fit holds besides the motion that is run, and what it says of it.
+void tell_fit(const SimulateOptions& options, const data::Fit& fit) {
+  if (!options.arc && fit.arcs.size() > 1)
+    note(fmt::format("{}: holds {} arcs, and the first is run; --arc 1 to --arc {} run the others",
+                     options.fit.string(), fit.arcs.size(), fit.arcs.size() - 1));
+  if (!fit.converged)
+    note(fmt::format("{}: is no good fit of its track: {}", options.fit.string(), fit.reason));
 }
 
 /// What the run follows from: a file, by its checksum, or a bundled scene.
@@ -156,10 +173,8 @@ void add_source(const fs::path& named, data::Table& table) {
 }
 
 /// A run counts time from the fit's state on, a recording from its first frame.
-void tell_origin(const SimulateOptions& options, data::Table& table) {
-  if (options.fit.empty()) return;
-  const data::Fit fit = data::read_fit(options.fit);
-  const double origin_s = arc_start_s(fit, options.arc), factor = time_factor(fit);
+void tell_origin(const data::Fit& fit, std::size_t arc, data::Table& table) {
+  const double origin_s = arc_start_s(fit, arc), factor = time_factor(fit);
   if (origin_s == 0.0 && factor == 1.0) return;
   std::string words = fmt::format("t_s = 0 is {} s of the recording", origin_s);
   if (factor != 1.0) words += fmt::format(", whose clock runs {:.6g} times as fast", 1.0 / factor);
@@ -177,16 +192,20 @@ void simulate_scene(const SimulateOptions& options) {
 #ifdef TROCHOID_HAS_TRACKING
   if (!options.animation.empty()) check_animation_name(options.animation);
 #endif
-  const data::Scene scene = wanted_scene(options);
+  const auto [scene, fit] = wanted(options);
   check_rows(named.string(), scene.run);
-  const model::Trajectory run = in_scene(named.string(), [&] { return model::simulate(scene); });
+  const model::Trajectory run =
+      in_scene(named.string(), [&, &scene = scene] { return model::simulate(scene); });
   if (run.values.rows() == 0)
     throw InputError(fmt::format("{}: the start leaves nothing to simulate: {} Start elsewhere",
                                  named.string(), model::sentence(run.outcome)));
-  if (options.fit.empty()) tell_idle_keys(options.scene, scene);
+  if (!fit) tell_idle_keys(options.scene, scene);
   data::Table table = trajectory_table(run);
   add_source(named, table);
-  tell_origin(options, table);
+  if (fit) {
+    tell_fit(options, *fit);
+    tell_origin(*fit, options.arc.value_or(0), table);
+  }
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
   data::write_table(table, output);
   std::vector<std::string> pictures;
@@ -212,9 +231,8 @@ void run(const SimulateOptions& options) {
         "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
         "a fit with --fit FILE");
   if (options.steady) {
-    const data::Scene scene = wanted_scene(options);
     return in_scene(options.fit.empty() ? options.scene : options.fit.string(),
-                    [&] { print_steady(scene, options.json); });
+                    [&] { print_steady(wanted(options).scene, options.json); });
   }
   simulate_scene(options);
 }
@@ -230,7 +248,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option(
       "--fit", options->fit,
       "Run the motion of a fit (JSON), from its start; --until goes beyond its end");
-  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0")
+  command->add_option("--arc", options->arc, "Which arc of the fit, counted from 0 [0]")
       ->check(whole_number())
       ->needs("--fit");
   command->add_option("-o,--output", options->output, "Trajectory CSV [SCENE.trajectory.csv]");

@@ -66,6 +66,14 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
                         why.ends_with('?') ? "" : "."),
             {}};
   }
+  constexpr double kMostly = 0.5;
+  if (facts.far_off > kMostly * facts.samples)
+    return {"bad",
+            "not of this track",
+            fmt::format("{} of {} positions lie far off the path that the model “{}” was fitted "
+                        "to: the fit is of another body or recording (--fit-track, --object).",
+                        facts.far_off, facts.samples, fit.model),
+            {}};
   const bool followed = fit.verdict == data::FitVerdict::doubtful;
   const bool correlated = fit.verdict == data::FitVerdict::good_correlated;
   const char* word = followed     ? "followed, not explained"
