@@ -153,6 +153,11 @@ std::vector<SteadyMotion> on_smooth_floor(const RimBody& b, double theta, double
   return motions;
 }
 
+RimBody on_its_rim(RimBody body, double theta) {
+  body.side = touching_side(theta, 0.0);
+  return body;
+}
+
 double least_rolling(const RimBody& b) {
   return std::sqrt(b.m * b.g * b.R * b.A / (b.C * (b.C + b.m * b.R * b.R)));
 }
@@ -182,19 +187,23 @@ std::string_view name(Floor floor) {
   return floor == Floor::rough ? "rough" : "smooth";
 }
 
-double steady_rolling_spin(const RimBody& body, double theta_rad, double precession_rad_s) {
+double steady_rolling_spin(const RimBody& given, double theta_rad, double precession_rad_s) {
+  const RimBody body = on_its_rim(given, theta_rad);
   const auto [s, c, z, slope] = tilt(body, theta_rad);
   const double W = precession_rad_s;
-  const double pull = W * W * s * (body.A * c + body.m * z * body.h) - body.m * body.g * slope;
+  const double pull =
+      W * W * s * (body.A * c + body.m * z * body.signed_h()) - body.m * body.g * slope;
   return pull / (W * (body.C * s + body.m * body.R * z));  // (2)
 }
 
-std::vector<double> steady_rolling_precessions(const RimBody& body, double theta_rad,
+std::vector<double> steady_rolling_precessions(const RimBody& given, double theta_rad,
                                                double along_m_s) {
+  const RimBody body = on_its_rim(given, theta_rad);
   const auto [s, c, z, slope] = tilt(body, theta_rad);
+  const double h = body.signed_h();
   // (1) with h W s - R w3 = v: a2 W^2 + a1 W + a0 = 0.
-  const double a2 = body.A * s * c - body.C * s * s * body.h / body.R;
-  const double a1 = (body.C * s / body.R + body.m * body.R * s + body.m * body.h * c) * along_m_s;
+  const double a2 = body.A * s * c - body.C * s * s * h / body.R;
+  const double a1 = (body.C * s / body.R + body.m * body.R * s + body.m * h * c) * along_m_s;
   const double a0 = -body.m * body.g * slope;
   const double discriminant = a1 * a1 - 4.0 * a2 * a0;
   if (discriminant < 0.0) return {};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -188,6 +189,26 @@ TEST(Pieces, WhatIsSaidOfAGroupHoldsForThoseOfItsParametersThatAreNotNamed) {
     ASSERT_TRUE(free[name]->prior) << name;
     EXPECT_EQ(free[name]->prior->value, value_N_m_s2) << name;
   }
+}
+
+// A start at the bound, or on its far side, from where a minimiser takes a few steps to anywhere.
+TEST(Pieces, AStartOnABoundOfZeroBeginsInsideOfIt) {
+  data::Scene scene;
+  scene.model.name = "top";
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  scene.fit.bounds = {{"dphi_rad_s", {0.0, kInfinity}}, {"dtheta_rad_s", {-kInfinity, 0.0}}};
+  const auto predictor = model::make_predictor(scene);
+  Problem problem = make_problem(*predictor, {ArcData{}}, scene);
+  for (const auto& [name, beyond] : {std::pair("dphi_rad_s", -2.0), {"dtheta_rad_s", 2.0}})
+    for (const double start : {0.0, beyond}) {
+      const int index = predictor->index_of(name);
+      problem.base[0][index] = start;
+      const auto free = std::find_if(problem.free.begin(), problem.free.end(),
+                                     [&](const FreeParameter& p) { return p.index == index; });
+      const double u = problem.start()[free - problem.free.begin()];
+      EXPECT_LT(free->transform.value(u) * beyond, 0.0) << name;
+      EXPECT_GE(std::abs(free->transform.slope(u)), 1e-4) << name;  // rad/s a unit of u
+    }
 }
 
 // The minimiser draws a reading, d scaled sigmas off, back with a force of w^2 d: the cost of

@@ -664,6 +664,19 @@ TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
   ASSERT_TRUE(mirrored.converged) << mirrored.reason;
   for (const char* name : {"theta_rad", "phi_rad", "w1_rad_s", "w2_rad_s", "w3_rad_s"})
     EXPECT_LT(pull(mirrored, name, fit.find(name)->value), 0.1) << name;  // the same minimum
+
+  // By what is known beforehand of the spin the body is called by its other face.
+  const double w3 = -fit.find("w3_rad_s")->value, sigma = fit.find("w3_rad_s")->sigma;
+  Case known = c;
+  known.scene.fit.prior["w3_rad_s"] = {w3, sigma};
+  Case given = c;
+  given.scene.fit.fixed["w3_rad_s"] = w3;
+  for (const Case& spoken : {known, given}) {
+    const data::Fit kept = fitting::fit(std::span(&spoken.track, 1), spoken.scene, options);
+    ASSERT_TRUE(kept.converged) << kept.reason;
+    EXPECT_NEAR(kept.find("w3_rad_s")->value, w3, sigma);
+    EXPECT_GT(kept.find("theta_rad")->value, 0.5 * M_PI);
+  }
 }
 
 TEST(RimFit, BoundsALossThatIsNotThere) {

@@ -123,6 +123,27 @@ TEST(RimStarts, OneSpinsAsFastAsTheTurningOfTheSeenAxisAsks) {
   }));
 }
 
+// A body whose faces differ may stand on its other rim, half its thickness to the other side.
+TEST(RimStarts, OfABodyOnItsOtherRimRollsOnThatOne) {
+  data::Scene scene = sliding_disc();
+  scene.model.name = "rolling";
+  const model::RimBody body = per_mass(scene);
+  const double theta = 2.2, rate_rad_s = 22.0;
+  const double spin = model::steady_rolling_spin(body, theta, rate_rad_s);
+  const std::map<std::string, double> truth{
+      {"theta_rad", theta}, {"phi_rad", 0.4},
+      {"w1_rad_s", 0.0},    {"w2_rad_s", rate_rad_s * std::sin(theta)},
+      {"w3_rad_s", spin},   {"x_m", 0.01},
+      {"y_m", -0.02}};
+  constexpr int kSamples = 24;
+  const data::Track track = path_of(scene, truth, kSamples, 240.0);
+  const ArcData seen =
+      make_arc(track, 0, kSamples, {.position = true, .theta = true, .phi = true}, false);
+  const double by_thickness = 2.0 * body.h * rate_rad_s * std::sin(theta) / body.R;
+  for (const Start& start : rim_starts(seen, body, false))
+    EXPECT_LT(std::abs(start.values.at("w3_rad_s") - spin), 0.2 * by_thickness);
+}
+
 // From positions alone the tilt is on a grid, and what spin goes with it follows from that.
 TEST(RimStarts, OneSpinsAsFastAsTheVeeringOfThePathAsks) {
   const data::Scene scene = sliding_disc();

@@ -90,6 +90,24 @@ TEST(ProfileLikelihood, AgreesWithTheCovarianceWhereTheModelIsNearlyLinear) {
   }
 }
 
+// A bound half an error bar above where it would come out: the profile ends there.
+TEST(ProfileLikelihood, OfWhatIsBoundedFromAboveReachesFromItsLowerLimitToTheBound) {
+  FitOptions options;
+  const data::Track track = thesis_track(25.0, 2e-4, 1);
+  const data::FitParameter plain = *fit_top(track, options).find("b_1_s");
+  const double bound_1_s = plain.value + 0.5 * plain.sigma;
+  data::Scene scene;
+  scene.model.name = "top";
+  scene.fit.bounds["b_1_s"] = {-std::numeric_limits<double>::infinity(), bound_1_s};
+  options.profile = true;
+  const data::Fit result = fit(std::span(&track, 1), scene, options);
+  ASSERT_TRUE(result.converged) << result.reason;
+  const data::Profile& profile = profile_of(result, "b_1_s");
+  EXPECT_EQ(profile.verdict, data::ProfileVerdict::one_sided);
+  EXPECT_NEAR(profile.lower_95, plain.value - 1.96 * plain.sigma, 0.2 * plain.sigma);
+  EXPECT_EQ(profile.upper_95, bound_1_s);
+}
+
 TEST(ProfileLikelihood, IsNotBoundedOnBothSidesByAFractionOfANutation) {
   FitOptions options;
   options.profile = true;

@@ -8,6 +8,7 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/inertia.hpp"
+#include "trochoid/model/rolling.hpp"
 
 namespace trochoid::model {
 namespace {
@@ -80,6 +81,31 @@ TEST(SteadyRolling, PrecessesAtOneOfTheRatesThatItsSpeedAsksFor) {
       ASSERT_FALSE(rates.empty());
       EXPECT_LT(std::min(std::abs(rates.front() / W - 1.0), std::abs(rates.back() / W - 1.0)),
                 kCancelled);
+    }
+}
+
+// Beyond pi/2 a body stands on its other rim: the same motion, called by its other face. The axis,
+// the node line and with it the speed along it turn round, the precession does not.
+TEST(SteadyRolling, IsTheSameCalledByTheOtherFace) {
+  const RimBody body{.m = 0.06, .A = 2.1e-5, .C = 4.2e-5, .R = 0.0375, .h = 0.0025};
+  RimBody other = body;
+  other.side = -1.0;
+  for (const double theta : {0.3, 0.8, 1.3})
+    for (const double W : {-30.0, 12.0}) {
+      const double beyond = std::numbers::pi - theta, w3 = steady_rolling_spin(body, beyond, W);
+      EXPECT_NEAR(w3, -steady_rolling_spin(body, theta, W), kCancelled * std::abs(w3));
+      const Rolling<double> system{.body = other, .losses = {}};
+      State<double, Rolling<double>::kStates> y{};
+      y[Rim::theta] = beyond;
+      y[Rim::w2] = W * std::sin(beyond);
+      y[Rim::w3] = w3;
+      const double falling = body.m * kGravity * body.R / body.A;  // the size of what cancels
+      EXPECT_NEAR(system.acceleration(system.motion(y)).w1, 0.0, kCancelled * falling);
+      const std::vector<double> rates = steady_rolling_precessions(body, theta, 0.2),
+                                beyond_rates = steady_rolling_precessions(body, beyond, -0.2);
+      ASSERT_EQ(beyond_rates.size(), rates.size());
+      ASSERT_FALSE(rates.empty());
+      EXPECT_NEAR(beyond_rates.front() / rates.back(), 1.0, kCancelled);
     }
 }
 

@@ -31,7 +31,7 @@ struct Minimum {
     plain = model::make_predictor(scene);
     wrapped = observed(*plain, scene, frame_time_s(tracks));
     problem = prepare(tracks, wrapped ? *wrapped : *plain, scene, options);
-    u = problem.start();
+    u = problem.here();
     reweight(problem, u, true);
   }
 };

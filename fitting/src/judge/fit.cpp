@@ -177,7 +177,7 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
         fit.integration_error_sigma));
   hold_vanished(problem, solution.u);
   name_attitudes(problem);
-  solution.u = problem.start();
+  solution.u = problem.here();
   return solution;
 }
 
@@ -185,7 +185,7 @@ Solution roughly_weighed(Problem& problem, Solution solution) {
   problem.set_base(solution.u);
   reweight(problem, solution.u, true);
   name_attitudes(problem);
-  solution.u = problem.start();
+  solution.u = problem.here();
   return solution;
 }
 

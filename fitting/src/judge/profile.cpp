@@ -156,10 +156,16 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
     profile.values.push_back(value);
     profile.delta_chi2.push_back(rise);
   }
+  // By the value, which falls with u where it is bounded from above.
+  const bool falls = transform.slope(solution.u[index]) < 0.0;
+  const Side& lower = falls ? above : below;
+  const Side& upper = falls ? below : above;
   const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[index].index];
-  profile.lower_95 = below.bounded ? transform.value(solution.u[index] + below.bound) : info.lower;
-  profile.upper_95 = above.bounded ? transform.value(solution.u[index] + above.bound) : info.upper;
-  if (profile.lower_95 > profile.upper_95) std::swap(profile.lower_95, profile.upper_95);
+  const auto [least, most] = transform.limits();
+  profile.lower_95 = lower.bounded ? transform.value(solution.u[index] + lower.bound)
+                                   : std::max(least, info.lower);
+  profile.upper_95 =
+      upper.bounded ? transform.value(solution.u[index] + upper.bound) : std::min(most, info.upper);
   const int bounds = below.bounded + above.bounded;
   profile.verdict = bounds == 2   ? data::ProfileVerdict::bounded
                     : bounds == 1 ? data::ProfileVerdict::one_sided

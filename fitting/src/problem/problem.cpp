@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "observe/angles.hpp"
 #include "observe/camera_error.hpp"
@@ -55,25 +56,60 @@ double Transform::slope(double u) const {
 }
 
 double Transform::inverse(double value) const {
-  const double least = 1e-300;
+  constexpr double kLeast = 1e-300, kMostShare = 1.0 - 1e-12;
   switch (kind) {
     case Kind::log:
-      return std::log(std::max(value, least));
-    // A start on or beyond the bound moves a thousandth of its size inside, else it never leaves.
+      return std::log(std::max(value, kLeast));
     case Kind::above:
-      return std::log(std::max(value - lower, 1e-3 * std::abs(lower) + least));
+      return std::log(std::max(value - lower, kLeast));
     case Kind::below:
-      return std::log(std::max(upper - value, 1e-3 * std::abs(upper) + least));
+      return std::log(std::max(upper - value, kLeast));
     case Kind::limited: {
-      const double share = std::clamp(value / upper, least, 0.999);
+      const double share = std::clamp(value / upper, kLeast, kMostShare);
       return std::log(share / (1.0 - share));
     }
     case Kind::between: {
       const double t = 2.0 * (value - lower) / (upper - lower) - 1.0;
-      return std::atanh(std::clamp(t, -0.999, 0.999));
+      return std::atanh(std::clamp(t, -kMostShare, kMostShare));
     }
     default:
       return value;
+  }
+}
+
+double Transform::start(double value) const {
+  constexpr double kShare = 1e-3;
+  switch (kind) {
+    case Kind::above:
+      return inverse(std::max(value, lower + inside));
+    case Kind::below:
+      return inverse(std::min(value, upper - inside));
+    case Kind::limited:
+      return inverse(std::min(value, (1.0 - kShare) * upper));
+    case Kind::between: {
+      const double margin = 0.5 * kShare * (upper - lower);
+      return inverse(std::clamp(value, lower + margin, upper - margin));
+    }
+    default:
+      return inverse(value);
+  }
+}
+
+std::pair<double, double> Transform::limits() const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  switch (kind) {
+    case Kind::log:
+      return {0.0, kInfinity};
+    case Kind::above:
+      return {lower, kInfinity};
+    case Kind::below:
+      return {-kInfinity, upper};
+    case Kind::limited:
+      return {0.0, upper};
+    case Kind::between:
+      return {lower, upper};
+    default:
+      return {-kInfinity, kInfinity};
   }
 }
 
@@ -100,9 +136,17 @@ std::vector<int> Problem::columns_of(int arc) const {
 }
 
 Eigen::VectorXd Problem::start() const {
+  return of_base(&Transform::start);
+}
+
+Eigen::VectorXd Problem::here() const {
+  return of_base(&Transform::inverse);
+}
+
+Eigen::VectorXd Problem::of_base(double (Transform::*u_of)(double) const) const {
   Eigen::VectorXd u(free.size());
   for (int i = 0; i < static_cast<int>(free.size()); ++i)
-    u[i] = free[i].transform.inverse(base[std::max(0, free[i].arc)][free[i].index]);
+    u[i] = (free[i].transform.*u_of)(base[std::max(0, free[i].arc)][free[i].index]);
   return u;
 }
 
@@ -270,6 +314,15 @@ void check_values(const model::Predictor& predictor, const data::FitSettings& se
   }
 }
 
+// A thousandth of the bound's size or the parameter's: of a coefficient, known by its decades, what
+// the scene gives; of a state, what such bodies have.
+double inside_of(const ParameterInfo& info, double bound) {
+  constexpr double kShare = 1e-3, kUsual_m = 0.1;
+  double usual = info.unit == "rad" || info.unit == "rad/s" || info.unit == "1/s" ? 1.0 : kUsual_m;
+  if (info.logarithmic) usual = std::numeric_limits<double>::min() / kShare;
+  return kShare * std::max({std::abs(bound), std::abs(info.value), usual});
+}
+
 Transform transform_of(const ParameterInfo& info, const std::string& model,
                        const data::FitSettings& settings) {
   if (const auto* bounds = said_of(info.name, settings.bounds)) {
@@ -279,16 +332,18 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
     const bool from_zero = info.logarithmic && !(lower > 0.0);
     if (high && from_zero && upper > 0.0) return {Transform::Kind::between, 0.0, upper};
     if (low && high) return {Transform::Kind::between, lower, upper};
-    if (low && !from_zero) return {Transform::Kind::above, lower, upper};
-    if (high) return {Transform::Kind::below, lower, upper};
+    if (low && !from_zero) return {Transform::Kind::above, lower, upper, inside_of(info, lower)};
+    if (high) return {Transform::Kind::below, lower, upper, inside_of(info, upper)};
   }
   // Beyond a coefficient of about 1.1 a disc on its rim has no consistent contact (Painleve).
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
   if (info.name == "contact_radius_m") return {Transform::Kind::limited, 0.0, info.upper};
-  if (info.name == kSlipScale)
-    return {Transform::Kind::above, std::min(kSharpest_m_s, 0.5 * info.value), 0.0};
+  if (info.name == kSlipScale) {
+    const double sharpest_m_s = std::min(kSharpest_m_s, 0.5 * info.value);
+    return {Transform::Kind::above, sharpest_m_s, 0.0, 1e-3 * sharpest_m_s};
+  }
   return {info.logarithmic ? Transform::Kind::log : Transform::Kind::identity, 0.0, 0.0};
 }
 
@@ -397,23 +452,28 @@ void name_attitudes(Problem& problem) {
   const model::Predictor& predictor = *problem.predictor;
   const int theta = predictor.index_of("theta_rad"), phi = predictor.index_of("phi_rad");
   if (theta < 0 || phi < 0) return;
-  const bool bound = std::any_of(problem.free.begin(), problem.free.end(), [&](const auto& p) {
-    return (p.index == theta || p.index == phi) &&
-           (p.prior || p.transform.kind != Transform::Kind::identity);
-  });
-  const auto fixed = [&](int index) {
-    return std::none_of(problem.free.begin(), problem.free.end(),
-                        [&](const FreeParameter& p) { return p.index == index; });
+  const auto may_be_anything = [&](int index) {
+    const auto is_it = [&](const FreeParameter& p) { return p.index == index; };
+    const auto spoken_of = [&](const FreeParameter& p) {
+      return is_it(p) && (p.prior || p.transform.kind != Transform::Kind::identity);
+    };
+    const auto& free = problem.free;
+    return std::any_of(free.begin(), free.end(), is_it) &&
+           std::none_of(free.begin(), free.end(), spoken_of);
   };
-  if (bound || fixed(theta) || fixed(phi)) return;
+  // Along axes that turn round with the name.
+  const std::array<int, 2> turning{predictor.index_of("w1_rad_s"), predictor.index_of("w3_rad_s")};
+  if (!may_be_anything(theta) || !may_be_anything(phi)) return;
+  for (const int rate : turning)
+    if (rate >= 0 && !may_be_anything(rate)) return;
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc) {
     Eigen::VectorXd& values = problem.base[arc];
     const bool marked = problem.arcs[arc].observable_index(model::Observable::psi_rad) >= 0;
     if (problem.arcs[arc].folded && !marked && values[theta] > 0.5 * data::kPi) {
       values[theta] = data::kPi - values[theta];
       values[phi] += data::kPi;
-      for (const char* rate : {"w1_rad_s", "w3_rad_s"})  // along axes that turn round
-        if (const int i = predictor.index_of(rate); i >= 0) values[i] = -values[i];
+      for (const int rate : turning)
+        if (rate >= 0) values[rate] = -values[rate];
     }
     values[phi] = wrapped(values[phi]);
   }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "observe/observations.hpp"
@@ -36,10 +37,16 @@ struct Transform {
   enum class Kind { identity, log, above, below, limited, between };
   Kind kind = Kind::identity;
   double lower = 0.0, upper = 0.0;
+  double inside = 0.0;  ///< above, below: least distance of a start from the bound, > 0
   [[nodiscard]] bool is_over_decades() const { return kind == Kind::log || kind == Kind::limited; }
   [[nodiscard]] double value(double u) const;
   [[nodiscard]] double slope(double u) const;  ///< d value / d u
   [[nodiscard]] double inverse(double value) const;
+  /// The same to begin with: on a bound the slope is 0, and what begins there, or beyond, never
+  /// leaves. It begins a little inside.
+  [[nodiscard]] double start(double value) const;
+  /// What its values lie between; may be infinite.
+  [[nodiscard]] std::pair<double, double> limits() const;
 };
 
 /// Why predictions ended before the track did, and starts were not followed to its end, counted
@@ -106,12 +113,16 @@ struct Problem {
   [[nodiscard]] bool frees_camera() const;
   [[nodiscard]] std::string name(int free_index) const;  ///< with "@i" for own ones of arc i > 0
   [[nodiscard]] std::vector<int> columns_of(int arc) const;  ///< free indices seen by an arc
-  [[nodiscard]] Eigen::VectorXd start() const;               ///< u of the values in `base`
+  [[nodiscard]] Eigen::VectorXd here() const;                ///< u of the values in `base`
+  [[nodiscard]] Eigen::VectorXd start() const;  ///< the same to begin with, off all bounds
   [[nodiscard]] Eigen::VectorXd values(int arc, const Eigen::VectorXd& u) const;
   [[nodiscard]] double value(int free_index, const Eigen::VectorXd& u) const;
   void set_base(const Eigen::VectorXd& u);  ///< writes the values of u back into `base`
   [[nodiscard]] int rows() const;
   [[nodiscard]] int max_steps() const;  ///< of one integration
+
+ private:
+  [[nodiscard]] Eigen::VectorXd of_base(double (Transform::*u_of)(double) const) const;
 };
 
 enum class Weights { kept, dropped };
@@ -173,8 +184,9 @@ void fold_tilt(const model::Predictor& predictor, Eigen::VectorXd& values, Eigen
 
 /// Of the two names of one attitude of a body whose faces look alike, (theta, phi) and (pi - theta,
 /// phi + pi), takes the one with the lesser tilt at the start of each arc, and phi within half a
-/// turn of zero. Leaves arcs alone where the spin angle is seen or theta is bounded or known
-/// beforehand.
+/// turn of zero. Leaves arcs alone where the spin angle is seen, and all of them where an angle or
+/// a rate that turns round with the axis is given, bounded or known beforehand: by what was said of
+/// it the body has but one of the names.
 void name_attitudes(Problem& problem);
 
 struct Solution {

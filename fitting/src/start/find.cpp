@@ -96,8 +96,7 @@ Found better_of_lookalikes(const Problem& problem, const SearchRequest& asked, F
   const int all = static_cast<int>(problem.arcs[0].t_s.size());
   Problem solved = problem;
   solved.set_base(found.solution.u);
-  Eigen::VectorXd sign;
-  fold_tilt(*problem.predictor, solved.base[0], sign);
+  name_attitudes(solved);
   for (const Start& start : asked.lookalikes(start_from(solved, found.path))) {
     if (exhausted(problem, found)) break;
     Found other = grow(problem, start, std::max(24, all / 8));

@@ -78,7 +78,7 @@ Motion motion_of(const ArcData& arc) {
 // Spin of a body that rolls without slip with the measured velocity.
 double spin_by_velocity(const Motion& motion, const model::RimBody& body, double phi, double w2) {
   const Eigen::Vector2d n(std::cos(phi), std::sin(phi));
-  return (body.h * w2 - motion.velocity_m_s.dot(n)) / body.R;
+  return (body.signed_h() * w2 - motion.velocity_m_s.dot(n)) / body.R;
 }
 
 Start state(const Motion& motion, double theta, double phi, double w1, double w2, double w3,
@@ -108,7 +108,8 @@ double spin_by_couples(const model::RimBody& q, const ArcData& arc, const Smooth
     const Eigen::Index i = nearest(tilts, t_s), k = nearest(turns, t_s);
     const double theta = tilts.curve.value(i, 0), w1 = tilts.curve.first(i, 0);
     const double dw1 = tilts.curve.second(i, 0), W = turns.curve.first(k, 0);
-    const double s = std::sin(theta), c = std::cos(theta), h = std::copysign(q.h, c);
+    const double s = std::sin(theta), c = std::cos(theta),
+                 h = model::touching_side(theta, w1) * q.h;
     const double z = q.R * s + h * c, slope = q.R * c - h * s;
     const Eigen::Vector2d n =
         Eigen::Rotation2Dd(turns.curve.value(k, 0)) * Eigen::Vector2d::UnitX();
@@ -183,7 +184,9 @@ std::vector<Start> from_angles(const ArcData& arc, const model::RimBody& body, b
                        double share) {
     const double leaning = std::clamp(tilt.first, 0.03, data::kPi - 0.03), azimuth = turn.first;
     const double w1 = share * tilt.second, w2 = turn.second * std::sin(leaning);
-    std::vector<double> spins{spin_by_velocity(motion, body, azimuth, w2)};
+    model::RimBody placed = body;
+    placed.side = model::touching_side(leaning, w1);
+    std::vector<double> spins{spin_by_velocity(motion, placed, azimuth, w2)};
     if (slow && turn.second != 0.0)
       spins.push_back(model::steady_rolling_spin(body, leaning, turn.second));
     if (slides && std::isfinite(balanced)) spins.push_back(balanced);
@@ -299,6 +302,7 @@ std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& kn
   constexpr double kFlattest = 0.05, kSteepest = 1.55, kStep = 0.05;  // tilts looked at
   constexpr int kHalvings = 20;
   const double theta = known.values.at("theta_rad"), w2 = known.values.at("w2_rad_s");
+  if (!(theta < 0.5 * data::kPi)) return {};
   const double along_m_s = body.h * w2 - body.R * known.values.at("w3_rad_s");
   const double rate = w2 / std::sin(theta);
   const auto spin = [&](double tilt) {  // the node line half a turn round

@@ -51,7 +51,7 @@ struct Start {
 /// States of a rim whose centre goes nearly the same way as that of a known one, but which leans
 /// the other way: the axis half a turn round, the same velocity of the centre and precession rate,
 /// and a tilt at which it rolls steadily so; there may be none or several.
-/// @param known  state of a rim, its tilt below pi/2; what else it has is kept.
+/// @param known  state of a rim; what else it has is kept. None where its tilt is not below pi/2.
 [[nodiscard]] std::vector<Start> leaning_otherwise(const model::RimBody& body, const Start& known);
 
 /// Starts for a flat puck: position and velocity from the window, friction from the deceleration.
