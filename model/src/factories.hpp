@@ -49,9 +49,9 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
 /// rounding leaves.
 [[nodiscard]] double finer(double tolerance);
 
-/// Fills error_estimate_rad from the differences between a run and its finer repetition, one per row.
-/// Beyond the first row where they exceed 0.05 rad the motion is not known (rounding has decided it):
-/// the run is cut there and ends with tolerance_not_reachable.
+/// Fills error_estimate_rad from the differences between a run and its finer repetition, one per
+/// row. Beyond the first row where they exceed 0.05 rad the motion is not known (rounding has
+/// decided it): the run is cut there and ends as diverged.
 void end_where_unknown(const Eigen::VectorXd& apart_rad, Trajectory& trajectory);
 
 }  // namespace trochoid::model

@@ -7,6 +7,7 @@
 
 #include "factories.hpp"
 #include "solve.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/model/free_body.hpp"
 #include "trochoid/model/inertia.hpp"
 
@@ -68,7 +69,7 @@ Eigen::Vector3d rates_of(const data::StartSettings& start, double theta, double 
 FreeSettings settings_of(const data::Scene& scene) {
   FreeSettings free;
   free.moments_kg_m2 = moments_of(scene);
-  free.theta_rad = scene.start.theta_rad.value_or(M_PI / 4.0);
+  free.theta_rad = scene.start.theta_rad.value_or(data::kPi / 4.0);
   free.phi_rad = scene.start.phi_rad.value_or(0.0);
   free.psi_rad = scene.start.psi_rad.value_or(0.0);
   free.w_rad_s = rates_of(scene.start, free.theta_rad, free.psi_rad);
@@ -113,10 +114,9 @@ class Angles {
   Angles(double phi, double psi)
       : half_sum_(0.5 * (phi + psi)), half_difference_(0.5 * (phi - psi)) {}
   void follow(double qw, double qx, double qy, double qz) {
-    if (qw != 0.0 || qz != 0.0)
-      half_sum_ += std::remainder(std::atan2(qz, qw) - half_sum_, 2.0 * M_PI);
+    if (qw != 0.0 || qz != 0.0) half_sum_ += data::wrapped(std::atan2(qz, qw) - half_sum_);
     if (qx != 0.0 || qy != 0.0)
-      half_difference_ += std::remainder(std::atan2(qy, qx) - half_difference_, 2.0 * M_PI);
+      half_difference_ += data::wrapped(std::atan2(qy, qx) - half_difference_);
   }
   [[nodiscard]] double phi() const { return half_sum_ + half_difference_; }
   [[nodiscard]] double psi() const { return half_sum_ - half_difference_; }

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/interpolate.hpp"
 
@@ -13,7 +13,6 @@ namespace {
 
 constexpr int kPerTurn = 256;  // samples per turn of phi; the average over a turn is then exact to
                                // the interpolation
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 void require_turns(const Eigen::VectorXd& phi) {
   const Eigen::Index n = phi.size();
@@ -22,7 +21,7 @@ void require_turns(const Eigen::VectorXd& phi) {
     if (!(sign * (phi[i] - phi[i - 1]) > 0.0))
       throw InputError(fmt::format(
           "mean_path: phi is not monotonic at row {}; the mean path needs steady precession", i));
-  if (n < 4 || std::abs(phi[n - 1] - phi[0]) <= 3.0 * kTurn)
+  if (n < 4 || std::abs(phi[n - 1] - phi[0]) <= 3.0 * data::kTurn)
     throw InputError("mean_path: the run spans less than three turns of phi; make it longer");
 }
 
@@ -83,7 +82,7 @@ MeanPath mean_path(const Eigen::VectorXd& t_s, const Eigen::VectorXd& phi_rad,
                    const Eigen::VectorXd& x_m, const Eigen::VectorXd& y_m) {
   require_turns(phi_rad);
   const double span = phi_rad[phi_rad.size() - 1] - phi_rad[0];
-  const double step = std::copysign(kTurn / kPerTurn, span);
+  const double step = std::copysign(data::kTurn / kPerTurn, span);
   const auto points = static_cast<Eigen::Index>(std::floor(span / step)) + 1;
   const Eigen::VectorXd grid =
       phi_rad[0] +

@@ -22,6 +22,10 @@ std::string_view name(Outcome outcome) {
       return "tolerance_not_reachable";
     case Outcome::out_of_domain:
       return "out_of_domain";
+    case Outcome::chattering:
+      return "chattering";
+    case Outcome::diverged:
+      return "diverged";
   }
   return "unknown";
 }
@@ -46,8 +50,26 @@ std::string_view sentence(Outcome outcome) {
       return "The tolerance asks for steps below rounding.";
     case Outcome::out_of_domain:
       return "Parameters or state left the model's range.";
+    case Outcome::chattering:
+      return "Sticking and slipping alternate too fast to be followed.";
+    case Outcome::diverged:
+      return "A finer run goes another way from here on: lower the tolerance; where that does not "
+             "help, rounding decides what follows.";
   }
   return "Unknown.";
+}
+
+bool broke_off(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::step_limit:
+    case Outcome::tolerance_not_reachable:
+    case Outcome::out_of_domain:
+    case Outcome::chattering:
+    case Outcome::diverged:
+      return true;
+    default:
+      return false;
+  }
 }
 
 }  // namespace trochoid::model

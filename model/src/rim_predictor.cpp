@@ -2,10 +2,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "factories.hpp"
 #include "rim_kernel.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 // Rolling, sliding and smooth-floor bodies as functions of their parameters. Position and spin
@@ -47,8 +47,8 @@ struct Entries {
 
 void add_initial(const RimStart& start, Floor floor, Entries& entries) {
   ParameterInfo theta = initial_parameter("theta_rad", "rad", start.theta_rad, "tilt of the axis");
-  theta.lower = Rolling<double>::kFlat_rad;
-  theta.upper = std::numbers::pi - theta.lower;
+  theta.lower = kFlat_rad;
+  theta.upper = data::kPi - theta.lower;
   entries.add(theta, kTheta);
   entries.add(initial_parameter("phi_rad", "rad", start.phi_rad, "precession angle"), kPhi);
   ParameterInfo psi = initial_parameter("psi_rad", "rad", start.psi_rad, "spin angle");
@@ -186,7 +186,7 @@ template <class S>
 RimPath<S> RimPredictor::seen(RimPath<S> path, const Call& call) const {
   if (path.end.outcome != Outcome::flat || !call.request.lies_where_it_fell) return path;
   const State<S, 10>& y = path.end.y;
-  const double tilt_rad = value_of(y[Rim::theta]) < 0.5 * std::numbers::pi ? 0.0 : std::numbers::pi;
+  const double tilt_rad = value_of(y[Rim::theta]) < 0.5 * data::kPi ? 0.0 : data::kPi;
   path.rows.resize(call.t_s.size(), {y[Rim::phi], S(tilt_rad), y[Rim::psi], y[Rim::x], y[Rim::y]});
   return path;
 }

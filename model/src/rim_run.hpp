@@ -323,7 +323,7 @@ class RimRun {
   /// Slip begins against the friction that rolling would need, so the force does not jump (S14).
   template <class Sink>
   void start_slip(const State<S, 8>& y, const S& delay, Sink& sink) {
-    if (chattering(end_.end_s)) return finish(Outcome::tolerance_not_reachable);
+    if (chattering(end_.end_s)) return finish(Outcome::chattering);
     if (options_.skips_onset) {
       const Onset onset = onset_of(moved_to_event(roll_, end_.end_s, y, delay));
       if (onset.lasts_s > 0.0) return skip_onset(y, onset, delay, sink);
@@ -498,7 +498,7 @@ class RimRun {
                          S(0.0), S(0.0));
       return;
     }
-    if (chattering(end_.end_s)) return finish(Outcome::tolerance_not_reachable);
+    if (chattering(end_.end_s)) return finish(Outcome::chattering);
     end_.y = across_event(slide_, slide_, end_.end_s, end_.y, delay,
                           [&](const State<S, 10>& at) { return slipping(rolling_part(at)); });
   }

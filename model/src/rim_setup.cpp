@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/inertia.hpp"
 
@@ -43,7 +43,7 @@ std::optional<double> one_of(const std::optional<double>& a, const char* name_a,
 }
 
 void check_tilt(double theta_rad) {
-  if (!(theta_rad > 0.0 && theta_rad < std::numbers::pi))
+  if (!(theta_rad > 0.0 && theta_rad < data::kPi))
     throw InputError(fmt::format("start.theta_rad = {} must lie between 0 and pi", theta_rad));
 }
 

@@ -21,7 +21,8 @@ struct RimStart {
   double w1_rad_s = 0.0, w2_rad_s = 0.0, w3_rad_s = 0.0;
   double x_m = 0.0, y_m = 0.0, vx_m_s = 0.0, vy_m_s = 0.0;
 };
-/// The scene's start; a velocity that is not given is that of rolling.
+/// The scene's start; a velocity that is not given is that of rolling, and of one of which a
+/// component is given the other is 0.
 /// @throws InputError if theta is missing, not inside (0, pi), or both of (w2, dphi) and so on are
 ///         given.
 [[nodiscard]] RimStart rim_start(const data::Scene& scene, const RimBody& body);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "factories.hpp"
 #include "rim_kernel.hpp"
@@ -307,16 +308,33 @@ RimJob rim_job(const data::Scene& scene, const std::string& law) {
   return job;
 }
 
-/// Largest differences of path and axis between two runs over their common rows.
+/// Whether a run ends earlier than another because its body goes another way: not a little earlier,
+/// as an event a little earlier makes it, and not because its integration gave up.
+bool ends_otherwise(const RimRunEnd<double>& earlier, double later_s) {
+  constexpr double kLittle = 0.01;
+  return !broke_off(earlier.outcome) && earlier.end_s < (1.0 - kLittle) * later_s;
+}
+
+/// Largest differences of path and axis between a run and its repetition; the run ends where they
+/// part.
 void estimate_error(const RimRecord& a, const RimRecord& b, Trajectory& run) {
   constexpr int kPhi = 1, kTheta = 2, kX = 7, kY = 8;
-  for (std::size_t n = 0; n < std::min(a.rows.size(), b.rows.size()); ++n) {
-    const auto& p = a.rows[n];
-    const auto& q = b.rows[n];
+  const std::size_t common = std::min(a.rows.size(), b.rows.size());
+  Eigen::VectorXd apart_rad(run.values.rows());
+  for (std::size_t n = 0; n < common; ++n) {
+    const auto &p = a.rows[n], &q = b.rows[n];
+    apart_rad[static_cast<Eigen::Index>(n)] =
+        std::hypot(p[kTheta] - q[kTheta], std::sin(p[kTheta]) * (p[kPhi] - q[kPhi]));
+  }
+  const bool parts = ends_otherwise(b.end, a.end.end_s);
+  apart_rad.tail(apart_rad.size() - static_cast<Eigen::Index>(common))
+      .setConstant(parts ? std::numeric_limits<double>::infinity() : 0.0);
+  end_where_unknown(apart_rad, run);
+  if (ends_otherwise(a.end, b.end.end_s)) run.outcome = Outcome::diverged;
+  const auto known = static_cast<std::size_t>(run.values.rows());
+  for (std::size_t n = 0; n < std::min(common, known); ++n) {
+    const auto &p = a.rows[n], &q = b.rows[n];
     run.error_estimate_m = std::max(run.error_estimate_m, std::hypot(p[kX] - q[kX], p[kY] - q[kY]));
-    run.error_estimate_rad =
-        std::max(run.error_estimate_rad,
-                 std::hypot(p[kTheta] - q[kTheta], std::sin(p[kTheta]) * (p[kPhi] - q[kPhi])));
   }
 }
 
@@ -344,11 +362,11 @@ Trajectory simulate_rim(const data::Scene& scene, const std::string& law) {
   for (std::size_t n = 0; n < record.rows.size(); ++n)
     run.values.row(static_cast<Eigen::Index>(n)) = Eigen::Map<const Eigen::RowVectorXd>(
         record.rows[n].data(), static_cast<Eigen::Index>(run.columns.size()));
-  estimate_error(record, other, run);
   run.events = std::move(record.end.events);
   run.outcome = record.end.outcome;
   run.end_s = record.end.end_s;
   run.statistics = record.end.statistics;
+  estimate_error(record, other, run);
   return run;
 }
 

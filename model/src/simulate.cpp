@@ -45,7 +45,8 @@ void end_where_unknown(const Eigen::VectorXd& apart_rad, Trajectory& trajectory)
   if (known == trajectory.values.rows()) return;
   trajectory.values.conservativeResize(known, Eigen::NoChange);
   trajectory.end_s = known > 0 ? trajectory.values(known - 1, 0) : 0.0;
-  trajectory.outcome = Outcome::tolerance_not_reachable;
+  trajectory.outcome = Outcome::diverged;
+  std::erase_if(trajectory.events, [&](const Event& e) { return e.t_s > trajectory.end_s; });
 }
 
 double finer(double tolerance) {

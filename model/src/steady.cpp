@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "rim_setup.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/sliding.hpp"
 
@@ -17,7 +17,7 @@ namespace trochoid::model {
 namespace {
 
 using Lanes = Dual<4>;
-constexpr double kUpright = 0.5 * std::numbers::pi;
+constexpr double kUpright = 0.5 * data::kPi;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNotDefined = std::numeric_limits<double>::quiet_NaN();
 

@@ -5,6 +5,7 @@
 #include "factories.hpp"
 #include "top_dispatch.hpp"
 #include "top_scene.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/model/events.hpp"
 
 // The top as a function of its parameters: the kernel follows the axis k, everything else (length,
@@ -62,7 +63,8 @@ std::vector<Entry> entries(const TopSettings& top) {
   drag(top.quadratic_drag, kQuadratic, "gamma3_quadratic", "1", top.quadratic,
        "quadratic drag on the spin, q3 I / Is^2");
   const std::vector<Entry> rest{
-      {kTheta, {"theta_rad", "rad", Role::initial, 0.0, M_PI, false, top.theta_rad, true, "tilt"}},
+      {kTheta,
+       {"theta_rad", "rad", Role::initial, 0.0, data::kPi, false, top.theta_rad, true, "tilt"}},
       {kPhi,
        {"phi_rad", "rad", Role::initial, -kInfinity, kInfinity, false, top.phi_rad, true,
         "precession angle"}},

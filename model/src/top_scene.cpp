@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/inertia.hpp"
 
@@ -86,7 +87,7 @@ void read_body(const data::Scene& scene, TopSettings& top) {
 }
 
 void check(const TopSettings& top) {
-  if (!(top.theta_rad >= 0.0) || top.theta_rad > M_PI)
+  if (!(top.theta_rad >= 0.0) || top.theta_rad > data::kPi)
     throw InputError(fmt::format("start.theta_rad = {} must lie between 0 and pi", top.theta_rad));
   const std::pair<const char*, double> numbers[] = {
       {"weight times l over I (body.mass_kg, l_m, I_kg_m2)", top.a_1_s2},
@@ -120,7 +121,7 @@ TopSettings common(const data::Scene& scene) {
   top.quadratic_drag = scene.model.drag_spin_quadratic_N_m_s2.has_value();
   top.drag = top.transverse_drag || top.spin_drag || top.dry_drag || top.quadratic_drag;
   top.l_m = pivot_distance_m(scene).value_or(0.1);
-  top.theta_rad = scene.start.theta_rad.value_or(M_PI / 4.0);
+  top.theta_rad = scene.start.theta_rad.value_or(data::kPi / 4.0);
   if (scene.support.pivot_m) {
     top.pivot_x_m = scene.support.pivot_m->x();
     top.pivot_y_m = scene.support.pivot_m->y();
@@ -181,7 +182,7 @@ TopSettings without_drag(const TopSettings& top) {
         "model \"top-euler\" is the thesis' frictionless top; leave drag_transverse_N_m_s and "
         "drag_spin_* out, or use model \"top\"");
   }
-  if (top.theta_rad == 0.0 || top.theta_rad == M_PI)
+  if (top.theta_rad == 0.0 || top.theta_rad == data::kPi)
     throw InputError("model \"top-euler\" is singular at theta_rad = 0 and pi; use model \"top\"");
   return top;
 }

@@ -7,6 +7,7 @@
 #include "solve.hpp"
 #include "top_dispatch.hpp"
 #include "top_scene.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/model/top.hpp"
 
 // A whole run of the top as a table. Our own steppers run in the kernel; SUNDIALS runs the same
@@ -115,7 +116,7 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   for (Eigen::Index row = 0; row < solution.states.rows(); ++row) {
     const auto y = solution.states.row(row);
     const double raw = std::atan2(y[3], -y[4]);
-    if (y[3] != 0.0 || y[4] != 0.0) phi += std::remainder(raw - phi, 2.0 * M_PI);
+    if (y[3] != 0.0 || y[4] != 0.0) phi += data::wrapped(raw - phi);
     if (row % parts != 0) continue;
     const auto n = static_cast<std::size_t>(row / parts);
     for (int i = 0; i < 7; ++i) base[i] = y[i];

@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "calibrate/overhead_fit.hpp"
 #include "drawn_clip.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/outline.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

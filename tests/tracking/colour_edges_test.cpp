@@ -160,8 +160,8 @@ ByColour seen_by_colour(const ThinDisc& disc, const Photograph& picture,
                                             disc.body, disc.camera, predicted);
   ByColour seen{outline_samples(disc.body, predicted, disc.camera, motion, 2.0), {}};
   constexpr double kBlurPx = 0.6, kReachPx = 3.0;
-  seen.edges =
-      find_colour_edges(colour, {seen.outline, Moments(), data::PoseMotion::Step()}, kBlurPx, kReachPx);
+  seen.edges = find_colour_edges(colour, {seen.outline, Moments(), data::PoseMotion::Step()},
+                                 kBlurPx, kReachPx);
   return seen;
 }
 

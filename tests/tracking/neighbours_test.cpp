@@ -1,8 +1,8 @@
 #include "link/neighbours.hpp"
 
-#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
 #include "link/one_side.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

@@ -1,8 +1,8 @@
 #include "link/readings.hpp"
 
-#include "trochoid/data/pose_motion.hpp"
 #include "glimpsed_sequence.hpp"
 #include "pose/pose_start.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

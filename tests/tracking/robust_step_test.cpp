@@ -28,8 +28,9 @@ std::vector<EdgeEquation> round_a_circle(double noise_px, double common_px, std:
   return equations;
 }
 
-RobustSolution solved(std::vector<EdgeEquation> equations,
-                      const data::PoseMotion::Step& prior = data::PoseMotion::Step::Constant(2, 30.0)) {
+RobustSolution solved(
+    std::vector<EdgeEquation> equations,
+    const data::PoseMotion::Step& prior = data::PoseMotion::Step::Constant(2, 30.0)) {
   RobustSolution solution;
   EXPECT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
   find_uncertainty(equations, prior, solution);

@@ -9,7 +9,6 @@
 #include "find/body_search.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "link/linking.hpp"
 #include "link/path_motion.hpp"
 #include "link/track_assembly.hpp"
@@ -17,6 +16,7 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/parallel.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

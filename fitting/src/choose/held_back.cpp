@@ -10,6 +10,7 @@
 
 #include "observe/angles.hpp"
 #include "observe/arcs.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -32,7 +33,7 @@ struct SumOfSquares {
 void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
                  SumOfSquares& squares) {
   if (angle_only && sample.psi) {
-    const double off = wrapped(predicted[2] - sample.psi->value_rad);
+    const double off = data::wrapped(predicted[2] - sample.psi->value_rad);
     squares.add(off / sample.psi->sigma_rad);
   }
   if (angle_only || !sample.has_metres()) return;

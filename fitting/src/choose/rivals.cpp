@@ -10,6 +10,7 @@
 #include "choose/rung.hpp"
 #include "observe/angles.hpp"
 #include "problem/problem.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -116,7 +117,7 @@ double shift_of(const data::FitParameter& here, const data::Fit& other) {
   const bool loss = here.name != "vx_m_s" && here.name != "vy_m_s";
   if (there == nullptr && !loss) return 0.0;
   const double change = (there != nullptr ? there->value : 0.0) - here.value;
-  return here.unit == "rad" ? wrapped(change) : change;
+  return here.unit == "rad" ? data::wrapped(change) : change;
 }
 
 // Variance of a parameter in a rung with further terms beyond that in the chosen one, which does

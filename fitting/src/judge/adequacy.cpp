@@ -90,7 +90,7 @@ double typical_noise(const Problem& problem, Channel channel) {
     for (const Reading& reading : arc.readings)
       if (reading.channel == channel)
         sigmas.push_back(noise_scale(arc, channel) / reading.whitener(0, 0));
-  return median(std::move(sigmas));
+  return median_or_zero(std::move(sigmas));
 }
 
 // What a channel's residuals are in one track, over its sigmas or the scatter of its samples.

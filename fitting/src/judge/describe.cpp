@@ -126,7 +126,7 @@ double turns_of_node_line(const Problem& problem, const Eigen::VectorXd& u) {
   const Eigen::VectorXd phi = problem.predictor->predict(problem.values(0, u), request).values;
   double turned = 0.0;
   for (Eigen::Index i = 1; i < phi.size() && std::isfinite(phi[i]); ++i)
-    turned += std::abs(std::remainder(phi[i] - phi[i - 1], data::kTurn));
+    turned += std::abs(data::wrapped(phi[i] - phi[i - 1]));
   return turned / data::kTurn;
 }
 

@@ -96,9 +96,9 @@ Eigen::VectorXd common_offset(const Problem& problem, const Linearised& all, Cha
     }
     first += arc.rows;
   }
-  const double typical = median(std::move(sizes));
+  const double typical = median_or_zero(std::move(sizes));
   if (!(typical > 0.0)) return rows;
-  return std::max(kOfScatter, kOfStated / median(std::move(scales))) / typical * rows;
+  return std::max(kOfScatter, kOfStated / median_or_zero(std::move(scales))) / typical * rows;
 }
 
 // What the camera's likely deviations do to the residuals of all channels, one each.
@@ -266,7 +266,7 @@ double typical_widening(const Eigen::VectorXd& variance, const Eigen::VectorXd& 
   std::vector<double> ratios;
   for (Eigen::Index i = 0; i < plain.size(); ++i)
     if (plain[i] > 0.0) ratios.push_back(std::sqrt(variance[i] / plain[i]));
-  return std::max(1.0, median(std::move(ratios)));
+  return std::max(1.0, median_or_zero(std::move(ratios)));
 }
 
 }  // namespace
@@ -392,7 +392,7 @@ Criteria criteria(const Problem& problem, const Eigen::VectorXd& u, double minus
   for (int arc = 0; arc < static_cast<int>(plain.arcs.size()); ++arc) {
     Eigen::VectorXd r;
     if (!evaluate(plain, arc, u, r, nullptr)) {
-      result.chi2 = std::numeric_limits<double>::infinity();
+      result.chi2 = result.aicc = result.bic = std::numeric_limits<double>::infinity();
       return result;
     }
     result.chi2 += r.squaredNorm();

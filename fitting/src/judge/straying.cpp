@@ -32,7 +32,7 @@ bool leaves_pivot(std::span<const data::Track> tracks, const data::Scene& scene)
       if (sample.has_covariance())
         sigmas_m.push_back(std::sqrt(0.5 * sample.covariance_m2.trace()));
   const double radius_m = scene.body ? scene.body->radius_m : 0.0;
-  return straying_m(tracks) > std::max(5.0 * median(std::move(sigmas_m)), 0.05 * radius_m);
+  return straying_m(tracks) > std::max(5.0 * median_or_zero(std::move(sigmas_m)), 0.05 * radius_m);
 }
 
 }  // namespace trochoid::fitting

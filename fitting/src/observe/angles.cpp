@@ -6,12 +6,8 @@
 
 namespace trochoid::fitting {
 
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, data::kTurn);
-}
-
 double continued(double angle_rad, double from_rad) {
-  return from_rad + wrapped(angle_rad - from_rad);
+  return from_rad + data::wrapped(angle_rad - from_rad);
 }
 
 AngleSeries angle_series(const ArcData& arc, Channel channel) {

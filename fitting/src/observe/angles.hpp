@@ -3,12 +3,11 @@
 #include <vector>
 
 #include "observe/observations.hpp"
+#include "trochoid/data/angle.hpp"
 
 namespace trochoid::fitting {
 
-/// Of all angles whole turns apart from this one, that within -pi .. pi [rad].
-[[nodiscard]] double wrapped(double angle_rad);
-/// Of the same angles, that nearest to another one.
+/// Of all angles whole turns apart from this one, that nearest to another one.
 [[nodiscard]] double continued(double angle_rad, double from_rad);
 
 /// Readings of one angle and the times they belong to, continued over its jumps.

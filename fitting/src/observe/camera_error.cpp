@@ -230,7 +230,7 @@ data::TrackSample measured_by(const data::Scene& scene, data::TrackSample sample
   const auto there =
       has_outline(scene, seen[0]) ? seen_by(scene, pose, camera, other) : std::nullopt;
   if (there) {
-    turned_rad = std::remainder(there->phi_rad - pose.phi_rad, data::kTurn);
+    turned_rad = data::wrapped(there->phi_rad - pose.phi_rad);
     pose = *there;
   } else {
     pose.centre_m.head<2>() += shift.place_m;

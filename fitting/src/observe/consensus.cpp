@@ -170,7 +170,7 @@ bool goes_smoothly(const NoisyPath& path, int from, int to) {
     if (i + 1 < m_s.size() && now > kLonger * std::max(before, m_s[i + 1].norm()) + noises_m_s[i])
       return false;
   }
-  return !changes.empty() && median(std::move(changes)) < kSmooth;
+  return !changes.empty() && median_or_zero(std::move(changes)) < kSmooth;
 }
 
 // A chain that could not go on for long has met another kind of motion, not wrong places: a body at
@@ -214,7 +214,7 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
   // A low quantile of what noise and bends make together bounds the noise: stated sigmas may be
   // too small, and what is wrong here and there must not pass for noise.
   constexpr double kRayleigh = 0.845, kWeights = 1.225;  // 0.3 quantile; of (-1/2, 1, -1/2)
-  const double stated_m = median({sigma_m.begin(), sigma_m.end()});
+  const double stated_m = median_or_zero({sigma_m.begin(), sigma_m.end()});
   const double bound_m = data::quantile(bends, 0.3) / (kRayleigh * kWeights);
   const double noise_m = std::max(stated_m, std::min(bound_m, noise_about_smooth_curve(t_s, xy_m)));
   std::vector<double> noises_m;
@@ -226,7 +226,7 @@ std::vector<int> consistent_path(std::span<const double> t_s, const Eigen::Matri
     speeds.push_back((xy_m.row(i) - xy_m.row(i - 1)).norm() / steps_s.back());
   }
   path.noise_m = noise_m;
-  path.step_s = median(steps_s);
+  path.step_s = median_or_zero(steps_s);
   path.speed_m_s = 3.0 * data::quantile(speeds, 0.7);
   path.acceleration_m_s2 = path.speed_m_s / (4.0 * path.step_s);
   std::vector<int> kept;

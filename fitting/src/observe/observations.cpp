@@ -195,9 +195,9 @@ double local_rate(const ArcData& arc, const std::vector<const Reading*>& reading
   const int n = static_cast<int>(readings.size());
   std::vector<double> rates;
   for (int i = std::max(0, about - kSteps); i < std::min(n - 1, about + kSteps); ++i)
-    rates.push_back(wrapped(readings[i + 1]->value.x() - readings[i]->value.x()) /
+    rates.push_back(data::wrapped(readings[i + 1]->value.x() - readings[i]->value.x()) /
                     (arc.t_s[readings[i + 1]->sample] - arc.t_s[readings[i]->sample]));
-  return median(std::move(rates));
+  return median_or_zero(std::move(rates));
 }
 
 // How far an angle lies off the chord through two other readings, and what a curved path adds to
@@ -213,8 +213,9 @@ OffChord off_chord(const ArcData& arc, const std::vector<const Reading*>& readin
   const double part_s = arc.t_s[readings[at]->sample] - arc.t_s[one.sample];
   const double here = readings[at]->value.x() - one.value.x();
   const double way = other.value.x() - one.value.x();
-  return {wrapped(here - rate * part_s - part_s / whole_s * wrapped(way - rate * whole_s)),
-          0.5 * part_s * (whole_s - part_s)};
+  return {
+      data::wrapped(here - rate * part_s - part_s / whole_s * data::wrapped(way - rate * whole_s)),
+      0.5 * part_s * (whole_s - part_s)};
 }
 
 // Chords between the neighbours on either side; near the ends, where there are not two of them,
@@ -282,7 +283,7 @@ std::vector<int> consistent_samples(const ArcData& arc) {
       if (reading.channel == channel && !doubtful[reading.sample]) readings.push_back(&reading);
     if (readings.size() < 24) continue;
     const std::vector<double> distance = neighbour_distance(arc, readings);
-    const double limit = kFar * median(distance);
+    const double limit = kFar * median_or_zero(distance);
     for (std::size_t i = 0; i < readings.size(); ++i)
       if (distance[i] > limit) doubtful[readings[i]->sample] = true;
   }
@@ -329,7 +330,7 @@ double excess_scatter(const ArcData& arc, Channel channel) {
       Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
   if (planar) curve = arc.positions_m();
   const double noise = std::min(noise_about_smooth_curve(t_s, curve), white_noise(t_s, curve));
-  return std::max(1.0, noise / median(std::move(sigmas)));
+  return std::max(1.0, noise / median_or_zero(std::move(sigmas)));
 }
 
 bool shows_direction(const ArcData& arc, std::size_t i) {
@@ -396,7 +397,7 @@ void whiten(const ArcData& arc, const Eigen::VectorXd& values, const Eigen::Matr
       sign = turns ? 1.0 : -1.0;
     }
     const double weight = sign * reading.whitener(0, 0);
-    out[reading.row] = reading.whitener(0, 0) * wrapped(predicted - reading.value.x());
+    out[reading.row] = reading.whitener(0, 0) * data::wrapped(predicted - reading.value.x());
     if (out_jacobian != nullptr) out_jacobian->row(reading.row) = weight * jacobian.row(source);
   }
 }

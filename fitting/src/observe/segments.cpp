@@ -37,7 +37,8 @@ Path path_of(const data::Track& track, SampleRange range) {
   for (int i = 0; i < path.size(); ++i)
     path.xy.row(i) = track.samples[path.sample[i]].centre_m.transpose();
   if (path.size() >= 3)
-    path.sigma_m = std::max(noise_about_smooth_curve(path.t_s, path.xy), median(std::move(sigmas)));
+    path.sigma_m =
+        std::max(noise_about_smooth_curve(path.t_s, path.xy), median_or_zero(std::move(sigmas)));
   return path;
 }
 

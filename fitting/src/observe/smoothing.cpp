@@ -71,7 +71,7 @@ int window_start(int at, int half_width, int count, int n) {
 
 double robust_sigma(std::vector<double> residuals) {
   for (double& residual : residuals) residual = std::abs(residual);
-  return data::kSdOverMedianDistance * median(std::move(residuals));
+  return data::kSdOverMedianDistance * median_or_zero(std::move(residuals));
 }
 
 // Variance of the centre residual of a w-sample cubic is sigma^2 (1 - leverage).
@@ -99,7 +99,7 @@ int sparse_stride(int n) {
 
 }  // namespace
 
-double median(std::vector<double> values) {
+double median_or_zero(std::vector<double> values) {
   return values.empty() ? 0.0 : data::median(std::move(values));
 }
 

@@ -32,6 +32,6 @@ struct SmoothCurve {
 [[nodiscard]] double white_noise(std::span<const double> t_s, const Eigen::MatrixXd& samples);
 
 /// Median; 0 for an empty list.
-[[nodiscard]] double median(std::vector<double> values);
+[[nodiscard]] double median_or_zero(std::vector<double> values);
 
 }  // namespace trochoid::fitting

@@ -95,7 +95,7 @@ double tolerance_for(const std::vector<ArcData>& arcs, double share) {
     std::vector<double> weights;
     for (const Reading& reading : arc.readings)
       if (reading.channel == Channel::position) weights.push_back(reading.whitener.norm());
-    const double sigma = 1.0 / std::max(median(std::move(weights)), 1e-300);
+    const double sigma = 1.0 / std::max(median_or_zero(std::move(weights)), 1e-300);
     if (extent > 0.0) least = std::min(least, share * sigma / extent);
   }
   return std::clamp(least, 1e-11, 1e-5);
@@ -239,7 +239,7 @@ double frame_time_s(std::span<const data::Track> tracks) {
   for (const data::Track& track : tracks)
     for (std::size_t i = 1; i < track.samples.size(); ++i)
       steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
-  return median(std::move(steps_s));
+  return median_or_zero(std::move(steps_s));
 }
 
 Problem prepare(std::span<const data::Track> tracks, const model::Predictor& predictor,

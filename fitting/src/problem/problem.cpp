@@ -475,7 +475,7 @@ void name_attitudes(Problem& problem) {
       for (const int rate : turning)
         if (rate >= 0) values[rate] = -values[rate];
     }
-    values[phi] = wrapped(values[phi]);
+    values[phi] = data::wrapped(values[phi]);
   }
 }
 

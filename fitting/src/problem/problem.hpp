@@ -204,7 +204,8 @@ struct SolveOptions {
   double initial_radius = 1e4;
 };
 
-/// Levenberg-Marquardt (Ceres, dense QR) from u.
+/// Levenberg-Marquardt (Ceres) from u: dense QR, or a sparse factorisation where there are many
+/// arcs.
 [[nodiscard]] Solution solve(const Problem& problem, const Eigen::VectorXd& u,
                              const SolveOptions& options = {});
 
@@ -219,9 +220,12 @@ struct SolveOptions {
 inline constexpr double kInlier = 3.5;
 
 /// Sets the arcs' noise_scale (if `rescale`) and robust weights from the residuals at u: a reading
-/// d > kInlier scaled sigmas off is multiplied by (kInlier/d)^2. All recordings share the scale of
-/// a channel, but for positions that came without covariance: of these each recording has its own.
-/// @returns the largest change of any weight or scale.
+/// d > kInlier scaled sigmas off is multiplied by (kInlier/d)^2. Each recording has its own scale
+/// of a channel, and leans on what all of them say where it is short; positions that came without
+/// covariance do not.
+/// @returns the largest change of any weight or scale; 0, all left as it was, where the model has
+/// no
+///          prediction at u, of which uncertainty() complains.
 double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale);
 
 /// What a reading's residuals are multiplied by for standing out.

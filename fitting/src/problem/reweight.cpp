@@ -85,7 +85,7 @@ std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
   const std::vector<double>& values = lengths.values;
   if (values.size() < 5) return std::nullopt;
   // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
-  double scale = median(values) / (planar ? 1.1774 : 0.6745);
+  double scale = median_or_zero(values) / (planar ? 1.1774 : 0.6745);
   for (int round = 0; round < 5; ++round) {
     double squares = 0.0;
     int inliers = 0;

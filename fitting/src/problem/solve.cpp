@@ -157,8 +157,11 @@ Solution solve(const Problem& problem, const Eigen::VectorXd& u, const SolveOpti
   add_costs(problem, blocks, solution.u, ceres_problem);
   hold(problem, blocks, solution.u, ceres_problem);
   ceres::Solver::Options ceres_options;
+  // Of many arcs, each with a state of its own, most of the Jacobian is zeros: QR, which is more
+  // accurate, would cost the cube of their number.
+  constexpr std::size_t kMany = 8;
   ceres_options.linear_solver_type =
-      problem.arcs.size() > 8 ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
+      problem.arcs.size() > kMany ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
   ceres_options.max_num_iterations = options.iterations;
   ceres_options.function_tolerance = options.function_tolerance;
   ceres_options.parameter_tolerance = 1e-11;

@@ -87,7 +87,7 @@ std::vector<Start> pivot_starts(const ArcData& window, bool unbalanced) {
   constexpr double kFraction_rad = 0.3;
   std::vector<double> turns;
   for (int i = 1; i < n; ++i) turns.push_back(std::abs(psi[i] - psi[i - 1]));
-  const double reach = kFraction_rad / std::max(median(std::move(turns)), 1e-9);
+  const double reach = kFraction_rad / std::max(median_or_zero(std::move(turns)), 1e-9);
   const int half_width = static_cast<int>(std::clamp(reach, 3.0, std::max(3.0, n / 8.0)));
   const Eigen::VectorXd w = smooth(spin.t_s, psi, half_width).first.col(0);
   constexpr int kLosses = 3;

@@ -70,8 +70,8 @@ Motion motion_of(const ArcData& arc) {
           .position_m = position,
           .velocity_m_s = velocity,
           .acceleration_m_s2 = pull,
-          .turning_rad_s = median(std::move(turning)),
-          .veering_rad_s = median(std::move(veering)),
+          .turning_rad_s = median_or_zero(std::move(turning)),
+          .veering_rad_s = median_or_zero(std::move(veering)),
           .strongest_m_s2 = *upper};
 }
 
@@ -121,7 +121,7 @@ double spin_by_couples(const model::RimBody& q, const ArcData& arc, const Smooth
     const double pull = q.A * (W * W * s * c - dw1) - slope * N + z * Ft;
     spins.push_back(pull / (q.C * W * s) - gained);
   }
-  return median(std::move(spins));
+  return median_or_zero(std::move(spins));
 }
 
 // Median of the slopes between all pairs of the first `count` readings (Theil and Sen), and the
@@ -132,10 +132,10 @@ std::pair<double, double> robust_line(const AngleSeries& series, int count, doub
     for (int k = i + 1; k < count; ++k)
       slopes.push_back((series.angle_rad[k] - series.angle_rad[i]) /
                        (series.t_s[k] - series.t_s[i]));
-  const double slope = median(std::move(slopes));
+  const double slope = median_or_zero(std::move(slopes));
   for (int i = 0; i < count; ++i)
     values.push_back(series.angle_rad[i] - slope * (series.t_s[i] - t_s));
-  return {median(std::move(values)), slope};
+  return {median_or_zero(std::move(values)), slope};
 }
 
 // The same for an angle that turns up to a quarter of a turn per sample and may be half a turn off:
@@ -166,7 +166,7 @@ double readings_a_turn(const AngleSeries& series) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < series.angle_rad.size(); ++i)
     steps.push_back(std::abs(series.angle_rad[i] - series.angle_rad[i - 1]));
-  return data::kTurn / std::max(median(std::move(steps)), 1e-9);
+  return data::kTurn / std::max(median_or_zero(std::move(steps)), 1e-9);
 }
 
 std::vector<Start> from_angles(const ArcData& arc, const model::RimBody& body, bool slides,

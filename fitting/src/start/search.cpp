@@ -22,11 +22,11 @@ int shortest_window(const ArcData& arc, int otherwise) {
   for (const Reading& reading : arc.readings) {
     if (reading.channel != Channel::phi) continue;
     if (before != nullptr)
-      rates_rad_s.push_back(std::abs(wrapped(reading.value.x() - before->value.x())) /
+      rates_rad_s.push_back(std::abs(data::wrapped(reading.value.x() - before->value.x())) /
                             (arc.t_s[reading.sample] - arc.t_s[before->sample]));
     before = &reading;
   }
-  const double turned = median(std::move(rates_rad_s)) * arc.duration_s();
+  const double turned = median_or_zero(std::move(rates_rad_s)) * arc.duration_s();
   if (!(turned > 0.0)) return otherwise;
   const double samples = kTurns * data::kTurn / turned * static_cast<double>(arc.t_s.size());
   return static_cast<int>(std::clamp<double>(samples, kLeast, otherwise));

@@ -5,6 +5,7 @@
 #include "observe/angles.hpp"
 #include "observe/decompositions.hpp"
 #include "start/strategy.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 
 // Multiple shooting. Segment j has its own initial state s_j; residuals r_j(s_j, p) and end state
@@ -119,7 +120,8 @@ Eigen::VectorXd gap(const model::Predictor& predictor, const std::vector<int>& s
                     const Eigen::VectorXd& to, const Eigen::VectorXd& from) {
   Eigen::VectorXd difference = to - from;
   for (std::size_t i = 0; i < state.size(); ++i)
-    if (predictor.parameters()[state[i]].unit == "rad") difference[i] = wrapped(difference[i]);
+    if (predictor.parameters()[state[i]].unit == "rad")
+      difference[i] = data::wrapped(difference[i]);
   return difference;
 }
 

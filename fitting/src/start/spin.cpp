@@ -63,7 +63,7 @@ std::pair<double, double> line_through(const SpinDifference& raw) {
   std::vector<double> angle{d.front()};
   for (std::size_t i = 1; i < t.size(); ++i) {
     const double step_s = t[i] - t[i - 1];
-    const double expected = angle.back() + median({rates.begin(), rates.end()}) * step_s;
+    const double expected = angle.back() + median_or_zero({rates.begin(), rates.end()}) * step_s;
     angle.push_back(continued(d[i], expected));
     rates.push_back((angle[i] - angle[i - 1]) / step_s);
     rates.pop_front();

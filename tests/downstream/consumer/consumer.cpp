@@ -19,7 +19,8 @@ int main() {
     omega_s_rad_s = 0.5
     [run]
     until_s = 1.0
-  )", "consumer");
+  )",
+                                                 "consumer");
   const auto run = trochoid::model::simulate(scene);
   std::cout << run.model << ": " << run.values.rows() << " rows to " << run.end_s << " s\n";
   return run.outcome == trochoid::model::Outcome::reached_end ? 0 : 1;

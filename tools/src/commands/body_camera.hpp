@@ -18,8 +18,8 @@ struct BodyCameraCommand {
 [[nodiscard]] tracking::BodyCamera camera_by_body(const std::filesystem::path& video,
                                                   const data::Scene& scene, double height_mm = 0.0);
 
-/// What a camera with a covariance sees of the floor in the middle of its pictures: "scale 1003 ± 12
-/// px/m on the floor, 1.16 m above it (0.835 to 1.61)".
+/// What a camera with a covariance sees of the floor in the middle of its pictures: "scale 1003 ±
+/// 12 px/m on the floor, 1.16 m above it (0.835 to 1.61)".
 [[nodiscard]] std::string overhead_words(const data::Camera& camera);
 
 /// How a recording whose scene names no camera may come by one, or why it cannot; empty where the

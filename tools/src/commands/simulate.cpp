@@ -125,12 +125,6 @@ void tell(const SimulateOptions& options, const model::Trajectory& run, const fs
   for (const std::string& picture : pictures) fmt::print("{}\n", picture);
 }
 
-bool broke_off(const model::Trajectory& run) {
-  using model::Outcome;
-  return run.outcome == Outcome::step_limit || run.outcome == Outcome::tolerance_not_reachable ||
-         run.outcome == Outcome::out_of_domain;
-}
-
 void check_rows(const std::string& scene, const data::RunSettings& run) {
   check_length(scene, run.until_s, run.rate_hz, data::Table::kMostRows, "rows");
   constexpr double kRounding = 1e-9;
@@ -219,7 +213,7 @@ void simulate_scene(const SimulateOptions& options) {
   }
 #endif
   tell(options, run, output, pictures);
-  if (broke_off(run))
+  if (broke_off(run.outcome))
     throw NotGood(fmt::format("the run broke off at t = {:g} s: {}", run.end_s,
                               model::sentence(run.outcome)));
 }

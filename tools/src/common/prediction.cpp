@@ -218,7 +218,7 @@ std::optional<double> spin_residual_rad(const data::TrackSample& sample, int obj
   if (!sample.psi || arc == nullptr) return std::nullopt;
   const auto pose = path.at(object, sample.t_s);
   if (!pose) return std::nullopt;
-  return std::remainder(sample.psi->value_rad - pose->psi_rad, data::kTurn);
+  return data::wrapped(sample.psi->value_rad - pose->psi_rad);
 }
 
 std::vector<std::vector<Residual>> residuals(const data::TrackFile& tracks,

@@ -21,7 +21,7 @@ void append(data::Table& table, const std::string& name, const Array& values) {
 }
 
 Array wrapped(const Array& angle) {
-  return angle.unaryExpr([](double a) { return std::remainder(a, data::kTurn); });
+  return angle.unaryExpr([](double a) { return data::wrapped(a); });
 }
 
 /// About the pivot of a top, else about the centre of mass; nothing without a mass.

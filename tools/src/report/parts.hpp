@@ -23,8 +23,8 @@ struct ReportFacts {
   int missing = 0;   ///< frames in those gaps
   int doubtful = 0;  ///< samples of low quality
   double first_s = 0.0, last_s = 0.0;
-  int far_off = 0;  ///< positions that an accepted fit gave up, in neither rms
-  double rms_axis_m = 0.0;   ///< residual per axis
+  int far_off = 0;          ///< positions that an accepted fit gave up, in neither rms
+  double rms_axis_m = 0.0;  ///< residual per axis
   double rms_axis_sigma =
       0.0;  ///< the same in sigmas of the track (before rescaling); NaN if unknown
   double rms_spin_rad = 0.0;    ///< residual of the spin angle; NaN if it is not seen or predicted

@@ -129,7 +129,7 @@ Eigen::VectorXd errors_of(const MadeTrack& made, const data::Fit& fit) {
     const std::string& name = fit.covariance_names[static_cast<std::size_t>(i)];
     const data::FitParameter* parameter = fit.find(name);
     errors[i] = parameter->value - made.truth.at(name);
-    if (parameter->unit == "rad") errors[i] = std::remainder(errors[i], data::kTurn);
+    if (parameter->unit == "rad") errors[i] = data::wrapped(errors[i]);
   }
   return errors;
 }

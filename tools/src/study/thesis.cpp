@@ -158,7 +158,7 @@ constexpr Quantity kSixPanels[] = {
 Eigen::VectorXd wrapped(Eigen::VectorXd angle) {
   double before = 0.0;
   for (double& value : angle) {
-    value = std::remainder(value, data::kTurn);
+    value = data::wrapped(value);
     const double now = value;
     if (std::abs(now - before) > data::kPi) value = std::numeric_limits<double>::quiet_NaN();
     before = now;

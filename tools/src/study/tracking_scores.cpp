@@ -42,7 +42,7 @@ Attitude folded(Attitude a, const data::Body& body) {
 }
 
 double turn_difference(double a, double b) {
-  return std::remainder(a - b, data::kTurn);
+  return data::wrapped(a - b);
 }
 
 std::map<std::int64_t, Eigen::Index> rows_by_frame(const data::Table& table) {

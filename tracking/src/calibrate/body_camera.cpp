@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "calibrate/overhead_fit.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "pose/pose_start.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/parallel.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/tracking/frame_source.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -251,7 +251,7 @@ class Search {
   static double turned_rad(const std::vector<SeenOutline>& seen) {
     double turned = 0.0;
     for (std::size_t i = 1; i < seen.size(); ++i)
-      turned += std::remainder(seen[i].pose.phi_rad - seen[i - 1].pose.phi_rad, data::kTurn);
+      turned += data::wrapped(seen[i].pose.phi_rad - seen[i - 1].pose.phi_rad);
     return std::abs(turned);
   }
 

@@ -7,10 +7,10 @@
 #include <limits>
 #include <utility>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/outline.hpp"
 #include "trochoid/data/parallel.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {

@@ -11,16 +11,16 @@ namespace trochoid::tracking {
 
 /// What the colour planes show of the silhouette about one of its samples.
 struct ColourEdge {
-  std::size_t sample;       ///< of the outline
+  std::size_t sample;             ///< of the outline
   data::PoseMotion::Step motion;  ///< how far it moves along its normal per unit of each parameter
-  double blur_px;           ///< of the edge in the planes
+  double blur_px;                 ///< of the edge in the planes
   ProfileEdge edge;
 };
 
 /// An outline in the middle of the exposure, every few pixels, and what it does meanwhile.
 struct ExposedOutline {
   const std::vector<OutlineSample>& middle;
-  const Moments& moments;         ///< empty: it hardly moves
+  const Moments& moments;               ///< empty: it hardly moves
   const data::PoseMotion::Step& smear;  ///< the body's motion from end to end; empty: not known
 };
 

@@ -8,8 +8,8 @@
 
 #include "edges/transfer_curve.hpp"
 #include "geometry/outline_samples.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {

@@ -430,13 +430,11 @@ void Fitting::find_levels(EdgeSide side, const std::vector<double>& noise2) {
 
 void Fitting::find_stretches(EdgeSide side) {
   constexpr double kShare = 0.3;
-  const auto sums =
-      sums_of_neighbours(kShare, Eigen::Array4d(Eigen::Array4d::Zero()),
-                         [side](const CurveLook& look) {
-                           const Level& level = look.levels[side];
-                           return Eigen::Array4d(1.0, level.beyond, level.beyond * level.beyond,
-                                                 level.variance);
-                         });
+  const auto sums = sums_of_neighbours(
+      kShare, Eigen::Array4d(Eigen::Array4d::Zero()), [side](const CurveLook& look) {
+        const Level& level = look.levels[side];
+        return Eigen::Array4d(1.0, level.beyond, level.beyond * level.beyond, level.variance);
+      });
   for (size_t i = 0; i < looks_.size(); ++i) {
     Level& level = looks_[i].levels[side];
     level.count = sums[i][0];
@@ -507,8 +505,8 @@ void Fitting::compare_with_rest() {
     const size_t l = i % kLanes;
     const double contrast = std::abs(static_cast<double>(b.outer[l] - b.inner[l]));
     const double less = std::max(0.0, bright[surface(i, kOutside)] - there(level));
-    profiles_[i].edge.dimmed =
-        level.per_unit * (less + std::sqrt(level.seen_variance_of_mean())) / std::max(1.0, contrast);
+    profiles_[i].edge.dimmed = level.per_unit * (less + std::sqrt(level.seen_variance_of_mean())) /
+                               std::max(1.0, contrast);
   }
 }
 

@@ -6,8 +6,8 @@
 
 #include "find/usual_frames.hpp"
 #include "geometry/pose_change.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {

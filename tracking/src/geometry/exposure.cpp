@@ -137,8 +137,9 @@ Sweep between(const Sweep& from, const Sweep& to, double part) {
   return sweep;
 }
 
-Moments moments_of(const data::Body& body, const data::Camera& camera, const data::PoseMotion& motion,
-                   const ExposureMotion& exposure, const Pose& middle, int parts) {
+Moments moments_of(const data::Body& body, const data::Camera& camera,
+                   const data::PoseMotion& motion, const ExposureMotion& exposure,
+                   const Pose& middle, int parts) {
   Moments moments;
   for (int k = 0; k < parts; ++k) {
     const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));

@@ -191,8 +191,8 @@ Eigen::Vector3d axis_towards(const data::Camera& camera, const data::Pose<>& pos
 }
 
 std::vector<OutlineSample> outline_samples(const data::Body& body, const data::Pose<>& pose,
-                                           const data::Camera& camera, const data::PoseMotion& motion,
-                                           double step_px) {
+                                           const data::Camera& camera,
+                                           const data::PoseMotion& motion, double step_px) {
   const auto outline = data::visible_outline(body, pose, camera, step_px);
   const data::PoseMotion::Velocities v = motion.velocities(pose);
   const Shape shape{body.radius_m, body.inner_radius_m, body.thickness_m, pose.centre_m,

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/outline.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 
@@ -20,7 +20,8 @@ struct OutlineSample {
   double height_px;              ///< above the floor, at the scale of the picture there
   double inside_px, outside_px;  ///< along the normal to the next edge of the body itself
   /// How far the outline moves along its normal per unit of each parameter.
-  using Motion = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, data::PoseMotion::kMost>;
+  using Motion =
+      Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, data::PoseMotion::kMost>;
   Motion motion;
   Motion near_motion;  ///< of the near face's rim across the wall, along the same normal; or empty
 };
@@ -30,7 +31,8 @@ struct OutlineSample {
 [[nodiscard]] std::vector<OutlineSample> outline_samples(const data::Body& body,
                                                          const data::Pose<>& pose,
                                                          const data::Camera& camera,
-                                                         const data::PoseMotion& motion, double step_px);
+                                                         const data::PoseMotion& motion,
+                                                         double step_px);
 
 /// Where an outline, sampled sparsely, crosses a row of pixels (where it runs up or down rather
 /// than across) or a column.

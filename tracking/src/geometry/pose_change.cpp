@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 
 PoseChange::PoseChange(const Pose& from, const Pose& to, double least_sine)
     : tilt_rad_(to.theta_rad - from.theta_rad),
-      precession_rad_(std::remainder(to.phi_rad - from.phi_rad, data::kTurn)),
+      precession_rad_(data::wrapped(to.phi_rad - from.phi_rad)),
       axis_(axis_of(to) - axis_of(from)),
       shift_m_(to.centre_m - from.centre_m),
       steep_(std::min(std::sin(from.theta_rad), std::sin(to.theta_rad)) < least_sine) {}

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "geometry/pose_change.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {

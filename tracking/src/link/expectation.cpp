@@ -8,9 +8,9 @@
 #include <numeric>
 
 #include "geometry/pose_change.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/interpolate.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -91,7 +91,7 @@ struct Neighbours {
     if (step_s <= 0.0) return 0.0;
     Pose end = to.pose();
     if (alike) end = nearer_face(end, from.pose(), 0.0);
-    return std::remainder(end.phi_rad - from.pose().phi_rad, data::kTurn) / step_s;
+    return data::wrapped(end.phi_rad - from.pose().phi_rad) / step_s;
   }
 };
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {

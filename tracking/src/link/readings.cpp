@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "geometry/pose_change.hpp"
-#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -413,7 +413,7 @@ void place_other_readings(const BodyFinder& finder, std::size_t settled,
     for (std::size_t which = 0; which < others.size(); ++which) {
       if (!others[which]) continue;
       const Eigen::Vector2d off_m = (others[which]->centre_m - pose.centre_m).head<2>();
-      const double turn = std::remainder(others[which]->phi_rad - pose.phi_rad, data::kTurn);
+      const double turn = data::wrapped(others[which]->phi_rad - pose.phi_rad);
       PoseSpread& spread = seen.other_readings[which];
       spread.m2 = off_m * off_m.transpose();
       spread.theta_rad2 = std::pow(others[which]->theta_rad - pose.theta_rad, 2);

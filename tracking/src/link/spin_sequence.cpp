@@ -13,10 +13,6 @@
 namespace trochoid::tracking {
 namespace {
 
-double wrapped_rad(double angle_rad) {
-  return std::remainder(angle_rad, data::kTurn);
-}
-
 class SpinSequence {
  public:
   explicit SpinSequence(const std::vector<Glimpse>& glimpses) {
@@ -53,8 +49,8 @@ class SpinSequence {
   /// spin is counted, is part of it.
   static double turn_rad(const Reading& from, const Reading& to) {
     const double cosine = 0.5 * (std::cos(from.pose.theta_rad) + std::cos(to.pose.theta_rad));
-    return wrapped_rad(to.pose.psi_rad - from.pose.psi_rad +
-                       cosine * wrapped_rad(to.pose.phi_rad - from.pose.phi_rad));
+    return data::wrapped(to.pose.psi_rad - from.pose.psi_rad +
+                         cosine * data::wrapped(to.pose.phi_rad - from.pose.phi_rad));
   }
 
   /// The first and one beyond the last reading within so many frames of reading k.
@@ -85,7 +81,7 @@ class SpinSequence {
     double least = std::numeric_limits<double>::infinity();
     for (const double one : turns) {
       double apart = 0.0;
-      for (const double other : turns) apart += std::abs(wrapped_rad(other - one));
+      for (const double other : turns) apart += std::abs(data::wrapped(other - one));
       if (apart < least) least = apart, usual = one;
     }
     return usual;
@@ -99,7 +95,7 @@ class SpinSequence {
     if (first + 2 >= readings_.size()) return false;
     const Reading &a = readings_[first], &b = readings_[first + 1], &c = readings_[first + 2];
     return std::abs(c.t_s - b.t_s - (b.t_s - a.t_s)) < 0.1 * frame_s_ &&
-           std::abs(wrapped_rad(turn_rad(b, c) - turn_rad(a, b))) < kEven_rad;
+           std::abs(data::wrapped(turn_rad(b, c) - turn_rad(a, b))) < kEven_rad;
   }
 
   /// Whether a reading goes with those right before, right after or on both sides of it: the rate
@@ -130,7 +126,7 @@ class SpinSequence {
       const auto usual = usual_turn_rad(k, late.t_s - early.t_s);
       if (!usual) continue;
       ++asked;
-      against += std::abs(wrapped_rad(turn_rad(early, late) - *usual)) > kFar_rad;
+      against += std::abs(data::wrapped(turn_rad(early, late) - *usual)) > kFar_rad;
     }
     return asked >= kFewest && against >= kMost * asked;
   }

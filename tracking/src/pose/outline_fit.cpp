@@ -112,7 +112,8 @@ double steepest_alike(const data::Body& body) {
 
 // Where several attitudes explain a picture about as well, the one chosen is no better known than
 // they are apart.
-void spread_over(const data::PoseMotion& motion, const std::vector<Fitted>& others, Fitted& chosen) {
+void spread_over(const data::PoseMotion& motion, const std::vector<Fitted>& others,
+                 Fitted& chosen) {
   // From start to start the support of one attitude differs by up to a tenth.
   // Evenness differs by more, and would leave out attitudes that the edges alone do not tell apart.
   constexpr double kAsGood = 0.9;
@@ -325,7 +326,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
 // for marks to tell.
 data::Pose<> faces_exchanged(const data::Pose<>& pose) {
   data::Pose<> over = data::turned_over(pose, 0.0);
-  over.phi_rad = std::remainder(over.phi_rad, data::kTurn);
+  over.phi_rad = data::wrapped(over.phi_rad);
   over.psi_rad = pose.psi_rad;
   return over;
 }
@@ -417,7 +418,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
       .most_looks = most_looks_,
       .visit = view.visit,
       .smear = moving ? data::PoseMotion::Step(view.exposure_fraction *
-                                         motion.step_between(*view.previous, starts.front()))
+                                               motion.step_between(*view.previous, starts.front()))
                       : data::PoseMotion::Step(),
       // Levels that are light mix linearly, whatever their colours.
       .tints = camera_.transfer == data::Transfer::linear

@@ -23,8 +23,8 @@ struct Scenery {
   ColourWindow colour;
   double most_looks;
   Visit visit = Visit::only;
-  data::PoseMotion::Step smear{};      ///< the body's motion during the exposure; empty: not known
-  std::optional<Tints> tints{};  ///< for what luma says wrongly between colours
+  data::PoseMotion::Step smear{};  ///< the body's motion during the exposure; empty: not known
+  std::optional<Tints> tints{};    ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
   const ShadingMemory* shading = nullptr;    ///< what other frames show; may be null
 

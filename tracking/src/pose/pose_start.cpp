@@ -206,7 +206,8 @@ double radius_in_picture(const data::Body& body, const data::Camera& camera,
 }  // namespace
 
 std::vector<data::Pose<>> starts_from_edges(const data::Body& body, const data::Support& support,
-                                            const data::Camera& camera, const data::PoseMotion& motion,
+                                            const data::Camera& camera,
+                                            const data::PoseMotion& motion,
                                             const OutlineView& view) {
   const Detection& detection = *view.detection;
   constexpr double kCellsPerRadius = 12.0;
@@ -293,8 +294,8 @@ std::optional<data::Pose<>> tilted(const data::Camera& camera, const data::PoseM
 }  // namespace
 
 std::optional<data::Pose<>> face_outlined_like(const data::Body& body, const data::Camera& camera,
-                                               const data::PoseMotion& motion, const data::Pose<>& pose,
-                                               Side side) {
+                                               const data::PoseMotion& motion,
+                                               const data::Pose<>& pose, Side side) {
   const double h = body.half_thickness_m();
   const View view(camera, pose);
   // The minor axis over the major one of the ellipse that is outlined.
@@ -304,7 +305,8 @@ std::optional<data::Pose<>> face_outlined_like(const data::Body& body, const dat
 }
 
 std::optional<data::Pose<>> outlined_like_face(const data::Body& body, const data::Camera& camera,
-                                               const data::PoseMotion& motion, const data::Pose<>& pose) {
+                                               const data::PoseMotion& motion,
+                                               const data::Pose<>& pose) {
   const double h = body.half_thickness_m();
   const View view(camera, pose);
   if (!(view.facing > 0.0 && view.leaning() > 0.0)) return std::nullopt;

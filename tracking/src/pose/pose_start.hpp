@@ -2,8 +2,8 @@
 #include <optional>
 #include <vector>
 
-#include "trochoid/data/pose_motion.hpp"
 #include "pose/edge_map.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/tracking/outline_fit.hpp"
 
 namespace trochoid::tracking {

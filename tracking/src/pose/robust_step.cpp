@@ -369,8 +369,8 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion
   return true;
 }
 
-void find_uncertainty(const std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
-                      RobustSolution& solution) {
+void find_uncertainty(const std::vector<EdgeEquation>& equations,
+                      const data::PoseMotion::Step& prior_sd, RobustSolution& solution) {
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(true);
   const ArrowSystem prior = prior_information(prior_sd, true);

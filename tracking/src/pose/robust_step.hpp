@@ -73,7 +73,7 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion
 
 /// How well a solution found with `directions` is known; infinitely badly if its equations do not
 /// determine it. The equations are as solve_robustly left them.
-void find_uncertainty(const std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
-                      RobustSolution& solution);
+void find_uncertainty(const std::vector<EdgeEquation>& equations,
+                      const data::PoseMotion::Step& prior_sd, RobustSolution& solution);
 
 }  // namespace trochoid::tracking

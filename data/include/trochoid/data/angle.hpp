@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <numbers>
 
 namespace trochoid::data {
@@ -13,6 +14,10 @@ constexpr double radians(double angle_deg) {
 /// @param angle_rad in rad @returns the same in degrees
 constexpr double degrees(double angle_rad) {
   return angle_rad * 180.0 / kPi;
+}
+/// @param angle_rad in rad @returns the same within half a turn of 0
+inline double wrapped(double angle_rad) {
+  return std::remainder(angle_rad, kTurn);
 }
 
 }  // namespace trochoid::data

@@ -39,7 +39,7 @@ struct Camera {
   std::optional<double> exposure_fraction;  ///< shutter time as a fraction of the frame interval
   Transfer transfer = Transfer::srgb;
   bool metres_by_radius = false;  ///< as large as the known radius of the body filmed has them
-  std::string file;  ///< where it was read from, for messages; empty if it was made
+  std::string file;               ///< where it was read from, for messages; empty if it was made
 
   /// By how much the numbers of a camera may be off: fx, fy, cx, cy (as above), k1, k2, p1, p2, k3,
   /// a turn along the camera's axes [rad], about the table's origin, and a shift along them [m]: a

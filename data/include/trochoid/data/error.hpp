@@ -17,8 +17,8 @@ class InputError : public Error {
   using Error::Error;
 };
 
-/// What is wrong with a track that is already in memory. The message cannot say which file the track
-/// was read from; whoever read it can.
+/// What is wrong with a track that is already in memory. The message cannot say which file the
+/// track was read from; whoever read it can.
 class TrackError : public InputError {
  public:
   using InputError::InputError;

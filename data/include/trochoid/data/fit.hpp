@@ -149,8 +149,8 @@ struct Fit {
   /// [product of the two parameters' units]. Of a top whose nutation is not seen by curvature,
   /// while the sigmas that this hides are infinite.
   Eigen::MatrixXd covariance;
-  double chi2 = 0.0;  ///< of the residuals over their sigmas, robustly weighted, >= 0
-  int dof = 0;        ///< degrees of freedom: measurements less free parameters
+  double chi2 = 0.0;         ///< of the residuals over their sigmas, robustly weighted, >= 0
+  int dof = 0;               ///< degrees of freedom: measurements less free parameters
   double noise_scale = 1.0;  ///< the arcs' largest, of tracks with sigmas of their own if any has
   double aicc = 0.0, bic = 0.0;     ///< information criteria, correlated residuals allowed for
   double whiteness_p = 0.0;         ///< p-value of the residuals being white, 0..1

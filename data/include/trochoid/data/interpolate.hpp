@@ -8,7 +8,7 @@ namespace trochoid::data {
 /// @param times  all different; as many as values, at least one.
 template <class Value>
 [[nodiscard]] Value polynomial_at(std::span<const double> times, std::span<const Value> values,
-                            double t) {
+                                  double t) {
   Value sum = 0.0 * values[0];
   for (std::size_t k = 0; k < times.size(); ++k) {
     double weight = 1.0;

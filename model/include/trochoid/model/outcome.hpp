@@ -15,10 +15,14 @@ enum class Outcome {
   step_limit,
   tolerance_not_reachable,  ///< step size fell to rounding
   out_of_domain,            ///< parameters or state outside the model's range
+  chattering,               ///< sticking and slipping alternate too fast to be followed
+  diverged,                 ///< two runs of different tolerance go different ways from here on
 };
-inline constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::out_of_domain) + 1;
+inline constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::diverged) + 1;
 
 [[nodiscard]] std::string_view name(Outcome outcome);      ///< e.g. "rim_switch"
 [[nodiscard]] std::string_view sentence(Outcome outcome);  ///< for people
+/// Whether the integration gave up there; else the motion went so far, or ended there.
+[[nodiscard]] bool broke_off(Outcome outcome);
 
 }  // namespace trochoid::model

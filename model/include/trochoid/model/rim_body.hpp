@@ -21,6 +21,10 @@ struct Rim {
   enum Component : int { phi, theta, psi, w1, w2, w3, x, y, un, ut };
 };
 
+/// Tilt at which a face is taken to touch the floor [rad]: a seventh part of a millimetre lower at
+/// the edge of a disc of 3 cm.
+inline constexpr double kFlat_rad = 0.01;
+
 struct RimBody {
   double m = 1.0, A = 0.0, C = 0.0;
   double R = 0.0, h = 0.0;

@@ -20,8 +20,6 @@ struct Rolling {
   static constexpr int kStates = 8;
   static constexpr int kEvents = 4;
   enum Event : int { flat, rim, lift_off, slip };
-  /// Tilt at which a face is taken to touch the floor [rad].
-  static constexpr double kFlat_rad = 0.01;
 
   RimBody body;
   LossList losses;

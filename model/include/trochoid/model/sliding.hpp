@@ -35,7 +35,6 @@ struct Sliding {
   static constexpr int kStates = 10;
   static constexpr int kEvents = 5;
   enum Event : int { flat, rim, lift_off, inconsistent, stick };
-  static constexpr double kFlat_rad = 0.01;
 
   RimBody body;
   LossList losses;
