@@ -42,6 +42,9 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
 /// The output times of a scene's [run]: 0, 1/rate, ... up to until_s. @throws InputError.
 [[nodiscard]] std::vector<double> output_times_s(const data::RunSettings& run);
 
+/// At most one of a rate's names may be given, as StartSettings has it. @throws InputError.
+void check_rates(const data::StartSettings& start);
+
 /// The columns every run with Euler angles begins with: t_s, phi_rad, ... energy_J.
 [[nodiscard]] const std::vector<std::string>& euler_columns();
 

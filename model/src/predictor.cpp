@@ -87,6 +87,7 @@ std::string law_of(const data::Scene& scene) {
 }
 
 std::unique_ptr<Predictor> make_predictor(const data::Scene& scene) {
+  check_rates(scene.start);
   const std::string name = law_of(scene);
   if (name == "top") return make_top(scene);
   if (name == "top-euler") return make_top_euler(scene);

@@ -33,15 +33,6 @@ constexpr LossWords kLossWords[kLosses] = {
     {"m", "pivoting friction: lever arm of the normal force"},
     {"m", "contour friction: lever arm of the normal force"}};
 
-/// Of a node rate and the Euler rate that may stand for it at most one is given.
-std::optional<double> one_of(const std::optional<double>& a, const char* name_a,
-                             const std::optional<double>& b, const char* name_b) {
-  if (a && b)
-    throw InputError(fmt::format("start.{} and start.{} describe the same rate: give one of them",
-                                 name_a, name_b));
-  return a ? a : b;
-}
-
 void check_tilt(double theta_rad) {
   if (!(theta_rad > 0.0 && theta_rad < data::kPi))
     throw InputError(fmt::format("start.theta_rad = {} must lie between 0 and pi", theta_rad));
@@ -57,10 +48,7 @@ void fill_angles(const data::StartSettings& given, RimStart& start) {
 
 void fill_rates(const data::StartSettings& given, double typical_w2, RimStart& start) {
   const double s = std::sin(start.theta_rad), c = std::cos(start.theta_rad);
-  start.w1_rad_s =
-      one_of(given.w1_rad_s, "w1_rad_s", given.dtheta_rad_s, "dtheta_rad_s").value_or(0.0);
-  (void)one_of(given.w2_rad_s, "w2_rad_s", given.dphi_rad_s, "dphi_rad_s");
-  (void)one_of(given.w3_rad_s, "w3_rad_s", given.dpsi_rad_s, "dpsi_rad_s");
+  start.w1_rad_s = given.w1_rad_s.value_or(given.dtheta_rad_s.value_or(0.0));
   start.w2_rad_s = given.dphi_rad_s ? *given.dphi_rad_s * s : given.w2_rad_s.value_or(typical_w2);
   start.w3_rad_s =
       given.dpsi_rad_s ? *given.dpsi_rad_s + start.w2_rad_s * c / s : given.w3_rad_s.value_or(0.0);

@@ -23,8 +23,7 @@ struct RimStart {
 };
 /// The scene's start; a velocity that is not given is that of rolling, and of one of which a
 /// component is given the other is 0.
-/// @throws InputError if theta is missing, not inside (0, pi), or both of (w2, dphi) and so on are
-///         given.
+/// @throws InputError if theta is missing or not inside (0, pi).
 [[nodiscard]] RimStart rim_start(const data::Scene& scene, const RimBody& body);
 /// The same for a fit, where the start is only a hint: what is missing is that of a disc wobbling
 /// about its resting centre (w3 = 0, steady precession).

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
@@ -27,6 +28,22 @@ std::vector<double> output_times_s(const data::RunSettings& run) {
   for (std::size_t n = 0; n < t_s.size(); ++n)
     t_s[n] = std::min(static_cast<double>(n) / run.rate_hz, run.until_s);
   return t_s;
+}
+
+void check_rates(const data::StartSettings& start) {
+  struct Named {
+    const char* name;
+    const std::optional<double>& value;
+  };
+  const Named w1{"w1_rad_s", start.w1_rad_s}, dtheta{"dtheta_rad_s", start.dtheta_rad_s};
+  const Named w2{"w2_rad_s", start.w2_rad_s}, dphi{"dphi_rad_s", start.dphi_rad_s};
+  const Named w3{"w3_rad_s", start.w3_rad_s}, dpsi{"dpsi_rad_s", start.dpsi_rad_s};
+  const Named omega_s{"omega_s_rad_s", start.omega_s_rad_s};
+  for (const auto& [one, other] : {std::pair(w1, dtheta), std::pair(w2, dphi), std::pair(w3, dpsi),
+                                   std::pair(omega_s, w3), std::pair(omega_s, dpsi)})
+    if (one.value && other.value)
+      throw InputError(fmt::format("start.{} and start.{} describe the same rate: give one of them",
+                                   one.name, other.name));
 }
 
 const std::vector<std::string>& euler_columns() {
@@ -69,6 +86,7 @@ Trajectory simulate(const data::Scene& scene) {
     throw InputError(
         fmt::format("run.tolerance = {} must lie between 0 and 0.1", scene.run.tolerance));
   }
+  check_rates(scene.start);
   const std::string name = law_of(scene);
   check_integrator(scene.run.integrator, name);
   if (name == "free") return simulate_free(scene);

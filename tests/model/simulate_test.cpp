@@ -8,6 +8,7 @@
 #include "common.hpp"
 #include "reference_cases.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/model/predictor.hpp"
 
 namespace trochoid::model {
 namespace {
@@ -153,6 +154,25 @@ TEST(Simulate, NamesWhatTheSceneLacks) {
   scene = reference("s01_free_thesis").posed.scene;
   scene.start.moments_kg_m2 = Eigen::Vector3d(1.0, 1.0, 3.0);  // no body has these
   EXPECT_THROW((void)simulate(scene), InputError);
+}
+
+TEST(Start, OfOneRateUnderTwoNamesIsRefusedByEveryModel) {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.03;
+  body.mass_kg = 0.05;
+  body.l_m = 0.1;
+  scene.model.friction = 0.2;
+  scene.start.theta_rad = 0.8;
+  scene.start.w3_rad_s = 5.0;
+  for (const char* name : {"free", "top", "rolling", "smooth", "sliding", "puck", "pivot"}) {
+    scene.model.name = name;
+    scene.start.dpsi_rad_s.reset();
+    EXPECT_NO_THROW((void)simulate(scene)) << name;
+    scene.start.dpsi_rad_s = 5.0;
+    EXPECT_THROW((void)simulate(scene), InputError) << name;
+    if (scene.model.name != "free") EXPECT_THROW((void)make_predictor(scene), InputError) << name;
+  }
 }
 
 }  // namespace
