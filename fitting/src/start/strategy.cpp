@@ -260,72 +260,121 @@ bool is_new(Valleys& valleys, int window, double chi2) {
   return !known;
 }
 
+// A start followed from window to window of the record.
+class Follower {
+ public:
+  Follower(const Problem& problem, const Start& start, int first_window, const Growth& growth)
+      : problem_(problem),
+        growth_(growth),
+        current_(problem),
+        all_(samples()),
+        window_(std::min(first_window, all_)),
+        rate_(growth.rate),
+        explained_(chi2_gate(all_)) {
+    apply(start, current_);
+  }
+
+  // As far as the start leads; whether to the end of the record.
+  bool follow() {
+    for (;;) switch (step()) {
+        case Step::led_nowhere:
+          return false;
+        case Step::at_the_end:
+          return true;
+        case Step::on:
+          break;
+      }
+  }
+
+  // Of a start that led to the end.
+  [[nodiscard]] Found found(const std::string& path) {
+    // To the end of a valley whose floor is that high it is far, and leads nowhere.
+    constexpr double kTellsNothing = 0.3;  // of the variance
+    const bool high = !problem_.rough &&
+                      last_.chi2 > kTellsNothing * null_chi2(windowed(current_, window_).arcs[0]);
+    if (!high)
+      last_ = problem_.rough ? minimise(current_, current_.start(),
+                                        {.iterations = 20, .function_tolerance = 1e-3})
+                             : solve_to_the_end(current_);
+    Found found = judged(current_, std::move(last_), path);
+    found.strays_s = std::move(strays_s_);
+    return high ? found : restart_around_fall(current_, std::move(found));
+  }
+
+ private:
+  enum class Step { on, at_the_end, led_nowhere };
+
+  [[nodiscard]] int samples() const { return static_cast<int>(current_.arcs[0].t_s.size()); }
+
+  // The path in the present window, and what that means.
+  Step step() {
+    // The first window settles which valley it is; the next ones only follow it.
+    const bool first = before_ == 0;
+    const SolveOptions options{.iterations = first ? 60 : 25,
+                               .function_tolerance = first && window_ < all_ ? 1e-4 : 1e-3};
+    Problem part = windowed(current_, window_);
+    last_ = without_strays(current_, window_, minimise(part, part.start(), options), options,
+                           strays_s_);
+    part = windowed(current_, window_);
+    all_ = samples();
+    const double reduced = last_.chi2 / free_rows(part), gate = chi2_gate(part.rows());
+    const bool lost = loses(reduced, gate);
+    if (!first && lost && retreats()) return Step::on;
+    if (!last_.usable) return Step::led_nowhere;
+    part.set_base(last_.u);
+    current_.base = part.base;
+    const bool gated = growth_.most_over_gate > 0.0;
+    const bool looked_up = growth_.known != nullptr && (first || gated);
+    if (window_ < all_ && looked_up && !is_new(*growth_.known, window_, last_.chi2))
+      return Step::led_nowhere;
+    // A window that is far from explained will not lead anywhere.
+    constexpr double kFarFromExplained = 30.0;  // times the gate
+    if (window_ < all_ && (gated ? lost : reduced > kFarFromExplained * gate)) {
+      if (problem_.shortfalls) ++problem_.shortfalls->departed;
+      return Step::led_nowhere;
+    }
+    if (problem_.partial && window_ > problem_.partial->samples && reduced < gate)
+      *problem_.partial = {window_, part.arcs[0].t_s.back(), part.base[0]};
+    if (window_ == all_) return Step::at_the_end;
+    explained_ = std::max(reduced, gate);
+    before_ = window_;
+    window_ = std::min(static_cast<int>(rate_ * window_) + 8, all_);
+    return Step::on;
+  }
+
+  // Whether a turn was lost on the way to so much chi-square a row.
+  [[nodiscard]] bool loses(double reduced, double gate) const {
+    constexpr double kLost = 4.0;
+    const double most =
+        growth_.most_over_gate > 0.0 ? growth_.most_over_gate * gate : kLost * explained_;
+    return !last_.usable || reduced > most;
+  }
+
+  // Half the way from what was explained last; false where that is tried or little.
+  bool retreats() {
+    constexpr int kMostRetreats = 4, kLeastStep = 4;
+    if (retreats_ >= kMostRetreats || window_ - before_ <= kLeastStep) return false;
+    ++retreats_;
+    rate_ = 1.0 + 0.5 * (rate_ - 1.0);
+    window_ = before_ + (window_ - before_) / 2;
+    return true;
+  }
+
+  const Problem& problem_;
+  const Growth& growth_;
+  Problem current_;
+  int all_, window_;
+  int before_ = 0, retreats_ = 0;  // the window explained last
+  double rate_, explained_;
+  Solution last_;
+  std::vector<double> strays_s_;
+};
+
 }  // namespace
 
 Found grow(const Problem& problem, const Start& start, int first_window, const Growth& growth) {
-  int all = static_cast<int>(problem.arcs[0].t_s.size());
-  Problem current = problem;
-  apply(start, current);
-  constexpr double kLost = 4.0;  // of chi-square per row: a turn was lost on the way
-  constexpr int kMostRetreats = 4, kLeastStep = 4;
-  constexpr double kFarFromExplained = 30.0;  // times the gate
-  constexpr double kTellsNothing = 0.3;       // of the variance
-  const bool gated = growth.most_over_gate > 0.0;
-  double rate = growth.rate;
-  int before = 0, retreats = 0;  // the window explained last
-  std::vector<double> strays_s;
-  double explained = chi2_gate(all);
-  for (int window = std::min(first_window, all);;) {
-    Problem part = windowed(current, window);
-    // The first window settles which valley it is; the next ones only follow it.
-    const bool first = before == 0;
-    const SolveOptions options{.iterations = first ? 60 : 25,
-                               .function_tolerance = first && window < all ? 1e-4 : 1e-3};
-    const Solution solution =
-        without_strays(current, window, minimise(part, part.start(), options), options, strays_s);
-    part = windowed(current, window);
-    all = static_cast<int>(current.arcs[0].t_s.size());
-    const double reduced = solution.chi2 / free_rows(part);
-    const double gate = chi2_gate(part.rows());
-    const bool lost =
-        !solution.usable || reduced > (gated ? growth.most_over_gate * gate : kLost * explained);
-    if (!first && lost && retreats < kMostRetreats && window - before > kLeastStep) {
-      ++retreats;
-      rate = 1.0 + 0.5 * (rate - 1.0);
-      window = before + (window - before) / 2;
-      continue;
-    }
-    if (!solution.usable) return {};
-    part.set_base(solution.u);
-    current.base = part.base;
-    const bool looked_up = growth.known != nullptr && (first || gated);
-    if (window < all && looked_up && !is_new(*growth.known, window, solution.chi2)) return {};
-    // A window that is far from explained will not lead anywhere.
-    if (window < all && (gated ? lost : reduced > kFarFromExplained * gate)) {
-      if (problem.shortfalls) ++problem.shortfalls->departed;
-      return {};
-    }
-    if (problem.partial && window > problem.partial->samples && reduced < gate)
-      *problem.partial = {window, part.arcs[0].t_s.back(), part.base[0]};
-    if (window == all) {
-      // To the end of a valley whose floor is that high it is far, and leads nowhere.
-      if (!problem.rough && solution.chi2 > kTellsNothing * null_chi2(part.arcs[0])) {
-        Found found = judged(current, solution, start.path);
-        found.strays_s = std::move(strays_s);
-        return found;
-      }
-      break;
-    }
-    explained = std::max(reduced, gate);
-    before = window;
-    window = std::min(static_cast<int>(rate * window) + 8, all);
-  }
-  Solution solution = problem.rough ? minimise(current, current.start(),
-                                               {.iterations = 20, .function_tolerance = 1e-3})
-                                    : solve_to_the_end(current);
-  Found found = judged(current, std::move(solution), start.path);
-  found.strays_s = std::move(strays_s);
-  return restart_around_fall(current, std::move(found));
+  Follower follower(problem, start, first_window, growth);
+  return follower.follow() ? follower.found(start.path) : Found{};
 }
 
 }  // namespace trochoid::fitting

@@ -60,58 +60,86 @@ double extent_m(const std::vector<BoardView>& views) {
   return most > 0.0 ? most : 1.0;
 }
 
-// The camera of all these views, one as good as the other. Its optics do not depend on the size of
-// the board; what OpenCV finds does, unless that is near one.
-Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_px) {
+// What OpenCV makes of all views, one as good as the other.
+struct OpenCvCamera {
+  cv::Mat matrix, distortion, view_rms;
+  std::vector<cv::Mat> rotations, translations;
+  double rms_px = 0.0, unit_m = 1.0;
+};
+
+// The optics do not depend on the size of the board; what OpenCV finds does, unless that is near
+// one.
+OpenCvCamera calibrated(const std::vector<BoardView>& views, const cv::Size& size_px) {
+  OpenCvCamera found;
+  found.unit_m = extent_m(views);
+  std::vector<std::vector<cv::Point3f>> board;
+  std::vector<std::vector<cv::Point2f>> image;
+  for (const BoardView& view : views) {
+    board.emplace_back();
+    image.emplace_back();
+    for (std::size_t i = 0; i < view.board_m.size(); ++i) {
+      board.back().emplace_back(static_cast<float>(view.board_m[i].x() / found.unit_m),
+                                static_cast<float>(view.board_m[i].y() / found.unit_m), 0.0F);
+      image.back().emplace_back(static_cast<float>(view.image_px[i].x()),
+                                static_cast<float>(view.image_px[i].y()));
+    }
+  }
+  try {
+    found.rms_px = cv::calibrateCamera(board, image, size_px, found.matrix, found.distortion,
+                                       found.rotations, found.translations, cv::noArray(),
+                                       cv::noArray(), found.view_rms, cv::CALIB_FIX_K3);
+  } catch (const cv::Exception& error) {
+    throw NumericalError(
+        fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
+  }
+  return found;
+}
+
+data::Camera optics_of(const OpenCvCamera& found, const cv::Size& size_px) {
+  data::Camera camera;
+  camera.width_px = size_px.width;
+  camera.height_px = size_px.height;
+  camera.fx = found.matrix.at<double>(0, 0);
+  camera.fy = found.matrix.at<double>(1, 1);
+  camera.cx = found.matrix.at<double>(0, 2);
+  camera.cy = found.matrix.at<double>(1, 2);
+  for (int i = 0; i < 5; ++i)
+    camera.distortion[static_cast<std::size_t>(i)] = found.distortion.at<double>(i);
+  return camera;
+}
+
+void check_views(const std::vector<BoardView>& views) {
   if (views.size() < kFewestViews)
     throw InputError(
         fmt::format("{} views of the board; at least {} from different directions "
                     "make a camera",
                     views.size(), kFewestViews));
-  std::vector<std::vector<cv::Point3f>> board;
-  std::vector<std::vector<cv::Point2f>> image;
-  const double unit_m = extent_m(views);
-  for (const BoardView& view : views) {
-    board.emplace_back();
-    image.emplace_back();
-    for (std::size_t i = 0; i < view.board_m.size(); ++i) {
-      board.back().emplace_back(static_cast<float>(view.board_m[i].x() / unit_m),
-                                static_cast<float>(view.board_m[i].y() / unit_m), 0.0F);
-      image.back().emplace_back(static_cast<float>(view.image_px[i].x()),
-                                static_cast<float>(view.image_px[i].y()));
-    }
-  }
-  cv::Mat matrix, distortion, view_rms;
-  std::vector<cv::Mat> rotations, translations;
-  double rms = 0.0;
-  try {
-    rms = cv::calibrateCamera(board, image, size_px, matrix, distortion, rotations, translations,
-                              cv::noArray(), cv::noArray(), view_rms, cv::CALIB_FIX_K3);
-  } catch (const cv::Exception& error) {
-    throw NumericalError(
-        fmt::format("{} views of the board determine no camera ({})", views.size(), error.err));
-  }
-  if (const std::size_t different = different_tilts(rotations); different < kFewestViews)
+}
+
+void check_tilts(const OpenCvCamera& found) {
+  const std::size_t views = found.rotations.size(), different = different_tilts(found.rotations);
+  if (different < kFewestViews)
     throw NumericalError(fmt::format(
         "{} views of the board are tilted in {} direction{} only and determine no camera; at least "
         "{} are needed, better ten, tilted by 20 to 40 degrees in different directions",
-        views.size(), different, different == 1 ? "" : "s", kFewestViews));
+        views, different, different == 1 ? "" : "s", kFewestViews));
+}
+
+// The camera of all these views.
+Calibration camera_of(const std::vector<BoardView>& views, const cv::Size& size_px) {
+  check_views(views);
+  const OpenCvCamera found = calibrated(views, size_px);
+  check_tilts(found);
   Calibration out;
   data::Camera& camera = out.camera;
-  camera.width_px = size_px.width;
-  camera.height_px = size_px.height;
-  camera.fx = matrix.at<double>(0, 0);
-  camera.fy = matrix.at<double>(1, 1);
-  camera.cx = matrix.at<double>(0, 2);
-  camera.cy = matrix.at<double>(1, 2);
-  for (int i = 0; i < 5; ++i)
-    camera.distortion[static_cast<std::size_t>(i)] = distortion.at<double>(i);
-  out.rms_px = rms / std::sqrt(2.0);  // OpenCV counts both coordinates of a corner as one
-  for (int i = 0; i < view_rms.rows; ++i)
-    out.view_rms_px.push_back(view_rms.at<double>(i) / std::sqrt(2.0));
+  camera = optics_of(found, size_px);
+  out.rms_px = found.rms_px / std::sqrt(2.0);  // OpenCV counts both coordinates of a corner as one
+  for (int i = 0; i < found.view_rms.rows; ++i)
+    out.view_rms_px.push_back(found.view_rms.at<double>(i) / std::sqrt(2.0));
   std::vector<PosedView> seen;
   for (std::size_t i = 0; i < views.size(); ++i)
-    seen.push_back(posed(camera, views[i], unit_m, rotations[i], translations[i]));
+    seen.push_back(
+        posed(camera, views[i], found.unit_m, found.rotations[i], found.translations[i]));
   set_optics_covariance(camera, seen);
   const Eigen::VectorXd sigma = camera.covariance.diagonal().cwiseSqrt();
   out.sigma_focal_px = std::max(sigma[0], sigma[1]);
