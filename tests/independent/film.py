@@ -5,7 +5,8 @@
 
 FOLDER: a recording of one body with truth as `trochoid study tracking` reads them (others are passed over). OUT/PARENT-FOLDER gets
 `track.csv`, `scene.toml`, which knows nothing of the motion's law, and `truth.json`: the coefficients object.json has under
-`dynamics`, and of the state at the track's first sample what truth.csv (or, at the first frame, object.json) says of it.
+`dynamics`, and the state at the track's first sample: what truth.csv says of it, rates by splines through its rows, or, at the
+first frame, object.json. Needs numpy and scipy.
 """
 import argparse
 import csv
@@ -14,6 +15,9 @@ import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
 
 # By the names a fit prints; the first of clips/gen.py, the second of older recordings.
 COEFFICIENTS = {"friction": "friction", "mu_coulomb": "friction", "rolling_friction_m": "rolling_friction_m",
@@ -55,11 +59,35 @@ def first_sample_s(track):
         return float(next(csv.DictReader(line for line in lines if not line.startswith("#")))["t_s"])
 
 
+def slope(t_s, values, row):
+    """What splines of two degrees agree on; None where the rows are too far apart for that."""
+    finer, coarser = (float(make_interp_spline(t_s, values, degree).derivative()(t_s[row])) for degree in (7, 5))
+    return finer if abs(finer - coarser) < 1e-3 * abs(finer) + 1e-3 * np.ptp(values) / np.ptp(t_s) else None
+
+
+def rates(rows, row, rolls):
+    """Angular velocity in node axes, or Euler rates of a top; velocity of a body that is free to go."""
+    t_s = np.array([float(r["t"]) for r in rows])
+    moving = range(max(0, row - 20), min(len(rows), row + 60))  # what lies where it fell has a kink there
+    by = {name: slope(t_s[moving], np.array([float(rows[i][name]) for i in moving]), row - moving[0])
+          for name in ("theta_rad", "phi_rad", "psi_rad", "x_m", "y_m")}
+    theta, dtheta, dphi, dpsi = float(rows[row]["theta_rad"]), by["theta_rad"], by["phi_rad"], by["psi_rad"]
+    if not rolls:
+        found = {"dtheta_rad_s": dtheta, "dphi_rad_s": dphi}
+    else:
+        found = {"w1_rad_s": dtheta, "vx_m_s": by["x_m"], "vy_m_s": by["y_m"],
+                 "w2_rad_s": dphi and dphi * np.sin(theta), "w3_rad_s": dphi and dpsi and dpsi + dphi * np.cos(theta)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
 def state(folder, thing, t_s):
     with open(folder / "truth.csv") as lines:
-        row = min(csv.DictReader(lines), key=lambda r: abs(float(r["t"]) - t_s))
-    found = {name: float(row[name]) for name in ("theta_rad", "phi_rad")}
-    if "com_to_pivot_m" not in thing and "pivot_m" not in thing:
+        rows = list(csv.DictReader(lines))
+    at = min(range(len(rows)), key=lambda i: abs(float(rows[i]["t"]) - t_s))
+    row = rows[at]
+    rolls = "com_to_pivot_m" not in thing and "pivot_m" not in thing
+    found = {name: float(row[name]) for name in ("theta_rad", "phi_rad")} | rates(rows, at, rolls)
+    if rolls:
         found |= {name: float(row[name]) for name in ("x_m", "y_m")}
     at_first = thing["dynamics"].get("state_at_frame0", {}) if int(row["frame"]) == 0 else {}
     return found | {name: at_first[key] for key, name in RATES.items() if key in at_first}
