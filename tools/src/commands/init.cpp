@@ -138,13 +138,12 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
   text +=
       "# file = \"camera.json\"     # from trochoid calibrate; pictures of a board tell it best\n";
   text += "# scale_px_per_m = 1000    # or: pixels per metre on the floor\n";
-  const auto captured = seen.video.capture_rate_hz;
   if (rate_hz)
     text += fmt::format("frame_rate_hz = {:<10g} # as given\n", *rate_hz);
-  else if (captured && std::abs(*captured - seen.video.frame_rate_hz) > 0.05 * *captured)
+  else if (seen.video.played_rate_hz)
     text += fmt::format(
         "frame_rate_hz = {:<10g} # the file says it was filmed at this rate and plays at {:.4g}\n",
-        *captured, seen.video.frame_rate_hz);
+        seen.video.frame_rate_hz, *seen.video.played_rate_hz);
   else
     text += "# frame_rate_hz = 240      # the true rate, if this was filmed in slow motion\n";
   if (seen.body && seen.body->least_axis_ratio > kFlatRatio && seen.body->usual_axis_ratio < 0.985)

@@ -69,7 +69,7 @@ Turn turn_of(const AVStream& stream, const AVFrame* photograph) {
   return matrix != nullptr ? Turn::of(reinterpret_cast<const std::int32_t*>(matrix)) : Turn{};
 }
 
-/// Rate at which a phone says it filmed; slow motion is stored at a lower one.
+/// Rate at which a phone says it filmed; slow motion may be stored at a lower one.
 std::optional<double> capture_rate_hz(const AVFormatContext& container) {
   const AVDictionaryEntry* entry =
       av_dict_get(container.metadata, "com.android.capture.fps", nullptr, 0);
@@ -192,6 +192,8 @@ class LibavSource final : public FrameSource {
     info_.variable_rate =
         has_average && std::isfinite(base) && std::abs(average - base) > 0.02 * base;
     if (!info_.variable_rate) steady_rate_hz_ = steady_rate_hz();
+    info_.capture_rate_hz = capture_rate_hz(*container_);
+    take_capture_rate();
     if (options_.frame_rate_hz) {
       if (!(*options_.frame_rate_hz > 0.0)) fail("the frame rate must be positive");
       info_.frame_rate_hz = *options_.frame_rate_hz;
@@ -199,11 +201,20 @@ class LibavSource final : public FrameSource {
     }
     const AVFieldOrder order = stream_->codecpar->field_order;
     info_.interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
-    info_.capture_rate_hz = capture_rate_hz(*container_);
     info_.frames = series_ ? static_cast<std::int64_t>(series_->pictures.size()) : pictures_shown();
     if (series_) info_.missing = series_->missing();
     if (series_) info_.left_out = series_->left_out;
     info_.codec = avcodec_get_name(decoder_->codec_id);
+  }
+
+  /// Stamps of a film that was taken at one rate and plays at another say nothing of the motion.
+  void take_capture_rate() {
+    constexpr double kClearly = 0.05;
+    if (options_.frame_rate_hz || !info_.capture_rate_hz || !(info_.frame_rate_hz > 0.0)) return;
+    if (std::abs(info_.frame_rate_hz - *info_.capture_rate_hz) < kClearly * *info_.capture_rate_hz)
+      return;
+    info_.played_rate_hz = info_.frame_rate_hz;
+    options_.frame_rate_hz = info_.capture_rate_hz;
   }
 
   /// As many as the container says, without those that its edit list hides.

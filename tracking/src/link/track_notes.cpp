@@ -58,6 +58,15 @@ Note note_on_evened(const VideoInfo& video) {
          "without it they keep their own times";
 }
 
+Note note_on_capture(const VideoInfo& video) {
+  if (!video.played_rate_hz) return std::nullopt;
+  return fmt::format(
+      "times are those of filming: the file says it was filmed at {0:.6g} pictures a second, and "
+      "plays at {1:.6g}; with a rate of {1:.6g} (--rate, [camera] frame_rate_hz) they are those "
+      "of playing it",
+      *video.capture_rate_hz, *video.played_rate_hz);
+}
+
 Note note_on_exposure(const WhatWasRead& read) {
   if (read.exposure_fraction <= 1.0) return std::nullopt;
   return fmt::format(
@@ -75,9 +84,10 @@ Note note_on_interlaced(const VideoInfo& video) {
 
 std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
   std::vector<std::string> notes;
-  for (const Note& note : {note_on_missing(video, read), note_on_left_out(video),
-                           note_on_repeated(read), note_on_damaged(read), note_on_evened(video),
-                           note_on_exposure(read), note_on_interlaced(video)})
+  for (const Note& note :
+       {note_on_missing(video, read), note_on_left_out(video), note_on_repeated(read),
+        note_on_damaged(read), note_on_evened(video), note_on_capture(video),
+        note_on_exposure(read), note_on_interlaced(video)})
     if (note) notes.push_back(*note);
   return notes;
 }

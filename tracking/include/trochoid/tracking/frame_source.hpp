@@ -35,6 +35,9 @@ struct VideoInfo {
   bool evened = false;      ///< it was variable, and a rate given instead takes it for even
   bool interlaced = false;  ///< by the stream's own word: two half pictures of different times
   std::optional<double> capture_rate_hz{};  ///< the camera's own, where the file tells it
+  /// That of the file's time stamps where pictures are timed by the capture rate instead: slow
+  /// motion, whose stamps are those of playing it.
+  std::optional<double> played_rate_hz{};
   int orientation = 1;  ///< how the stored pictures were turned to be upright, by Exif's numbers
 };
 
@@ -45,8 +48,8 @@ struct VideoInfo {
 struct SourceOptions {
   bool colour = false;
   std::optional<double>
-      frame_rate_hz{};  ///< overrides the time stamps: slow motion, image sequences; a picture
-                        ///< that is lost inside keeps its time all the same
+      frame_rate_hz{};  ///< overrides the time stamps and the capture rate: slow motion, image
+                        ///< sequences; a picture that is lost inside keeps its time all the same
   std::optional<double>
       untimed_rate_hz{};     ///< of an image sequence where frame_rate_hz is not given
   std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
