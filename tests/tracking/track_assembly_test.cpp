@@ -126,5 +126,48 @@ TEST(TrackAssembly, MetresStayUnknownWhereNoFloorIsSeen) {
   EXPECT_NO_THROW(data::check(track, "track"));
 }
 
+// A top seen by a camera that sinks by a pixel: metres and the direction of its axis are those that
+// the camera would have shown before, and the spin that is counted from it takes the turn back.
+TEST(TrackAssembly, OfACameraThatMovesIsWhatOneThatStandsStillWouldShow) {
+  const data::Camera camera = data::Camera::overhead(640, 480, 1000.0, 1.2);
+  const Eigen::Vector2d pivot_m(0.01, -0.02);
+  PoseMeasurement pose;
+  pose.pose.theta_rad = 0.5;
+  pose.pose.psi_rad = 0.3;
+  pose.centre_px.setZero();
+  pose.covariance_m2 = pose.covariance_px2 = 1e-8 * Eigen::Matrix2d::Identity();
+  pose.sigma_theta_rad = pose.sigma_phi_rad = 0.001;
+  pose.sigma_psi_rad = 0.001;
+  BodyPath path;
+  AssemblyOptions how;
+  how.camera = &camera;
+  how.pivot_m = pivot_m;
+  constexpr double kLength_m = 0.03, kPhi_rad = 0.4;
+  // The axis points from the pivot to the centre: along (sin phi, -cos phi).
+  const Eigen::Vector2d before_m =
+      pivot_m + kLength_m * Eigen::Vector2d(std::sin(kPhi_rad), -std::cos(kPhi_rad));
+  const Eigen::Vector3d there_m(before_m.x(), before_m.y(), 0.0);
+  for (int i = 0; i < 30; ++i) {
+    const Eigen::Vector2d gone_px(0.1 * i, -0.05 * i);
+    const Eigen::Vector2d seen_m =
+        before_m + camera.jacobian_px_per_m(there_m).leftCols<2>().inverse() * gone_px;
+    const Eigen::Vector2d from_m = seen_m - pivot_m;
+    pose.pose.centre_m = {seen_m.x(), seen_m.y(), 0.0};
+    pose.pose.phi_rad = std::atan2(from_m.x(), -from_m.y());
+    path.frames[i].t_s = 0.01 * i;
+    path.frames[i].seen.pose = pose;
+    how.shifts[i] = {gone_px, 0.01};
+  }
+  const data::Track track = assemble_track(path, 0, {}, how);
+  for (std::size_t i = 0; i < track.samples.size(); ++i) {
+    const data::TrackSample& sample = track.samples[i];
+    EXPECT_LT((sample.centre_m - before_m).norm(), 1e-6);
+    EXPECT_NEAR(sample.phi->value_rad, kPhi_rad, 1e-4);
+    const double turned_rad = kPhi_rad - path.frames[static_cast<int>(i)].seen.pose->pose.phi_rad;
+    EXPECT_NEAR(sample.psi->value_rad, 0.3 - std::cos(0.5) * turned_rad, 1e-4);
+    EXPECT_GT(sample.covariance_m2(0, 0), 1e-8);
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "find/body_search.hpp"
+#include "find/camera_motion.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
 #include "link/linking.hpp"
@@ -59,6 +60,7 @@ class Tracking {
       while (bodies_missing() && follow_next_body()) {
       }
       if (!bodies_missing()) recording_.stop_sampling();
+      watch_camera();
       report_progress();
     }
     if (paths_.empty()) nothing_found();
@@ -171,6 +173,23 @@ class Tracking {
     for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
     for (const BodyPath& path : paths_) explain(path);
     return true;
+  }
+
+  /// Where the bodies are in a frame, with their size.
+  [[nodiscard]] Follower::Others bodies_in(const Frame& frame) const {
+    Follower::Others bodies;
+    for (const BodyPath& path : paths_)
+      if (const auto at = path.frames.find(frame.index); at != path.frames.end())
+        bodies.emplace_back(at->second.seen.centre_px, at->second.seen.rim.semi_major_px());
+    return bodies;
+  }
+
+  /// The camera's own motion, in the frames of the window, once it is known where the bodies are.
+  void watch_camera() {
+    if (paths_.empty()) return;
+    const Plate& plate = background_.plate();
+    if (!camera_motion_) camera_motion_.emplace(plate.luma, plate.noise_levels);
+    for (const Frame& frame : recording_.window()) camera_motion_->look(frame, bodies_in(frame));
   }
 
   void see(const Frame& frame) {
@@ -502,6 +521,8 @@ class Tracking {
     AssemblyOptions how{.fold = result.file.angles_folded,
                         .readout_s = scene_.camera.readout_s,
                         .video = recording_.info()};
+    if (camera_) how.camera = &*camera_;
+    if (camera_motion_) how.shifts = camera_motion_->shifts();
     if (scene_.body && !scene_.body->marks.empty())
       how.mark_rad = scene_.body->marks.front().angle_rad;
     for (std::size_t k = 0; k < paths_.size(); ++k) {
@@ -509,6 +530,9 @@ class Tracking {
       MetreRule rule;
       if (!(has_shape(scene_) && camera_)) rule = metre_rule(path, words);
       how.on_pin = stays_on_a_pin(path);
+      how.pivot_m.reset();
+      if (scene_.support.kind == data::SupportKind::pivot && scene_.support.pivot_m && !how.on_pin)
+        how.pivot_m = scene_.support.pivot_m->head<2>();
       result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), rule, how));
       const auto& samples = result.file.tracks.back().samples;
       const auto found = static_cast<std::int64_t>(samples.size());
@@ -517,6 +541,8 @@ class Tracking {
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
+    if (auto note = note_about_camera_motion(how.shifts))
+      result.file.notes.push_back(std::move(*note));
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
@@ -553,6 +579,7 @@ class Tracking {
   std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;
+  std::optional<CameraMotion> camera_motion_;
   std::int64_t frames_ = 0, damaged_ = 0, missing_ = 0;
   /// The last frames of a window open the next.
   static constexpr std::size_t kOverlap = 12;

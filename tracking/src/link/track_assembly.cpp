@@ -71,19 +71,54 @@ bool lies(const BodyPath& path) {
   return spread(roundness) < kAsRound && spread(along) < kTurned && spread(across) < kTurned;
 }
 
+/// Codecs hold back what hardly changes in a picture, and with it some of the shift.
+double sigma2_px2(const PictureShift& shift) {
+  constexpr double kHeldBack = 0.15;
+  return shift.sigma_px * shift.sigma_px + kHeldBack * kHeldBack * shift.px.squaredNorm();
+}
+
+/// A pose as a camera that stands still would have seen it, but for its tilt: some pixels turn the
+/// view by next to nothing.
+void take_back(const PictureShift& shift, const AssemblyOptions& options,
+               PoseMeasurement& measured) {
+  data::Pose<>& pose = measured.pose;
+  const Eigen::Matrix2d m_per_px =
+      options.camera->jacobian_px_per_m(pose.centre_m).leftCols<2>().inverse();
+  const Eigen::Vector2d before_m = pose.centre_m.head<2>();
+  pose.centre_m.head<2>() -= m_per_px * shift.px;
+  const Eigen::Matrix2d covariance_m2 = sigma2_px2(shift) * m_per_px * m_per_px.transpose();
+  measured.covariance_m2 += covariance_m2;
+  if (!options.pivot_m) return;
+  const Eigen::Vector2d from_m = before_m - *options.pivot_m,
+                        to_m = pose.centre_m.head<2>() - *options.pivot_m;
+  const double turn_rad =
+      std::atan2(from_m.x() * to_m.y() - from_m.y() * to_m.x(), from_m.dot(to_m));
+  const double sigma_rad = std::sqrt(0.5 * covariance_m2.trace()) / to_m.norm();
+  pose.phi_rad += turn_rad;
+  measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, sigma_rad);
+  // Spin is counted from the node line.
+  const double of_spin = std::cos(pose.theta_rad);
+  pose.psi_rad -= of_spin * turn_rad;
+  if (measured.sigma_psi_rad)
+    measured.sigma_psi_rad = std::hypot(*measured.sigma_psi_rad, of_spin * sigma_rad);
+}
+
 /// Metres stay unknown where no floor is seen.
-void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const MetreRule& rule) {
+void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const PictureShift& shift,
+                     const MetreRule& rule) {
   if (!rule.camera) return;
   Eigen::Vector3d p;
   try {
-    p = rule.camera->table_from_image(seen.centre_px, 0.0);
+    p = rule.camera->table_from_image(seen.centre_px - shift.px, 0.0);
   } catch (const NumericalError&) {  // above the horizon, or where the distortion does not hold
     return;
   }
   const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
   const Eigen::Matrix2d m_per_px = px_per_m.inverse();
   sample.centre_m = p.head<2>();
-  sample.covariance_m2 = m_per_px * seen.covariance_px2 * m_per_px.transpose();
+  sample.covariance_m2 = m_per_px *
+                         (seen.covariance_px2 + sigma2_px2(shift) * Eigen::Matrix2d::Identity()) *
+                         m_per_px.transpose();
 }
 
 /// @param mark_rad of data::turned_over.
@@ -205,15 +240,19 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
     const double usual = *inflation++;
+    const auto moved = options.shifts.find(index);
     if (seen.pose) {
       PoseMeasurement pose = *seen.pose;
       pose.inflate(usual);
+      if (moved != options.shifts.end() && options.camera != nullptr)
+        take_back(moved->second, options, pose);
       sample.centre_m = pose.pose.centre_m.head<2>();
       sample.covariance_m2 = pose.covariance_m2;
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
       if (face_on) join_turns(*seen.pose, sample);
     } else {
-      metres_from_rim(sample, seen, rule);
+      metres_from_rim(sample, seen, moved == options.shifts.end() ? PictureShift{} : moved->second,
+                      rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
       if (turns_as_it_spins && seen.turned_rad)
         sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "find/body_finder.hpp"
+#include "find/camera_motion.hpp"
 #include "find/spin_profile.hpp"
 #include "link/readings.hpp"
 #include "trochoid/data/camera.hpp"
@@ -40,6 +41,11 @@ struct AssemblyOptions {
   double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
   double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
   VideoInfo video{};       ///< whose rows these are
+  const data::Camera* camera = nullptr;  ///< by which poses were measured
+  /// Of a body that leans from it: the axis goes through it, and precession is where the centre is.
+  std::optional<Eigen::Vector2d> pivot_m{};
+  /// By frame index, where the camera moves: metres are those of a camera that does not.
+  std::map<std::int64_t, PictureShift> shifts{};
 };
 
 /// Track samples of a path: metres and their covariance, unwrapped and folded angles, times of the

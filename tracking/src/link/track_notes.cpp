@@ -92,6 +92,22 @@ std::vector<std::string> notes_about_recording(const VideoInfo& video, const Wha
   return notes;
 }
 
+std::optional<std::string> note_about_camera_motion(
+    const std::map<std::int64_t, PictureShift>& shifts) {
+  if (shifts.empty()) return std::nullopt;
+  double squares = 0.0, farthest_px = 0.0;
+  for (const auto& [index, shift] : shifts) {
+    squares += shift.px.squaredNorm();
+    farthest_px = std::max(farthest_px, shift.px.norm());
+  }
+  const Eigen::Vector2d gone_px = shifts.rbegin()->second.px - shifts.begin()->second.px;
+  return fmt::format(
+      "the camera moves: the picture of the floor by {:.2g} px rms, at most {:.2g} px, and {:.2g} "
+      "px from the first frame to the last; metres are those of a camera that stands still, "
+      "pixels and angles are left as they are; fasten the camera",
+      std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
+}
+
 std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
                                             const data::Camera& camera) {
   constexpr double kNoticeable_px = 0.15;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,10 @@ struct WhatWasRead {
 /// What a user should know of a recording before trusting times and blur.
 [[nodiscard]] std::vector<std::string> notes_about_recording(const VideoInfo& video,
                                                              const WhatWasRead& read);
+
+/// By how much the camera moves, where it does.
+[[nodiscard]] std::optional<std::string> note_about_camera_motion(
+    const std::map<std::int64_t, PictureShift>& shifts);
 
 /// Where all edges lie to one side: a transfer curve other than the camera's does that, and so do
 /// other causes. Nothing of paths without poses.

@@ -1,0 +1,98 @@
+#include "find/camera_motion.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "drawn_clip.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+constexpr int kFloorWidth = 320, kFloorHeight = 240, kPictures = 40;
+constexpr double kNoise_levels = 1.5;
+
+// A floor as it is drawn in drawn_floor(), some fraction of a pixel away, lit by a lamp of its own.
+cv::Mat floor_at(const Eigen::Vector2d& shift_px, double contrast, double lamp_levels) {
+  cv::Mat floor(kFloorHeight, kFloorWidth, CV_64F);
+  for (int y = 0; y < kFloorHeight; ++y)
+    for (int x = 0; x < kFloorWidth; ++x) {
+      const double u = x - shift_px.x(), v = y - shift_px.y();
+      floor.at<double>(y, x) =
+          140.0 +
+          contrast * (6.0 * std::sin(0.41 * u + 0.3) * std::sin(0.37 * v) +
+                      4.0 * std::sin(0.2 * (u + 2.0 * v))) +
+          lamp_levels *
+              std::exp(-0.5 * (std::pow((x - 80) / 90.0, 2) + std::pow((y - 60) / 90.0, 2)));
+    }
+  return floor;
+}
+
+struct Scenery {
+  std::function<Eigen::Vector2d(int frame)> shift_px;
+  double contrast = 1.0;
+  double lamp_levels = 0.0;  // by the last frame
+};
+
+// What is found of frames with a dark body that crosses them.
+std::map<std::int64_t, PictureShift> found_in(const Scenery& scenery) {
+  std::mt19937 random(5);
+  const cv::Mat plate = developed(floor_at({0.0, 0.0}, scenery.contrast, 0.0), 0.3, random);
+  CameraMotion motion(plate, kNoise_levels);
+  for (int i = 0; i < kPictures; ++i) {
+    cv::Mat picture =
+        floor_at(scenery.shift_px(i), scenery.contrast, scenery.lamp_levels * i / (kPictures - 1));
+    const Eigen::Vector2d at_px(60.0 + 5.0 * i, 120.0);
+    draw_disc(picture, at_px.x(), at_px.y(), 20.0, 15.0, 0.3 * i, 40.0);
+    Frame frame;
+    frame.index = i;
+    frame.luma = developed(picture, kNoise_levels, random);
+    motion.look(frame, {{at_px, 20.0}});
+  }
+  return motion.shifts();
+}
+
+// A hundred points with a slope of 2 levels a pixel in each quarter, and noise of 1.5 levels: to
+// 0.06 px, of which frames may be off three times.
+TEST(CameraMotion, FollowsASaggingStandAndAKnockSinceTheBeginning) {
+  const auto sags = [](int i) { return Eigen::Vector2d(0.04 * i, 0.02 * i); };
+  const auto knocked = [](int i) {
+    return i < 25 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.2, -0.8);
+  };
+  for (const std::function<Eigen::Vector2d(int)>& goes :
+       {std::function<Eigen::Vector2d(int)>(sags), std::function<Eigen::Vector2d(int)>(knocked)}) {
+    const auto shifts = found_in({goes});
+    ASSERT_EQ(shifts.size(), static_cast<std::size_t>(kPictures));
+    const Eigen::Vector2d first_px = goes(4) - 0.5 * (goes(4) - goes(3));  // the median of eight
+    for (const auto& [index, shift] : shifts) {
+      EXPECT_LT((shift.px - (goes(static_cast<int>(index)) - first_px)).norm(), 0.18) << index;
+      EXPECT_LT(shift.sigma_px, 0.08);
+    }
+  }
+}
+
+TEST(CameraMotion, ShakesAboutOnePlace) {
+  const auto shakes = [](int i) { return Eigen::Vector2d(0.5 + 0.8 * std::sin(0.9 * i), 0.0); };
+  const auto shifts = found_in({shakes});
+  ASSERT_EQ(shifts.size(), static_cast<std::size_t>(kPictures));
+  for (const auto& [index, shift] : shifts)
+    EXPECT_LT((shift.px - shakes(static_cast<int>(index)) + Eigen::Vector2d(0.5, 0.0)).norm(), 0.3);
+}
+
+TEST(CameraMotion, OfACameraThatStandsStillIsNone) {
+  const auto still = [](int) { return Eigen::Vector2d(0.0, 0.0); };
+  EXPECT_TRUE(found_in({still}).empty());
+  EXPECT_TRUE(found_in({still, 1.0, 60.0}).empty());  // a lamp comes up in a corner
+}
+
+// On a plain floor there is nothing to go by, whatever the camera does.
+TEST(CameraMotion, IsNotMadeUpFromNoise) {
+  const auto sags = [](int i) { return Eigen::Vector2d(0.04 * i, 0.0); };
+  EXPECT_TRUE(found_in({sags, 0.0}).empty());
+  EXPECT_TRUE(found_in({sags, 0.02}).empty());
+}
+
+}  // namespace
+}  // namespace trochoid::tracking
