@@ -16,6 +16,7 @@ class Repeats {
   cv::Mat before_run_;       ///< the one before those that differ by next to nothing
   double moved_levels_ = 0;  ///< how far the last picture that was none differed
   int run_ = 0;              ///< pictures since then that differ by next to nothing
+  double run_levels_ = 0.0;  ///< by how much at most
   std::int64_t count_ = 0;
 };
 
