@@ -59,7 +59,7 @@ std::map<std::int64_t, PictureShift> found_in(const Scenery& scenery) {
 TEST(CameraMotion, FollowsASaggingStandAndAKnockSinceTheBeginning) {
   const auto sags = [](int i) { return Eigen::Vector2d(0.04 * i, 0.02 * i); };
   const auto knocked = [](int i) {
-    return i < 25 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.2, -0.8);
+    return i < 20 ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(1.2, -0.8);
   };
   for (const std::function<Eigen::Vector2d(int)>& goes :
        {std::function<Eigen::Vector2d(int)>(sags), std::function<Eigen::Vector2d(int)>(knocked)}) {

@@ -1,18 +1,19 @@
 #!/usr/bin/python3
-"""Variants of recordings with truth in which something is in the way.
+"""Variants of recordings with truth in which something is in the way, or the camera moves.
 
     obstruct.py OUT FOLDER... [--variants NAME,...]
 
 writes OUT/<folder name>_<variant> for each, in the layout that `trochoid study tracking OUT/*` reads: arms and bars over the
 body, other things on the floor, lamps that flicker, the body leaving the picture or resting, noise, compression. The
-picture's own light stays what the recording had; truth.csv says which share of the outline is left to see. At most 200
+picture's own light stays what the recording had. A stand sags (by 3 px in all), shakes (1 px, 17 and 23 Hz) or is knocked
+(1.5 px): truth.csv's metres stay, its pixels go along. It says which share of the outline is left to see. At most 200
 frames of each are used. Needs numpy, scipy, ffmpeg.
 """
 import argparse, csv, json, subprocess
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, shift
 
 FRAMES, GAMMA = 200, 2.2
 
@@ -121,6 +122,21 @@ def rests(clip, random):
     return frames
 
 
+def camera_moves(path_of):
+    """@param path_of (times in s) -> where the picture has gone, n x 2 [px]"""
+    def variant(clip, random):
+        gone = path_of(np.arange(len(clip.frames)) / clip.camera["fps"])
+        for row, (dx, dy) in zip(clip.truth, gone):
+            row["x_px"], row["y_px"] = float(row["x_px"]) + dx, float(row["y_px"]) + dy
+        moved = lambda f, by: np.stack([shift(f[..., c], by, order=3, mode="nearest") for c in range(3)], axis=2)
+        return [moved(f, (dy, dx)) + random.normal(0, 0.4, f.shape) for f, (dx, dy) in zip(clip.frames, gone)]
+    return variant
+
+
+def shakes(t):
+    return np.stack([np.sin(2 * np.pi * 17.3 * t), np.sin(2 * np.pi * 23.1 * t + 1)], axis=1)
+
+
 def noisy(sd, contrast=1.0, floor=0.0):
     def variant(clip, random):
         dim = lambda f: 255 * (contrast * (f / 255) ** GAMMA + floor) ** (1 / GAMMA)
@@ -136,6 +152,8 @@ VARIANTS = {
     "bands": (light(lambda _, i, y: 0.85 * (1 + 0.1 * np.sin(2 * np.pi * (1.5 * y + 0.23 * i)))), H264),
     "steps": (light(lambda t, *_: 1.0 if t < 1 / 3 else 0.7 if t < 2 / 3 else 0.85), H264),
     "leaves": (leaves, H264), "rests": (rests, H264), "noise": (noisy(9.0), H264), "dim": (noisy(4.0, 0.25, 0.12), H264),
+    "sags": (camera_moves(lambda t: 3 * np.outer(t / t[-1], [0.8, 0.6])), H264), "shakes": (camera_moves(shakes), H264),
+    "knocked": (camera_moves(lambda t: 1.5 * np.outer(t > 0.6 * t[-1], [0.8, -0.6])), H264),
     "strong": (noisy(0.0), ["-c:v", "libx264", "-crf", "27", "-pix_fmt", "yuv420p"]),
     "hevc10": (noisy(0.0), ["-c:v", "libx265", "-x265-params", "log-level=none", "-crf", "14", "-pix_fmt", "yuv420p10le"]),
 }

@@ -196,7 +196,8 @@ Eigen::Vector2d CameraMotion::rest_px() const {
   const Eigen::Vector2d begun_px = usual_px(std::max(kFewest, looks_.size() / kBeginning), whole);
   std::vector<double> off_px;
   for (const auto& [index, look] : looks_) off_px.push_back((look.shift_px - middle_px).norm());
-  const bool shakes = (begun_px - middle_px).norm() < data::median(std::move(off_px));
+  constexpr double kNear = 0.5;  // a knock half way leaves the middle between the two places
+  const bool shakes = (begun_px - middle_px).norm() < kNear * data::median(std::move(off_px));
   return shakes ? middle_px : begun_px;
 }
 

@@ -103,8 +103,9 @@ std::optional<std::string> note_about_camera_motion(
   const Eigen::Vector2d gone_px = shifts.rbegin()->second.px - shifts.begin()->second.px;
   return fmt::format(
       "the camera moves: the picture of the floor by {:.2g} px rms, at most {:.2g} px, and {:.2g} "
-      "px from the first frame to the last; metres are those of a camera that stands still, "
-      "pixels and angles are left as they are; fasten the camera",
+      "px from the first frame to the last; metres are those of a camera that stands still, as a "
+      "whole known no better than to some tenths of that, pixels and angles are left as they are; "
+      "fasten the camera",
       std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
 }
 
