@@ -156,13 +156,17 @@ TEST(TrackAssembly, OfACameraThatMovesIsWhatOneThatStandsStillWouldShow) {
     pose.pose.phi_rad = std::atan2(from_m.x(), -from_m.y());
     path.frames[i].t_s = 0.01 * i;
     path.frames[i].seen.pose = pose;
-    how.shifts[i] = {gone_px, 0.01};
+    if (i != 11) how.shifts[i] = {gone_px, 0.01};
   }
   const data::Track track = assemble_track(path, 0, {}, how);
   for (std::size_t i = 0; i < track.samples.size(); ++i) {
     const data::TrackSample& sample = track.samples[i];
-    EXPECT_LT((sample.centre_m - before_m).norm(), 1e-6);
-    EXPECT_NEAR(sample.phi->value_rad, kPhi_rad, 1e-4);
+    // A frame in which the floor was hidden has its neighbour's shift, a tenth of a pixel from its
+    // own.
+    const bool hidden = i == 11;
+    EXPECT_LT((sample.centre_m - before_m).norm(), hidden ? 2e-4 : 1e-6);
+    EXPECT_NEAR(sample.phi->value_rad, kPhi_rad, hidden ? 5e-3 : 1e-4);
+    if (hidden) continue;
     const double turned_rad = kPhi_rad - path.frames[static_cast<int>(i)].seen.pose->pose.phi_rad;
     EXPECT_NEAR(sample.psi->value_rad, 0.3 - std::cos(0.5) * turned_rad, 1e-4);
     EXPECT_GT(sample.covariance_m2(0, 0), 1e-8);

@@ -106,7 +106,9 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
     found.px -= sums.shift();
     found.information = sums.information() / (scale * scale);
   }
-  const bool known = found.px.allFinite() && found.information.allFinite();
+  // What goes farther has lost its points, below a hand for one.
+  constexpr double kFarthest_px = 8.0;
+  const bool known = found.px.norm() < kFarthest_px && found.information.allFinite();
   return known ? std::optional(found) : std::nullopt;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "link/path_scatter.hpp"
@@ -75,6 +76,17 @@ bool lies(const BodyPath& path) {
 double sigma2_px2(const PictureShift& shift) {
   constexpr double kHeldBack = 0.15;
   return shift.sigma_px * shift.sigma_px + kHeldBack * kHeldBack * shift.px.squaredNorm();
+}
+
+/// Of the frame, or of the one nearest to it in which the floor told: a hand may hide it for a
+/// while.
+PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frame) {
+  if (shifts.empty()) return {};
+  const auto after = shifts.lower_bound(frame);
+  if (after == shifts.begin()) return after->second;
+  const auto before = std::prev(after);
+  const bool is_nearer = after == shifts.end() || frame - before->first < after->first - frame;
+  return (is_nearer ? before : after)->second;
 }
 
 /// A pose as a camera that stands still would have seen it, but for its tilt: some pixels turn the
@@ -240,19 +252,17 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
     const double usual = *inflation++;
-    const auto moved = options.shifts.find(index);
+    const PictureShift shift = shift_in(options.shifts, index);
     if (seen.pose) {
       PoseMeasurement pose = *seen.pose;
       pose.inflate(usual);
-      if (moved != options.shifts.end() && options.camera != nullptr)
-        take_back(moved->second, options, pose);
+      if (!options.shifts.empty() && options.camera != nullptr) take_back(shift, options, pose);
       sample.centre_m = pose.pose.centre_m.head<2>();
       sample.covariance_m2 = pose.covariance_m2;
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
       if (face_on) join_turns(*seen.pose, sample);
     } else {
-      metres_from_rim(sample, seen, moved == options.shifts.end() ? PictureShift{} : moved->second,
-                      rule);
+      metres_from_rim(sample, seen, shift, rule);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
       if (turns_as_it_spins && seen.turned_rad)
         sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),
