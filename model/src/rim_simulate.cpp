@@ -330,7 +330,11 @@ void estimate_error(const RimRecord& a, const RimRecord& b, Trajectory& run) {
   apart_rad.tail(apart_rad.size() - static_cast<Eigen::Index>(common))
       .setConstant(parts ? std::numeric_limits<double>::infinity() : 0.0);
   end_where_unknown(apart_rad, run);
-  if (ends_otherwise(a.end, b.end.end_s)) run.outcome = Outcome::diverged;
+  if (parts || ends_otherwise(a.end, b.end.end_s)) {
+    run.outcome = Outcome::diverged;
+    run.end_s = std::min(run.end_s, b.end.end_s);
+    std::erase_if(run.events, [&](const Event& e) { return e.t_s >= run.end_s; });
+  }
   const auto known = static_cast<std::size_t>(run.values.rows());
   for (std::size_t n = 0; n < std::min(common, known); ++n) {
     const auto &p = a.rows[n], &q = b.rows[n];

@@ -94,5 +94,33 @@ TEST(CameraMotion, IsNotMadeUpFromNoise) {
   EXPECT_TRUE(found_in({sags, 0.02}).empty());
 }
 
+// Of exactly upright stripes nothing is known along them.
+TEST(CameraMotion, OnStripesIsNotGuessed) {
+  cv::Mat plate(kFloorHeight, kFloorWidth, CV_8U);
+  for (int x = 0; x < kFloorWidth; ++x)
+    plate.col(x).setTo(cv::saturate_cast<std::uint8_t>(140.0 + 40.0 * std::sin(0.3 * x)));
+  CameraMotion motion(plate, kNoise_levels);
+  for (int i = 0; i < kPictures; ++i) {
+    Frame frame;
+    frame.index = i;
+    frame.luma = plate.clone();
+    motion.look(frame, {});
+  }
+  EXPECT_TRUE(motion.shifts().empty());
+}
+
+// A push by more than can be followed: before it the camera shakes, and that is seen all the same.
+TEST(CameraMotion, IsSeenBeforeAPushThatNoneCanFollow) {
+  const auto pushed = [](int i) {
+    return Eigen::Vector2d(0.8 * std::sin(0.9 * i) + (i < 30 ? 0.0 : 25.0), 0.0);
+  };
+  const auto shifts = found_in({pushed});
+  ASSERT_GE(shifts.size(), 20U);
+  for (const auto& [index, shift] : shifts) {
+    if (index >= 30) continue;
+    EXPECT_LT((shift.px - pushed(static_cast<int>(index))).norm(), 0.4) << index;
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

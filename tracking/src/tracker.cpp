@@ -541,7 +541,7 @@ class Tracking {
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
     }
-    if (auto note = note_about_camera_motion(how.shifts))
+    if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))
       result.file.notes.push_back(std::move(*note));
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))

@@ -157,11 +157,14 @@ data::Profile assemble(const Problem& problem, const Solution& solution, int ind
     profile.delta_chi2.push_back(rise);
   }
   // By the value, which falls with u where it is bounded from above.
-  const bool falls = transform.slope(solution.u[index]) < 0.0;
+  const bool falls = transform.kind == Transform::Kind::below;
   const Side& lower = falls ? above : below;
   const Side& upper = falls ? below : above;
   const model::ParameterInfo& info = problem.predictor->parameters()[problem.free[index].index];
-  const auto [least, most] = transform.limits();
+  // How far a friction is sought is no limit that anybody gave.
+  const auto [least, most] = transform.kind == Transform::Kind::limited
+                                 ? std::pair(info.lower, info.upper)
+                                 : transform.limits();
   profile.lower_95 = lower.bounded ? transform.value(solution.u[index] + lower.bound)
                                    : std::max(least, info.lower);
   profile.upper_95 =

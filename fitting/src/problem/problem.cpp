@@ -56,14 +56,14 @@ double Transform::slope(double u) const {
 }
 
 double Transform::inverse(double value) const {
-  constexpr double kLeast = 1e-300, kMostShare = 1.0 - 1e-12;
+  constexpr double kLeast = 1e-300, kLeastShare = 1e-9, kMostShare = 1.0 - 1e-12;
   switch (kind) {
     case Kind::log:
       return std::log(std::max(value, kLeast));
     case Kind::above:
-      return std::log(std::max(value - lower, kLeast));
+      return std::log(std::max(value - lower, kLeastShare * inside));
     case Kind::below:
-      return std::log(std::max(upper - value, kLeast));
+      return std::log(std::max(upper - value, kLeastShare * inside));
     case Kind::limited: {
       const double share = std::clamp(value / upper, kLeast, kMostShare);
       return std::log(share / (1.0 - share));

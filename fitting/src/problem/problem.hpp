@@ -224,8 +224,7 @@ inline constexpr double kInlier = 3.5;
 /// of a channel, and leans on what all of them say where it is short; positions that came without
 /// covariance do not.
 /// @returns the largest change of any weight or scale; 0, all left as it was, where the model has
-/// no
-///          prediction at u, of which uncertainty() complains.
+///          no prediction at u, of which uncertainty() complains.
 double reweight(Problem& problem, const Eigen::VectorXd& u, bool rescale);
 
 /// What a reading's residuals are multiplied by for standing out.

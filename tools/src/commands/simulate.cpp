@@ -152,8 +152,12 @@ Wanted wanted(const SimulateOptions& options) {
 /// What a fit holds besides the motion that is run, and what it says of it.
 void tell_fit(const SimulateOptions& options, const data::Fit& fit) {
   if (!options.arc && fit.arcs.size() > 1)
-    note(fmt::format("{}: holds {} arcs, and the first is run; --arc 1 to --arc {} run the others",
-                     options.fit.string(), fit.arcs.size(), fit.arcs.size() - 1));
+    note(fmt::format("{}: holds {} arcs, and the first is run; {} the other{}",
+                     options.fit.string(), fit.arcs.size(),
+                     fit.arcs.size() == 2
+                         ? "--arc 1 runs"
+                         : fmt::format("--arc 1 to --arc {} run", fit.arcs.size() - 1),
+                     fit.arcs.size() == 2 ? "" : "s"));
   if (!fit.converged)
     note(fmt::format("{}: is no good fit of its track: {}", options.fit.string(), fit.reason));
 }

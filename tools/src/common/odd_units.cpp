@@ -51,15 +51,26 @@ void tell_odd_times(const std::string& path, const data::Track& track) {
     note(fmt::format("{}: samples are {:.3g} s apart; is t_s in seconds?", path, step_s));
 }
 
-// More than half a turn a row cannot be followed, and a full turn that is left out is one of 2 pi.
-// A tilt beyond pi no track may hold (check_sample).
+double usual_step_s(const data::Track& track) {
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < track.samples.size(); ++i)
+    steps_s.push_back(track.samples[i].t_s - track.samples[i - 1].t_s);
+  return data::median(std::move(steps_s));
+}
+
+// More than half a turn a row cannot be followed, and a full turn that is left out is one of 2 pi;
+// over a gap a body may turn by any angle. A tilt beyond pi no track may hold (check_sample).
 void tell_odd_angle(const std::string& path, const data::Track& track, const char* name,
                     std::optional<MeasuredAngle> TrackSample::*angle) {
   constexpr double kVague_rad = 0.5, kWrapped_rad = 2.0 * data::kTurn;
   std::vector<double> steps_rad, sigmas_rad;
   double longest_rad = 0.0;
+  const double gap_s = 1.5 * usual_step_s(track);
   std::optional<double> last_rad;
+  double last_s = 0.0;
   for (const TrackSample& sample : track.samples) {
+    if (sample.t_s - last_s > gap_s) last_rad.reset();
+    last_s = sample.t_s;
     const auto& read = sample.*angle;
     if (!read) {
       last_rad.reset();

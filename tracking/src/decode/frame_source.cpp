@@ -207,12 +207,13 @@ class LibavSource final : public FrameSource {
     info_.codec = avcodec_get_name(decoder_->codec_id);
   }
 
-  /// Stamps of a film that was taken at one rate and plays at another say nothing of the motion.
+  /// Stamps of a film that was taken at one rate and plays at another say nothing of the motion; of
+  /// one that lost a few pictures on its way they are right.
   void take_capture_rate() {
-    constexpr double kClearly = 0.05;
+    constexpr double kClearly = 1.5;
     if (options_.frame_rate_hz || !info_.capture_rate_hz || !(info_.frame_rate_hz > 0.0)) return;
-    if (std::abs(info_.frame_rate_hz - *info_.capture_rate_hz) < kClearly * *info_.capture_rate_hz)
-      return;
+    const double times = *info_.capture_rate_hz / info_.frame_rate_hz;
+    if (std::max(times, 1.0 / times) < kClearly) return;
     info_.played_rate_hz = info_.frame_rate_hz;
     options_.frame_rate_hz = info_.capture_rate_hz;
   }

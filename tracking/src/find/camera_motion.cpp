@@ -82,7 +82,8 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
                                                           Eigen::Vector2d from_px) {
   constexpr std::size_t kFewest = 50;
   constexpr int kRounds = 3;
-  constexpr double kRadii = 2.5;  // a body's shadow is beside it
+  constexpr double kRadii = 2.5;        // a body's shadow is beside it
+  constexpr double kFarthest_px = 8.0;  // what goes farther has lost its points
   std::vector<const Point*> points;
   for (const Point& point : quarter)
     if (std::none_of(bodies.begin(), bodies.end(), [&](const auto& body) {
@@ -105,11 +106,10 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
                1.0 / (1.0 + std::pow(residuals[i] / (kInlier * scale), 2)));
     found.px -= sums.shift();
     found.information = sums.information() / (scale * scale);
+    // Of stripes nothing is known along them.
+    if (!(found.px.norm() < kFarthest_px) || !found.information.allFinite()) return std::nullopt;
   }
-  // What goes farther has lost its points, below a hand for one.
-  constexpr double kFarthest_px = 8.0;
-  const bool known = found.px.norm() < kFarthest_px && found.information.allFinite();
-  return known ? std::optional(found) : std::nullopt;
+  return found;
 }
 
 CameraMotion::CameraMotion(const cv::Mat& plate, double noise_levels) {
@@ -144,20 +144,26 @@ void CameraMotion::look(const Frame& frame, const Follower::Others& bodies) {
   Look look;
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  std::array<bool, kQuarters> seen{};
+  std::array<std::optional<Found>, kQuarters> found;
   for (std::size_t k = 0; k < kQuarters; ++k) {
-    const auto found = shift_of(quarters_[k], frame.luma, surroundings, bodies, last_px_[k]);
-    if (!found) continue;
-    seen[k] = true;
-    look.of_quarters_px.col(static_cast<Eigen::Index>(k)) = last_px_[k] = found->px;
-    information += found->information;
-    sum += found->information * found->px;
+    found[k] = shift_of(quarters_[k], frame.luma, surroundings, bodies, last_px_[k]);
+    if (!found[k]) continue;
+    information += found[k]->information;
+    sum += found[k]->information * found[k]->px;
   }
-  if (std::count(seen.begin(), seen.end(), true) < std::ssize(seen) / 2) return;
+  if (std::count(found.begin(), found.end(), std::nullopt) > std::ssize(found) / 2) return;
   look.shift_px = information.inverse() * sum;
   look.sigma_px = std::sqrt(0.5 * information.inverse().trace());
-  for (std::size_t k = 0; k < kQuarters; ++k)  // one that a body hides contradicts nobody
-    if (!seen[k]) look.of_quarters_px.col(static_cast<Eigen::Index>(k)) = look.shift_px;
+  // One quarter alone, below a hand or after a knock that none can follow, says nothing of the
+  // camera; and one that a body hides contradicts nobody.
+  constexpr double kTogether_px = 2.0;
+  for (std::size_t k = 0; k < kQuarters; ++k) {
+    const Eigen::Vector2d px = found[k] ? found[k]->px : look.shift_px;
+    if (!((px - look.shift_px).norm() < kTogether_px)) return;
+    look.of_quarters_px.col(static_cast<Eigen::Index>(k)) = px;
+  }
+  for (std::size_t k = 0; k < kQuarters; ++k)
+    if (found[k]) last_px_[k] = found[k]->px;
   looks_[frame.index] = look;
 }
 

@@ -30,10 +30,10 @@ class CameraMotion {
   /// @param bodies  centres and radii in the frame, which tell nothing of the camera
   void look(const Frame& frame, const Follower::Others& bodies);
 
-  /// By frame index, from where it was in the first tenth of them, or, where it shakes about one
-  /// place, from that; empty where the camera stands still, or the
-  /// floor does not tell: it moves where the shifts are larger than 0.1 px rms and than what the
-  /// quarters of the picture disagree by.
+  /// By index of the frames in which the floor tells, from where it was in the first tenth of them
+  /// (eight at least) or, where it shakes about one place, from that. Empty where the camera stands
+  /// still, or the floor does not tell: it moves where the shifts are larger than 0.1 px rms and
+  /// than twice what the quarters of the picture disagree by.
   [[nodiscard]] std::map<std::int64_t, PictureShift> shifts() const;
 
  private:

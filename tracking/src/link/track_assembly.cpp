@@ -78,15 +78,19 @@ double sigma2_px2(const PictureShift& shift) {
   return shift.sigma_px * shift.sigma_px + kHeldBack * kHeldBack * shift.px.squaredNorm();
 }
 
-/// Of the frame, or of the one nearest to it in which the floor told: a hand may hide it for a
-/// while.
+/// Of the frame, or of the one nearest to it in which the floor told, known the worse the farther
+/// that is: a hand may hide it for a while.
 PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frame) {
+  constexpr double kGoes_px = 0.1;  // a frame
   if (shifts.empty()) return {};
-  const auto after = shifts.lower_bound(frame);
-  if (after == shifts.begin()) return after->second;
-  const auto before = std::prev(after);
-  const bool is_nearer = after == shifts.end() || frame - before->first < after->first - frame;
-  return (is_nearer ? before : after)->second;
+  auto nearest = shifts.lower_bound(frame);
+  if (nearest == shifts.end() ||
+      (nearest != shifts.begin() && frame - std::prev(nearest)->first < nearest->first - frame))
+    --nearest;
+  PictureShift shift = nearest->second;
+  shift.sigma_px =
+      std::hypot(shift.sigma_px, kGoes_px * static_cast<double>(std::abs(frame - nearest->first)));
+  return shift;
 }
 
 /// A pose as a camera that stands still would have seen it, but for its tilt: some pixels turn the

@@ -53,7 +53,7 @@ Note note_on_damaged(const WhatWasRead& read) {
 }
 
 Note note_on_evened(const VideoInfo& video) {
-  if (!video.evened) return std::nullopt;
+  if (!video.evened || video.played_rate_hz) return std::nullopt;
   return "the time stamps are uneven, and the rate given takes the pictures for evenly spaced; "
          "without it they keep their own times";
 }
@@ -93,7 +93,7 @@ std::vector<std::string> notes_about_recording(const VideoInfo& video, const Wha
 }
 
 std::optional<std::string> note_about_camera_motion(
-    const std::map<std::int64_t, PictureShift>& shifts) {
+    const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frames, bool metres) {
   if (shifts.empty()) return std::nullopt;
   double squares = 0.0, farthest_px = 0.0;
   for (const auto& [index, shift] : shifts) {
@@ -101,12 +101,19 @@ std::optional<std::string> note_about_camera_motion(
     farthest_px = std::max(farthest_px, shift.px.norm());
   }
   const Eigen::Vector2d gone_px = shifts.rbegin()->second.px - shifts.begin()->second.px;
-  return fmt::format(
+  std::string words = fmt::format(
       "the camera moves: the picture of the floor by {:.2g} px rms, at most {:.2g} px, and {:.2g} "
-      "px from the first frame to the last; metres are those of a camera that stands still, as a "
-      "whole known no better than to some tenths of that, pixels and angles are left as they are; "
-      "fasten the camera",
-      std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
+      "px from the beginning to the end; {}; fasten the camera",
+      std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm(),
+      metres ? "metres are those of a camera that stands still, as a whole known no better than to "
+               "some tenths of that (a top's precession and spin go along); pixels and tilts are "
+               "left as they are"
+             : "pixels are left as they are");
+  constexpr double kNearlyAll = 0.9;
+  if (const auto told = static_cast<std::int64_t>(shifts.size());
+      static_cast<double>(told) < kNearlyAll * static_cast<double>(frames))
+    words += fmt::format("; in {} of {} frames the floor does not tell", frames - told, frames);
+  return words;
 }
 
 std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,

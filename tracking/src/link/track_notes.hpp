@@ -26,8 +26,9 @@ struct WhatWasRead {
                                                              const WhatWasRead& read);
 
 /// By how much the camera moves, where it does.
+/// @param frames  of the recording.  @param metres  whether its tracks have any.
 [[nodiscard]] std::optional<std::string> note_about_camera_motion(
-    const std::map<std::int64_t, PictureShift>& shifts);
+    const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frames, bool metres);
 
 /// Where all edges lie to one side: a transfer curve other than the camera's does that, and so do
 /// other causes. Nothing of paths without poses.
