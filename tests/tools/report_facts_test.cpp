@@ -76,6 +76,13 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
               testing::StartsWith("The path of 11 of the 20 positions, over 0.1 s"));
 }
 
+TEST(Report, SaysFirstWhatTheTrackerNotedOfItsRecording) {
+  ReportInput input = sliding_puck();
+  input.tracks.notes = {"the camera moves"};
+  input.fit->warnings = {"a warning"};
+  EXPECT_THAT(judge(gather(input)).remarks, testing::ElementsAre("the camera moves", "a warning"));
+}
+
 TEST(Report, AFitFromWhosePathMostPositionsLieFarIsOfAnotherTrack) {
   ReportInput input = sliding_puck();
   for (data::TrackSample& sample : input.tracks.tracks.front().samples)

@@ -371,7 +371,6 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
                    p.status == data::ParameterStatus::free      ? ""
                    : p.status == data::ParameterStatus::derived ? "   (derived)"
                                                                 : "   (from the prior)");
-  for (const std::string& note : run.tracked.file.notes) fmt::print("  note: {}\n", note);
   for (const std::string& remark : verdict.remarks) fmt::print("  note: {}\n", remark);
   fmt::print("Open {}\n", (folder / "report.html").string());
   fmt::print("also {}, {}{}\n", (folder / "overlay.mp4").string(), (folder / "path.png").string(),

@@ -294,7 +294,6 @@ std::string quality_section(const ReportFacts& facts) {
           fmt::format("{:.3f} (residual rms over stated sigma; 1 when both are right)",
                       facts.rms_axis_sigma));
   if (file.angles_folded) entry("tilt", "folded to 0..90 degrees: the faces look alike");
-  for (const std::string& note : file.notes) entry("note", note);
   return html + "</dl></section>\n";
 }
 

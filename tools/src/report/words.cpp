@@ -109,6 +109,9 @@ Verdict judge(const ReportFacts& facts) {
                     facts.input.no_fit_reason.empty() ? "" : ": " + facts.input.no_fit_reason),
         {}};
   }
+  // What the tracker has to say of its recording is what everything else stands on.
+  const std::vector<std::string>& notes = facts.input.tracks.notes;
+  verdict.remarks.insert(verdict.remarks.begin(), notes.begin(), notes.end());
   if (!facts.metres)
     verdict.remarks.push_back(
         "positions are in pixels: a camera file, a scale or the body's radius would give metres");
