@@ -59,7 +59,8 @@ double usual_step_s(const data::Track& track) {
 }
 
 // More than half a turn a row cannot be followed, and a full turn that is left out is one of 2 pi;
-// over a gap a body may turn by any angle. A tilt beyond pi no track may hold (check_sample).
+// over a gap a body may turn by any angle. A tilt beyond pi no track may hold (check_sample), and a
+// body that hardly leans has a vague precession: of the spin alone a large error is odd.
 void tell_odd_angle(const std::string& path, const data::Track& track, const char* name,
                     std::optional<MeasuredAngle> TrackSample::*angle) {
   constexpr double kVague_rad = 0.5, kWrapped_rad = 2.0 * data::kTurn;
@@ -89,7 +90,7 @@ void tell_odd_angle(const std::string& path, const data::Track& track, const cha
         fmt::format("{}: {}_rad changes by {:.3g} from one row to the next, at most by {:.3g}; is "
                     "it in radians?",
                     path, name, usual_rad, longest_rad));
-  else if (sigma_rad > kVague_rad)
+  else if (sigma_rad > kVague_rad && angle == &TrackSample::psi)
     note(fmt::format("{}: sigma_{}_rad is {:.3g}, which tells hardly any angle; is it in radians?",
                      path, name, sigma_rad));
 }

@@ -21,8 +21,8 @@ struct Rim {
   enum Component : int { phi, theta, psi, w1, w2, w3, x, y, un, ut };
 };
 
-/// Tilt at which a face is taken to touch the floor [rad]: a seventh part of a millimetre lower at
-/// the edge of a disc of 3 cm.
+/// Tilt at which a face is taken to touch the floor [rad]: the far edge of a disc of 3 cm radius is
+/// then 0.6 mm above it.
 inline constexpr double kFlat_rad = 0.01;
 
 struct RimBody {
