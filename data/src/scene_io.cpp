@@ -8,6 +8,7 @@
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/moment.hpp"
 #include "trochoid/data/scene_error.hpp"
+#include "trochoid/data/start_rates.hpp"
 
 // Scene TOML: docs/formats.md. The keys are listed in scene_keys.hpp.
 namespace trochoid::data {
@@ -99,17 +100,10 @@ void check_camera(const TableReader& reader, const CameraSettings& camera) {
                               key));
 }
 
-void check_start(const TableReader& reader) {
-  constexpr std::array<std::pair<const char*, const char*>, 5> kPairs{
-      {{"w1_rad_s", "dtheta_rad_s"},
-       {"w2_rad_s", "dphi_rad_s"},
-       {"w3_rad_s", "dpsi_rad_s"},
-       {"omega_s_rad_s", "w3_rad_s"},
-       {"omega_s_rad_s", "dpsi_rad_s"}}};
-  for (const auto& [rate, derivative] : kPairs)
-    if (reader.has(rate) && reader.has(derivative))
-      reader.fail(derivative,
-                  fmt::format("{} and {} say the same thing; keep one", rate, derivative));
+void check_start(const TableReader& reader, const StartSettings& start) {
+  if (const auto twice = rate_named_twice(start))
+    reader.fail(twice->second,
+                fmt::format("{} and {} say the same thing; keep one", twice->first, twice->second));
 }
 
 void check_run(const TableReader& reader, const RunSettings& run) {
@@ -177,7 +171,8 @@ Scene scene_of(const toml::table& root, const std::string& where) {
   read(
       "model", scene.model, [](auto&& v) { model_keys(v); }, unchecked);
   read(
-      "start", scene.start, [](auto&& v) { start_keys(v); }, check_start);
+      "start", scene.start, [](auto&& v) { start_keys(v); },
+      [&](const TableReader& reader) { check_start(reader, scene.start); });
   read(
       "run", scene.run, [](auto&& v) { run_keys(v); },
       [&](const TableReader& r) { check_run(r, scene.run); });

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "factories.hpp"
 #include "trochoid/data/error.hpp"
+#include "trochoid/data/start_rates.hpp"
 #include "trochoid/data/table.hpp"
 
 namespace trochoid::model {
@@ -31,19 +31,9 @@ std::vector<double> output_times_s(const data::RunSettings& run) {
 }
 
 void check_rates(const data::StartSettings& start) {
-  struct Named {
-    const char* name;
-    const std::optional<double>& value;
-  };
-  const Named w1{"w1_rad_s", start.w1_rad_s}, dtheta{"dtheta_rad_s", start.dtheta_rad_s};
-  const Named w2{"w2_rad_s", start.w2_rad_s}, dphi{"dphi_rad_s", start.dphi_rad_s};
-  const Named w3{"w3_rad_s", start.w3_rad_s}, dpsi{"dpsi_rad_s", start.dpsi_rad_s};
-  const Named omega_s{"omega_s_rad_s", start.omega_s_rad_s};
-  for (const auto& [one, other] : {std::pair(w1, dtheta), std::pair(w2, dphi), std::pair(w3, dpsi),
-                                   std::pair(omega_s, w3), std::pair(omega_s, dpsi)})
-    if (one.value && other.value)
-      throw InputError(fmt::format("start.{} and start.{} describe the same rate: give one of them",
-                                   one.name, other.name));
+  if (const auto twice = data::rate_named_twice(start))
+    throw InputError(fmt::format("start.{} and start.{} describe the same rate: give one of them",
+                                 twice->first, twice->second));
 }
 
 const std::vector<std::string>& euler_columns() {

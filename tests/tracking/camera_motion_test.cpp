@@ -73,6 +73,7 @@ TEST(CameraMotion, FollowsASaggingStandAndAKnockSinceTheBeginning) {
   }
 }
 
+// The median of a shake is off its middle by up to a quarter of it.
 TEST(CameraMotion, ShakesAboutOnePlace) {
   const auto shakes = [](int i) { return Eigen::Vector2d(0.5 + 0.8 * std::sin(0.9 * i), 0.0); };
   const auto shifts = found_in({shakes});
