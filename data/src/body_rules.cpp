@@ -14,6 +14,12 @@ std::optional<BodyFault> fault_of(const Body& body, const BodyKeys& keys) {
     return BodyFault{keys.inner_radius,
                      fmt::format("{} = {} must not exceed {} = {}", keys.inner_radius,
                                  body.inner_radius_m, keys.radius, body.radius_m)};
+  if (body.border_radius_m > 0.0 &&
+      (body.border_radius_m <= body.inner_radius_m || body.border_radius_m >= body.radius_m))
+    return BodyFault{keys.border_radius,
+                     fmt::format("{} = {} must lie between {} = {} and {} = {}", keys.border_radius,
+                                 body.border_radius_m, keys.inner_radius, body.inner_radius_m,
+                                 keys.radius, body.radius_m)};
   if (body.axle_radius_m >= body.radius_m)
     return BodyFault{keys.axle_radius,
                      fmt::format("{} = {} must be smaller than {} = {}", keys.axle_radius,

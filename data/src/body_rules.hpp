@@ -8,7 +8,7 @@ namespace trochoid::data {
 
 /// How a file spells the sizes of a body [m], as its messages show them.
 struct BodyKeys {
-  std::string radius, inner_radius, axle_radius;
+  std::string radius, inner_radius, border_radius, axle_radius;
   std::string marks;          ///< the list of them
   std::string mark_distance;  ///< of one mark
 };
@@ -19,7 +19,8 @@ struct BodyFault {
 };
 
 /// Sizes that contradict each other, whatever file they come from: a ring without a bore, a bore
-/// larger than the rim, an axle as wide as the body, a mark beyond the rim or in the bore. A top
+/// larger than the rim, a border outside of the
+/// face, an axle as wide as the body, a mark beyond the rim or in the bore. A top
 /// has no shape.
 [[nodiscard]] std::optional<BodyFault> fault_of(const Body& body, const BodyKeys& keys);
 

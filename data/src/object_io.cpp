@@ -58,6 +58,7 @@ Body read_body(const JsonReader& json) {
   body.radius_m = length_of(json, {"R_m", "R_outer_m"}, kSize, 0.0);
   if (body.radius_m == 0.0) json.fail("key \"R_m\" (or \"R_outer_m\") is missing");
   body.inner_radius_m = length_of(json, {"R_inner_m"}, kSizeOrNone, 0.0);
+  body.border_radius_m = length_of(json, {"R_border_m"}, kSizeOrNone, 0.0);
   body.thickness_m = length_of(json, {"thickness_m", "height_m"}, kSizeOrNone, 0.0);
   body.axle_radius_m = length_of(json, {"axle_radius_m"}, kSizeOrNone, 0.0);
   body.axle_above_m = length_of(json, {"axle_above_upper_face_m"}, kSizeOrNone, 0.0);
@@ -69,6 +70,7 @@ Body read_body(const JsonReader& json) {
   }
   const BodyKeys keys{.radius = json.has("R_m") ? "\"R_m\"" : "\"R_outer_m\"",
                       .inner_radius = "\"R_inner_m\"",
+                      .border_radius = "\"R_border_m\"",
                       .axle_radius = "\"axle_radius_m\"",
                       .marks = "\"markers\"",
                       .mark_distance = "\"r_m\""};

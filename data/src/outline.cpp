@@ -97,6 +97,8 @@ Arc classify(const View& view, Edge edge, double c) {
       return {view.face_seen, c > view.through_limit};
     case Edge::lower_bore:
       return {view.face_seen && c < view.far_bore_limit, true};
+    case Edge::border:
+      return {view.face_seen, false};
     case Edge::side_wall:
       break;
   }
@@ -113,6 +115,7 @@ Eigen::Vector3d outwards(const View& view, Edge edge, const Eigen::Vector3d& rad
       return -view.axis;
     case Edge::upper_bore:
       return -radial;
+    case Edge::border:
     case Edge::side_wall:
       break;
   }
@@ -211,6 +214,7 @@ std::vector<Circle> circles_of(const Body& body) {
     circles.push_back({Edge::upper_bore, body.inner_radius_m, h});
     circles.push_back({Edge::lower_bore, body.inner_radius_m, -h});
   }
+  if (body.border_radius_m > 0.0) circles.push_back({Edge::border, body.border_radius_m, h});
   return circles;
 }
 

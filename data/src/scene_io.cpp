@@ -56,6 +56,7 @@ void check_body(const TableReader& reader, const Body& body) {
     reader.fail("", "[body] needs radius_m, the outer radius of the rim");
   const BodyKeys keys{.radius = "radius_m",
                       .inner_radius = "inner_radius_m",
+                      .border_radius = "border_radius_m",
                       .axle_radius = "axle_radius_m",
                       .marks = "mark",
                       .mark_distance = "distance_m"};

@@ -60,6 +60,7 @@ void body_keys(Visit&& visit) {
   visit("radius_m", &Body::radius_m, kSize);
   visit("inner_radius_m", &Body::inner_radius_m, kSizeOrNone);
   visit("thickness_m", &Body::thickness_m, kSizeOrNone);
+  visit("border_radius_m", &Body::border_radius_m, kSizeOrNone);
   visit("axle_radius_m", &Body::axle_radius_m, kSizeOrNone);
   visit("axle_above_m", &Body::axle_above_m, kSizeOrNone);
   visit("mass_kg", &Body::mass_kg, kPositive);

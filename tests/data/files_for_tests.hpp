@@ -16,8 +16,7 @@ class TestFolder {
  public:
   TestFolder()
       : path_(std::filesystem::path(testing::TempDir()) /
-              ("trochoid_data_" + std::to_string(::getpid()) + "_" +
-               testing::UnitTest::GetInstance()->current_test_info()->name())) {
+              ("trochoid_data_" + std::to_string(::getpid()))) {
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -69,6 +69,9 @@ TEST(ObjectFile, IsHeldToTheRulesOfTheScene) {
   EXPECT_NE(message(R"({"type": "ring", "R_outer_m": 0.03, "R_inner_m": 0.04})")
                 .find(R"("R_inner_m" = 0.04 must not exceed "R_outer_m" = 0.03)"),
             std::string::npos);
+  EXPECT_NE(message(R"({"type": "disc", "R_m": 0.03, "R_border_m": 0.03})")
+                .find(R"("R_border_m" = 0.03 must lie between)"),
+            std::string::npos);
   EXPECT_NE(
       message(R"({"type": "disc", "R_m": 0.03, "markers": [{"r_m": 0.05, "radius_m": 0.004}]})")
           .find(R"(the mark's "r_m" = 0.05 lies outside "R_m" = 0.03)"),

@@ -188,6 +188,28 @@ TEST(Outline, OfAFlatDiscSeenFromAboveIsOneCircle) {
   for (const auto& p : outline) EXPECT_TRUE(p.silhouette);
 }
 
+TEST(Outline, HasTheBorderOfTheNearFaceInsideOfIt) {
+  Body body = thick_disc();
+  body.border_radius_m = 0.8 * body.radius_m;
+  const Camera camera = Camera::from_scale(400, 300, 1000.0);
+  const Pose<> pose = pose_at(0.5, 0.3, body);
+  const Eigen::Vector3d face =
+      pose.centre_m + body.half_thickness_m() * symmetry_axis(pose.theta_rad, pose.phi_rad);
+  for (const auto& p : visible_outline(body, pose, camera)) {
+    if (p.edge != Edge::border) continue;
+    EXPECT_FALSE(p.silhouette);
+    EXPECT_NEAR((p.table_m - face).norm(), body.border_radius_m, 1e-12);
+    EXPECT_GT(p.normal_px.dot(p.image_px - camera.image_from_table<double>(face)), 0.0);
+  }
+  // Ramanujan's perimeter of an ellipse, for axes of 32 and 32 cos 0.5.
+  const double a = 32.0, b = 32.0 * std::cos(0.5);
+  const double perimeter_px = kPi * (3.0 * (a + b) - std::sqrt((3.0 * a + b) * (a + 3.0 * b)));
+  EXPECT_NEAR(length_px(visible_outline(body, pose, camera), Edge::border), perimeter_px,
+              perimeter_px * kChordShare);
+  EXPECT_EQ(length_px(visible_outline(body, pose_at(kPi / 2, 0.3, body), camera), Edge::border),
+            0.0);
+}
+
 TEST(Outline, OfADiscOnEdgeSeenFromAboveIsARectangle) {
   const Camera camera = Camera::from_scale(400, 300, 1000.0);
   const auto outline = visible_outline(thick_disc(), pose_at(kPi / 2, 0.3, thick_disc()), camera);

@@ -284,6 +284,12 @@ INSTANTIATE_TEST_SUITE_P(
                      ":4:", "must not exceed"},
         RefusedScene{"RingWithoutBore", "[body]\nkind = 'ring'\nradius_m = 1",
                      ":1:", "inner_radius_m"},
+        RefusedScene{"BorderOutside", "[body]\nradius_m = 1\nborder_radius_m = 1.5",
+                     ":3:", "border_radius_m = 1.5 must lie between"},
+        RefusedScene{"BorderInTheBore",
+                     "[body]\nkind = 'ring'\nradius_m = 1\ninner_radius_m = 0.8\n"
+                     "border_radius_m = 0.7",
+                     ":5:", "between inner_radius_m = 0.8 and radius_m = 1"},
         RefusedScene{"AxleTooThick", "[body]\nradius_m = 1\naxle_radius_m = 1",
                      ":3:", "axle_radius_m = 1 must be smaller than radius_m = 1"},
         RefusedScene{"TooManyObjects", "[tracking]\nobjects = 65", ":2:", "1..64"},

@@ -128,6 +128,23 @@ TEST(PictureRenderer, ShowsTheMarkWhereTheSpinSays) {
   EXPECT_GT(green(at), 5.0F * green(opposite));
 }
 
+TEST(PictureRenderer, DrawsABorderFromItsRadiusOutwards) {
+  data::Body body = flat_disc();
+  body.border_radius_m = 0.024;
+  const data::Camera camera = data::Camera::overhead(200, 160, 1000.0, 1.0);
+  data::Pose<> pose;
+  pose.centre_m.z() = 5e-7;
+  const cv::Mat light = PictureRenderer(body, camera, plain()).light({pose});
+  const auto green = [&](double from_axis_m) {
+    const Eigen::Vector2d p =
+        camera.image_from_table<double>(Eigen::Vector3d(from_axis_m, 0.0, 0.0));
+    return light.at<cv::Vec3f>(static_cast<int>(p.y()), static_cast<int>(p.x()))[1];
+  };
+  EXPECT_FLOAT_EQ(green(0.022), green(0.0));
+  EXPECT_GT(green(0.026), 5.0F * green(0.0));
+  EXPECT_FLOAT_EQ(green(0.026), green(-0.028));
+}
+
 // Of a level body the shadow of a lamp aside is as large as its face, whichever its penumbra.
 TEST(PictureRenderer, CastsAShadowOfTheSizeOfTheFace) {
   constexpr double kScale = 1000.0, kRadius_m = 0.03, kHeight_m = 0.1;

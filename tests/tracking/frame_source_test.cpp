@@ -208,9 +208,8 @@ TEST_F(FrameSourceTest, AWindowHoldsSomeOfTheRecordingOrIsRefused) {
   EXPECT_THAT(error_of(clip, {.from = "99"}),
               HasSubstr(fmt::format("no picture lies from = 99: frame {}, at {:g} s, is the last",
                                     kClipFrames - 1, 0.1 * (kClipFrames - 1))));
-  EXPECT_THAT(
-      error_of(clip, {.from = "f5", .to = "0.2"}),
-      HasSubstr("no picture lies from = f5 to = 0.2: frame 3, at 0.3 s, lies between them"));
+  EXPECT_THAT(error_of(clip, {.from = "f5", .to = "0.2"}),
+              HasSubstr("no picture lies from = f5 to = 0.2: frame 3, at 0.3 s, is past the end"));
 }
 
 TEST_F(FrameSourceTest, DecodingAheadChangesNothing) {
@@ -532,6 +531,13 @@ TEST_F(FrameSourceTest, AFileCutShortIsNotTakenForAWholeOne) {
   std::ofstream(cut, std::ios::binary) << bytes.substr(0, bytes.size() * 2 / 3);
   EXPECT_THAT(error_of(cut),
               HasSubstr(index_in_front ? "breaks off after frame" : "not a readable video"));
+  // Matroska says how long it lasts, whatever rate its pictures were taken at.
+  std::ifstream clip(write_clip("clip.mkv", "FFV1", 50.0), std::ios::binary);
+  bytes.assign((std::istreambuf_iterator<char>(clip)), {});
+  const fs::path half = folder_ / "half.mkv";
+  std::ofstream(half, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
+  EXPECT_THAT(error_of(half), HasSubstr("breaks off at"));
+  EXPECT_THAT(error_of(half, {.frame_rate_hz = 500.0}), HasSubstr("breaks off at"));
 }
 
 }  // namespace

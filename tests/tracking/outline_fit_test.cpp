@@ -797,6 +797,44 @@ TEST(OutlineFitter, ABrightFaceIsNotTakenForTheWholeBody) {
   EXPECT_LT((seen->centre_px - centre).norm(), kTolerance_px);
 }
 
+// A border on the face that is about as bright as the floor, beside a bright wall: the inner edge
+// of the border is the clearest there is.
+struct BorderedDisc {
+  static constexpr double kTheta = 0.7, kFloor = 130.0, kBorder = 0.88;
+  Eigen::Vector2d centre{80.2, 70.4};
+
+  /// @param known of the border, as a share of the radius; 0: nothing.
+  [[nodiscard]] std::optional<PoseMeasurement> measure(double known) const {
+    FlatDisc disc;
+    disc.body.thickness_m = 0.006;
+    disc.body.border_radius_m = known * disc.body.radius_m;
+    constexpr double kRadius_px = 30.0, kHalf_px = 3.0;
+    cv::Mat picture(140, 160, CV_64F, cv::Scalar(kFloor));
+    draw_cylinder(picture, centre, kRadius_px, kHalf_px, kTheta, 70.0, 126.0);
+    draw_disc(picture, centre.x(), centre.y() + kHalf_px * std::sin(kTheta), kBorder * kRadius_px,
+              kBorder * kRadius_px * std::cos(kTheta), 0.0, 220.0);
+    std::mt19937 random(15);
+    const cv::Mat luma = developed(picture, 2.0, random);
+    const cv::Mat plate(140, 160, CV_8U, cv::Scalar(kFloor));
+    const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+    const Detection detection{
+        .centre_px = centre, .semi_major_px = 30.0, .semi_minor_px = 28.0, .box = {50, 42, 61, 57}};
+    return fitter.measure({.luma = luma, .background = plate, .detection = detection});
+  }
+};
+
+TEST(OutlineFitter, ABorderOnTheFaceIsNotTakenForTheRimWhereItIsKnown) {
+  const BorderedDisc scene;
+  const auto seen = scene.measure(BorderedDisc::kBorder);
+  ASSERT_TRUE(seen);
+  constexpr double kTolerance_rad = 0.03, kTolerance_px = 0.3;
+  EXPECT_NEAR(seen->pose.theta_rad, BorderedDisc::kTheta, kTolerance_rad);
+  EXPECT_LT((seen->centre_px - scene.centre).norm(), kTolerance_px);
+  EXPECT_GT(seen->accepted, 0.9);
+  const auto unknown = scene.measure(0.0);
+  EXPECT_TRUE(!unknown || unknown->accepted < 0.7);
+}
+
 // A wall hardly brighter than the floor: beside the face there is an outline as long as that with
 // the wall, but the light has to change beside its edges to explain them.
 struct FaintWall {

@@ -108,10 +108,9 @@ TEST(TrackAssembly, OnlyOfABodyThatLiesDoesItsFaceTellTheSpin) {
 // What is thrown up before a camera that looks along the floor passes the horizon.
 TEST(TrackAssembly, MetresStayUnknownWhereNoFloorIsSeen) {
   constexpr int kWidth = 200, kHeight = 100;
-  MetreRule rule{data::Camera::overhead(kWidth, kHeight, 100.0, 1.0)};
-  Eigen::Matrix3d& camera_from_table = rule.camera->camera_from_table;
-  camera_from_table << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0;
-  rule.camera->camera_from_table_m = {0.0, 1.0, 0.0};
+  data::Camera floor = data::Camera::overhead(kWidth, kHeight, 100.0, 1.0);
+  floor.camera_from_table << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0;
+  floor.camera_from_table_m = {0.0, 1.0, 0.0};
   BodyPath path;
   for (const double y_px : {20.0, 80.0}) {
     BodyPath::At& at = path.frames[static_cast<std::int64_t>(y_px)];
@@ -119,7 +118,7 @@ TEST(TrackAssembly, MetresStayUnknownWhereNoFloorIsSeen) {
     at.seen.centre_px = {0.5 * kWidth, y_px};
     at.seen.covariance_px2 = Eigen::Matrix2d::Identity();
   }
-  const data::Track track = assemble_track(path, 0, rule, {});
+  const data::Track track = assemble_track(path, 0, floor, {});
   ASSERT_EQ(track.samples.size(), 2u);
   EXPECT_FALSE(track.samples[0].has_metres() || track.samples[0].has_covariance());
   EXPECT_TRUE(track.samples[1].has_metres() && track.samples[1].has_covariance());

@@ -8,6 +8,7 @@
 
 #include "find/body_search.hpp"
 #include "find/camera_motion.hpp"
+#include "find/face_border.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
 #include "link/linking.hpp"
@@ -463,20 +464,20 @@ class Tracking {
   }
 
   /// Metres for a track measured by rims: a camera over the floor, or the known radius.
-  [[nodiscard]] MetreRule metre_rule(const BodyPath& path, std::string& words) const {
-    const VideoInfo& video = recording_.info();
-    MetreRule rule;
+  [[nodiscard]] std::optional<data::Camera> floor_of_rims(const BodyPath& path,
+                                                          std::string& words) const {
     if (camera_) {
-      rule.camera = camera_;
       words = "rim centre projected to the floor by the camera";
-    } else if (has_shape(scene_)) {
-      const double scale = usual_radius_px(path) / scene_.body->radius_m;
-      rule.camera = data::Camera::from_scale(video.width_px, video.height_px, scale);
-      words = fmt::format("scale {:.6g} px/m from the known radius", scale);
-    } else {
-      words = "none: pixels only";
+      return camera_;
     }
-    return rule;
+    if (!has_shape(scene_)) {
+      words = "none: pixels only";
+      return std::nullopt;
+    }
+    const VideoInfo& video = recording_.info();
+    const double scale = usual_radius_px(path) / scene_.body->radius_m;
+    words = fmt::format("scale {:.6g} px/m from the known radius", scale);
+    return data::Camera::from_scale(video.width_px, video.height_px, scale);
   }
 
   /// In most of the frames that tell.
@@ -511,29 +512,53 @@ class Tracking {
             : ", and a body that tilts is not where the middle of its rim appears");
   }
 
+  /// What the outline of a body may have been taken for, where most of its frames show it badly.
+  [[nodiscard]] std::optional<std::string> note_about_border() const {
+    constexpr double kBadly = 0.7;  // of the outline, in the usual frame
+    constexpr std::size_t kLooks = 5;
+    if (paths_.empty() || !has_shape(scene_) || !camera_ || scene_.body->border_radius_m > 0.0)
+      return std::nullopt;
+    const BodyPath& path = paths_.front();
+    const double seen = usual_accepted(path);
+    if (seen > kBadly) return std::nullopt;
+    std::vector<DoubtfulLook> looks;
+    for (const Frame& frame : recording_.window())
+      if (const auto at = path.frames.find(frame.index);
+          at != path.frames.end() && at->second.seen.pose)
+        looks.push_back({&frame, &at->second.seen});
+    if (looks.size() < kLooks) return std::nullopt;
+    std::vector<DoubtfulLook> some;
+    for (std::size_t k = 0; k < kLooks; ++k)
+      some.push_back(looks[(2 * k + 1) * looks.size() / (2 * kLooks)]);
+    const auto border = likely_border(*scene_.body, scene_.support, *camera_, background_.plate(),
+                                      some, options_.checkpoint);
+    return border ? std::optional(note_about_likely_border(seen, *border)) : std::nullopt;
+  }
+
   TrackResult result() {
     TrackResult result;
     result.file.source = video_.filename().string();
-    result.file.angles_folded = has_shape(scene_) && camera_ && scene_.body->faces_look_alike();
     result.summary.frames = frames_;
     result.summary.damaged = damaged_;
     std::string words = fmt::format("{}: the CoM of the fitted cylinder", camera_words());
-    AssemblyOptions how{.fold = result.file.angles_folded,
-                        .readout_s = scene_.camera.readout_s,
-                        .video = recording_.info()};
+    AssemblyOptions how{.readout_s = scene_.camera.readout_s, .video = recording_.info()};
     if (camera_) how.camera = &*camera_;
     if (camera_motion_) how.shifts = camera_motion_->shifts();
     if (scene_.body && !scene_.body->marks.empty())
       how.mark_rad = scene_.body->marks.front().angle_rad;
     for (std::size_t k = 0; k < paths_.size(); ++k) {
       const BodyPath& path = paths_[k];
-      MetreRule rule;
-      if (!(has_shape(scene_) && camera_)) rule = metre_rule(path, words);
+      std::optional<data::Camera> floor;
+      if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
       how.on_pin = stays_on_a_pin(path);
+      // A pivot tells the ends of an axis apart, unless the body turns about it in place.
+      how.fold = has_shape(scene_) && camera_ && scene_.body->faces_look_alike() &&
+                 (scene_.support.kind != data::SupportKind::pivot || how.on_pin);
+      result.file.angles_folded = result.file.angles_folded || how.fold;
       how.pivot_m.reset();
       if (scene_.support.kind == data::SupportKind::pivot && scene_.support.pivot_m && !how.on_pin)
         how.pivot_m = scene_.support.pivot_m->head<2>();
-      result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), rule, how));
+      result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), floor, how));
       const auto& samples = result.file.tracks.back().samples;
       const auto found = static_cast<std::int64_t>(samples.size());
       result.summary.found += found;
@@ -546,6 +571,7 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
+    if (auto note = note_about_border()) result.file.notes.push_back(std::move(*note));
     if (!paths_.empty() && std::all_of(paths_.begin(), paths_.end(),
                                        [&](const auto& path) { return lies_throughout(path); }))
       result.file.notes.emplace_back(

@@ -56,6 +56,7 @@ struct Views {
   std::vector<cv::Mat> pictures;  ///< of `found`
   cv::Size size;
   std::string floor;  ///< the one of the floor, by its name in `found`; empty: not said
+  std::string first;  ///< file that shows the floor if none is said to
   int looked_at = 0;
   std::string other_board;  ///< what is seen of one that was not looked for, in words
   std::optional<int> orientation;
@@ -176,6 +177,7 @@ Views look_at_inputs(const CalibrateOptions& options, const tracking::BoardPatte
   Progress progress("calibrate", "files");
   std::vector<fs::path> files = each_once(files_of(options));
   views.floor = floor_among(files, options.floor).string();
+  views.first = files.front().string();
   // The boards say what size pictures have.
   if (files.front() == views.floor) std::rotate(files.begin(), files.begin() + 1, files.end());
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -236,7 +238,13 @@ std::size_t worst_view(const tracking::Calibration& result) {
 }
 
 std::size_t floor_view(const CalibrateOptions& options, const Views& views) {
-  if (options.floor.empty()) return 0;
+  if (options.floor.empty()) {
+    if (views.found.front().name.starts_with(views.first)) return 0;
+    throw InputError(fmt::format(
+        "{}: the board is not seen whole in this, the first picture, which is taken for "
+        "that of the floor; name another with --floor",
+        views.first));
+  }
   for (std::size_t i = 0; i < views.found.size(); ++i)
     if (views.found[i].name == views.floor) return i;
   std::error_code ignored;

@@ -154,6 +154,7 @@ nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& mo
   json["type"] = ring ? "ring" : "disc";
   json[ring ? "R_outer_m" : "R_m"] = body.radius_m;
   if (ring) json["R_inner_m"] = body.inner_radius_m;
+  if (body.border_radius_m > 0.0) json["R_border_m"] = body.border_radius_m;
   json[ring ? "height_m" : "thickness_m"] = body.thickness_m;
   if (body.mass_kg) json["mass_kg"] = *body.mass_kg;
   if (body.l_m) json["com_to_pivot_m"] = *body.l_m;

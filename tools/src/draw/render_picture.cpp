@@ -212,6 +212,8 @@ PictureRenderer::Seen PictureRenderer::trace(double x_px, double y_px, const Pos
 bool PictureRenderer::shows_mark(const Seen& seen) const {
   const double up = seen.hit.normal.z();
   if (std::abs(up) <= 0.5) return false;
+  if (body_.border_radius_m > 0.0 && seen.hit.at.head<2>().norm() > body_.border_radius_m)
+    return true;
   return std::any_of(body_.marks.begin(), body_.marks.end(), [&](const data::SpinMark& mark) {
     const Eigen::Vector2d centre(mark.distance_m * std::cos(mark.angle_rad),
                                  mark.distance_m * std::sin(mark.angle_rad));

@@ -169,8 +169,8 @@ void ResidualStrip::draw_time_axis(double top_px) {
        ++k) {
     const double x = x_of(k * step_s);
     cv::line(picture_, {pixel(x), pixel(top_px)}, {pixel(x), pixel(top_px) + 3}, kAxis);
-    draw_text(picture_, fmt::format("{:.4g}", k * step_s), {x, top_px + 1.7 * text_px_},
-              0.85 * text_px_, kWords, Align::centre);
+    draw_text(picture_, fmt::format("{:.{}f}", k * step_s, decimals_of_step(step_s)),
+              {x, top_px + 1.7 * text_px_}, 0.85 * text_px_, kWords, Align::centre);
   }
   draw_text(picture_, "t [s]", {1.2 * text_px_, top_px + 1.7 * text_px_}, 0.85 * text_px_, kWords);
 }

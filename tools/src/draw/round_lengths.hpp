@@ -21,4 +21,9 @@ namespace trochoid::tools {
   return 10.0 * power;
 }
 
+/// Digits behind the point that tell multiples of a step apart.
+[[nodiscard]] inline int decimals_of_step(double step) {
+  return std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+}
+
 }  // namespace trochoid::tools

@@ -410,22 +410,34 @@ class LibavSource final : public FrameSource {
     check_length();
   }
 
-  /// Containers that do not count frames may promise a length (Matroska); with sound beside the
-  /// pictures it may be the sound's.
+  /// Containers that do not count frames may promise a length (Matroska), by its own clock
+  /// whatever rate is given.
   void check_length() const {
-    const bool promised = info_.frames == 0 && container_->nb_streams == 1 &&
-                          container_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM &&
-                          container_->duration != AV_NOPTS_VALUE && !options_.frame_rate_hz &&
-                          first_stamp_ != AV_NOPTS_VALUE && info_.frame_rate_hz > 0.0;
-    if (!promised) return;
-    const double length_s = static_cast<double>(container_->duration) / AV_TIME_BASE;
+    const double rate_hz = av_q2d(stream_->avg_frame_rate);
+    if (info_.frames != 0 || first_stamp_ == AV_NOPTS_VALUE || !(rate_hz > 0.0)) return;
+    const double length_s = promised_length_s();
+    if (length_s == 0.0) return;
     const double read_s =
         static_cast<double>(last_stamp_ - first_stamp_) * av_q2d(stream_->time_base);
-    const double forgiven_s = std::max(3.0 / info_.frame_rate_hz, 0.02 * length_s);
+    const double forgiven_s = std::max(3.0 / rate_hz, 0.02 * length_s);
     if (length_s - read_s > forgiven_s)
       fail(fmt::format(
           "breaks off at {:.3f} s of {:.3f} s; copy the whole file, or stop earlier (to)", read_s,
           length_s));
+  }
+
+  /// Of the pictures from the first on, as the container tells it; 0 where it does not. With sound
+  /// beside them its whole length may be the sound's, but the pictures may have a tag of theirs
+  /// that says when they end.
+  [[nodiscard]] double promised_length_s() const {
+    const AVDictionaryEntry* tag = av_dict_get(stream_->metadata, "DURATION", nullptr, 0);
+    std::int64_t end_us = 0;
+    if (tag != nullptr && av_parse_time(&end_us, tag->value, 1) >= 0)
+      return static_cast<double>(end_us) / AV_TIME_BASE -
+             static_cast<double>(first_stamp_) * av_q2d(stream_->time_base);
+    const bool known = container_->nb_streams == 1 && container_->duration != AV_NOPTS_VALUE &&
+                       container_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM;
+    return known ? static_cast<double>(container_->duration) / AV_TIME_BASE : 0.0;
   }
 
   /// Whoever asks for a part of a recording wants some of it.
@@ -436,7 +448,7 @@ class LibavSource final : public FrameSource {
     };
     fail(fmt::format("no picture lies{}{}: frame {}, at {:.4g} s, {}", words("from", options_.from),
                      words("to", options_.to), last_index_, last_s_,
-                     at_end ? "is the last" : "lies between them"));
+                     at_end ? "is the last" : "is past the end"));
   }
 
   std::string name_;

@@ -94,6 +94,14 @@ cv::Mat scaled_to(const AVFrame& picture, AVPixelFormat target, int type, Scaler
                                     picture.height, target, SWS_BILINEAR | SWS_ACCURATE_RND,
                                     nullptr, nullptr, nullptr));
   if (!scaler) throw InputError(fmt::format("{} cannot be converted", format_words(picture)));
+  const AVPixFmtDescriptor* format =
+      av_pix_fmt_desc_get(static_cast<AVPixelFormat>(picture.format));
+  // What a picture says of its range is not in its format; levels of ours are full.
+  constexpr int kNeutral = 1 << 16;
+  const int* coefficients = sws_getCoefficients(picture.colorspace);
+  if (format != nullptr && (format->flags & AV_PIX_FMT_FLAG_RGB) == 0)
+    sws_setColorspaceDetails(scaler.get(), coefficients, is_full_range(picture, *format),
+                             coefficients, 1, 0, kNeutral, kNeutral);
   cv::Mat image(picture.height, picture.width, type);
   std::uint8_t* planes[4] = {image.data, nullptr, nullptr, nullptr};
   const int strides[4] = {static_cast<int>(image.step), 0, 0, 0};

@@ -153,6 +153,9 @@ class CylinderFinder final : public BodyFinder {
       return 0.0;
     }
   }
+  [[nodiscard]] double reach_px(const Sighting& seen) const override {
+    return seen.rim.semi_major_px() * std::hypot(1.0, body_.half_thickness_m() / body_.radius_m);
+  }
   [[nodiscard]] bool faces_look_alike() const override { return alike_; }
   [[nodiscard]] double mark_rad() const override {
     return body_.marks.empty() ? 0.0 : body_.marks.front().angle_rad;

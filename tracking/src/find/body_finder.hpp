@@ -80,6 +80,10 @@ class BodyFinder {
   [[nodiscard]] virtual double expected_major_px(const Eigen::Vector2d& /*at_px*/) const {
     return 0.0;
   }
+  /// How far from its centre the body's outline may lie, at most [px].
+  [[nodiscard]] virtual double reach_px(const Sighting& seen) const {
+    return seen.rim.semi_major_px();
+  }
   /// Poses (theta, phi) and (pi - theta, phi + pi) show the same picture.
   [[nodiscard]] virtual bool faces_look_alike() const { return false; }
   /// Angle of the spin mark in the body, 0 without one.

@@ -98,8 +98,8 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
       residuals[i] = level_at(luma, surroundings, points[i]->at_px + found.px) - points[i]->level;
       sizes[i] = std::abs(residuals[i]);
     }
-    constexpr double kSigmaOfMedian = 1.4826, kRounding_levels = 0.3, kInlier = 2.0;
-    const double scale = kSigmaOfMedian * data::median(sizes) + kRounding_levels;
+    constexpr double kRounding_levels = 0.3, kInlier = 2.0;
+    const double scale = data::kSdOverMedianDistance * data::median(sizes) + kRounding_levels;
     ShiftSums sums;
     for (std::size_t i = 0; i < points.size(); ++i)
       sums.add(points[i]->by, residuals[i],

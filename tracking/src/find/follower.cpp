@@ -137,7 +137,8 @@ std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& ex
                                           double reach_px) {
   Sighting guess = expected;
   const double size = guess.rim.semi_major_px();
-  const cv::Rect box = box_around(guess.centre_px, 1.6 * size + reach_px + 12.0, frame.luma.size());
+  const cv::Rect box = box_around(guess.centre_px, 1.6 * finder_.reach_px(guess) + reach_px + 12.0,
+                                  frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
   background_.scaled_into(plate_, gain_, box);
   Look look{.frame = frame, .background = plate_};

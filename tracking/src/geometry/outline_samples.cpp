@@ -10,7 +10,7 @@ namespace {
 using Edge = data::OutlinePoint::Edge;
 
 struct Shape {
-  double radius, bore, thickness;
+  double radius, bore, border, thickness;
   Eigen::Vector3d centre, axis;  // axis towards the camera
 };
 
@@ -33,9 +33,11 @@ void limit_reach(const Shape& shape, Reach& reach) {
       (from_centre - from_centre.dot(shape.axis) * shape.axis).normalized();
   const Eigen::Vector3d down = -shape.thickness * shape.axis;
   const double band = shape.radius - shape.bore;
+  // From the rim or the bore to where the look of the face next changes.
+  const double to_border = shape.border > 0.0 ? shape.radius - shape.border : band;
   switch (reach.point.edge) {
     case Edge::upper_rim:
-      reach.edge_at(-(shape.bore > 0.0 ? band : 2.0 * shape.radius) * radial);
+      reach.edge_at(-(shape.bore + shape.border > 0.0 ? to_border : 2.0 * shape.radius) * radial);
       if (!reach.point.silhouette) reach.edge_at(down);
       break;
     case Edge::lower_rim:
@@ -45,7 +47,7 @@ void limit_reach(const Shape& shape, Reach& reach) {
       reach.edge_at(-2.0 * shape.radius * radial);
       break;
     case Edge::upper_bore:
-      reach.edge_at(band * radial);
+      reach.edge_at((shape.border > 0.0 ? shape.border - shape.bore : band) * radial);
       reach.edge_at(-2.0 * shape.bore * radial);
       reach.edge_at(-2.0 * shape.bore * radial + down);
       if (!reach.point.silhouette) reach.edge_at(down);
@@ -53,6 +55,10 @@ void limit_reach(const Shape& shape, Reach& reach) {
     case Edge::lower_bore:
       reach.edge_at(-down);
       reach.edge_at(-2.0 * shape.bore * radial - down);
+      break;
+    case Edge::border:
+      reach.edge_at((shape.radius - shape.border) * radial);
+      reach.edge_at(-(shape.bore > 0.0 ? shape.border - shape.bore : 2.0 * shape.border) * radial);
       break;
   }
 }
@@ -195,8 +201,8 @@ std::vector<OutlineSample> outline_samples(const data::Body& body, const data::P
                                            const data::PoseMotion& motion, double step_px) {
   const auto outline = data::visible_outline(body, pose, camera, step_px);
   const data::PoseMotion::Velocities v = motion.velocities(pose);
-  const Shape shape{body.radius_m, body.inner_radius_m, body.thickness_m, pose.centre_m,
-                    axis_towards(camera, pose)};
+  const Shape shape{body.radius_m,    body.inner_radius_m, body.border_radius_m,
+                    body.thickness_m, pose.centre_m,       axis_towards(camera, pose)};
   std::vector<OutlineSample> samples;
   samples.reserve(outline.size());
   for (const auto& point : outline) {

@@ -71,11 +71,11 @@ double log_score_ratio(const Sighting& one, const Sighting& other) {
          shadow_log_score_ratio(one, other);
 }
 
-// From the middle of a body: what its outline needs, and its shadow.
-constexpr double kBeside_radii = 1.6, kAround_radii = 2.5;
+// From the middle of a body, over how far it reaches: what its outline needs, and its shadow.
+constexpr double kBeside = 1.6, kAround = 2.5;
 
-bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii) {
-  const double half_px = reach_radii * seen.rim.semi_major_px() + 24.0;
+bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double beside) {
+  const double half_px = beside * finder_.reach_px(seen) + 24.0;
   const cv::Rect box = cv::Rect(static_cast<int>(seen.centre_px.x() - half_px),
                                 static_cast<int>(seen.centre_px.y() - half_px),
                                 static_cast<int>(2.0 * half_px), static_cast<int>(2.0 * half_px)) &
@@ -87,7 +87,7 @@ bool Measuring::prepare_plate(const Frame& frame, const Sighting& seen, double r
 
 std::optional<FloorDarkening> Measuring::floor_around(const Frame& frame, const Sighting& seen,
                                                       const data::Pose<>& pose) {
-  if (!prepare_plate(frame, seen, kAround_radii)) return std::nullopt;
+  if (!prepare_plate(frame, seen, kAround)) return std::nullopt;
   return finder_.floor_around(frame, plate_, pose);
 }
 
@@ -103,8 +103,7 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
                                               const std::optional<data::Pose<>>& near,
                                               const ShadingMemory* shading, bool there) {
   finder_.place(guess);
-  if (!prepare_plate(frame, guess, background_.lamp() ? kAround_radii : kBeside_radii))
-    return std::nullopt;
+  if (!prepare_plate(frame, guess, background_.lamp() ? kAround : kBeside)) return std::nullopt;
   Look look{.frame = frame, .background = plate_};
   look.predicted = &guess;
   look.shading = shading;

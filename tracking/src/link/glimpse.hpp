@@ -52,7 +52,7 @@ class Measuring {
  private:
   /// Brings the background around a sighting to the brightness of the frame; false if that is out
   /// of the picture.
-  bool prepare_plate(const Frame& frame, const Sighting& seen, double reach_radii);
+  bool prepare_plate(const Frame& frame, const Sighting& seen, double beside);
   /// Under the lamp, which is known.
   [[nodiscard]] double agreement(const std::optional<FloorDarkening>& floor) const;
 

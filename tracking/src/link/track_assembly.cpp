@@ -121,15 +121,15 @@ void take_back(const PictureShift& shift, const AssemblyOptions& options,
 
 /// Metres stay unknown where no floor is seen.
 void metres_from_rim(data::TrackSample& sample, const Sighting& seen, const PictureShift& shift,
-                     const MetreRule& rule) {
-  if (!rule.camera) return;
+                     const std::optional<data::Camera>& floor) {
+  if (!floor) return;
   Eigen::Vector3d p;
   try {
-    p = rule.camera->table_from_image(seen.centre_px - shift.px, 0.0);
+    p = floor->table_from_image(seen.centre_px - shift.px, 0.0);
   } catch (const NumericalError&) {  // above the horizon, or where the distortion does not hold
     return;
   }
-  const Eigen::Matrix2d px_per_m = rule.camera->jacobian_px_per_m(p).leftCols<2>();
+  const Eigen::Matrix2d px_per_m = floor->jacobian_px_per_m(p).leftCols<2>();
   const Eigen::Matrix2d m_per_px = px_per_m.inverse();
   sample.centre_m = p.head<2>();
   sample.covariance_m2 = m_per_px *
@@ -239,7 +239,8 @@ double usual_radius_px(const BodyPath& path) {
   return data::upper_median(std::move(sizes));
 }
 
-data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+data::Track assemble_track(const BodyPath& path, int object,
+                           const std::optional<data::Camera>& floor,
                            const AssemblyOptions& options) {
   data::Track track{.object = object, .samples = {}};
   Unwrapper phi(data::kTurn);
@@ -266,7 +267,7 @@ data::Track assemble_track(const BodyPath& path, int object, const MetreRule& ru
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
       if (face_on) join_turns(*seen.pose, sample);
     } else {
-      metres_from_rim(sample, seen, shift, rule);
+      metres_from_rim(sample, seen, shift, floor);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
       if (turns_as_it_spins && seen.turned_rad)
         sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),

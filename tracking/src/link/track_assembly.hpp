@@ -30,11 +30,6 @@ struct BodyPath {
   ReadingTallies readings{};  ///< of all its frames
 };
 
-/// How pixels become metres in a track measured by rims alone.
-struct MetreRule {
-  std::optional<data::Camera> camera;  ///< of the floor plane, in which rims are taken to lie
-};
-
 struct AssemblyOptions {
   bool fold = false;       ///< faces look alike: report min(theta, pi - theta)
   bool on_pin = false;     ///< held at its own middle: turns about the vertical where seen face on
@@ -50,7 +45,10 @@ struct AssemblyOptions {
 
 /// Track samples of a path: metres and their covariance, unwrapped and folded angles, times of the
 /// sample's own row.
-[[nodiscard]] data::Track assemble_track(const BodyPath& path, int object, const MetreRule& rule,
+/// @param floor of a track measured by rims alone, which are taken to lie on the floor that this
+/// camera sees; without, it has no metres.
+[[nodiscard]] data::Track assemble_track(const BodyPath& path, int object,
+                                         const std::optional<data::Camera>& floor,
                                          const AssemblyOptions& options);
 
 /// Median of the rim's semi-major axis over the path [px]: what the known radius is compared with.

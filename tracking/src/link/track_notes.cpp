@@ -15,15 +15,10 @@ namespace {
 using Note = std::optional<std::string>;
 
 Note note_on_missing(const VideoInfo& video, const WhatWasRead& read) {
-  if (video.missing > 0)
-    return fmt::format(
-        "by their numbers {} of {} pictures are missing; the others keep the times of theirs",
-        video.missing, video.frames + video.missing);
-  if (read.missing > 0)
-    return fmt::format(
-        "by their time stamps {} of {} pictures are missing; the others keep their times",
-        read.missing, read.frames + read.missing);
-  return std::nullopt;
+  if (read.missing == 0) return std::nullopt;
+  return fmt::format("by their {} {} of {} pictures are missing; the others keep their times",
+                     video.missing > 0 ? "numbers" : "time stamps", read.missing,
+                     read.frames + read.missing);
 }
 
 Note note_on_left_out(const VideoInfo& video) {
@@ -131,6 +126,21 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
       "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another radius or a "
       "camera with transfer = \"{}\" does that",
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
+}
+
+double usual_accepted(const BodyPath& path) {
+  std::vector<double> accepted;
+  for (const auto& [index, at] : path.frames) accepted.push_back(at.seen.accepted);
+  return accepted.empty() ? 0.0 : data::median(std::move(accepted));
+}
+
+std::string note_about_likely_border(double seen, double border) {
+  return fmt::format(
+      "in the usual frame {:.0f} % of the outline are seen where they should be, and with a border "
+      "on the faces from about {:.2f} of the radius outwards the pictures are explained better: if "
+      "there is one (a raised rim, print), give border_radius_m under [body]; it may have been "
+      "taken for the outline, and the error bars do not hold that",
+      100.0 * seen, border);
 }
 
 data::Table edge_table(const std::vector<BodyPath>& paths) {

@@ -35,6 +35,13 @@ struct WhatWasRead {
 [[nodiscard]] std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
                                                           const data::Camera& camera);
 
+/// Fraction 0..1 of the outline with an edge exactly there, in the median frame; 0 without frames.
+[[nodiscard]] double usual_accepted(const BodyPath& path);
+
+/// That something on the faces may have been taken for the outline.
+/// @param seen usual_accepted of the body.  @param border where it begins, of the radius.
+[[nodiscard]] std::string note_about_likely_border(double seen, double border);
+
 /// The accepted edge points of all frames [px].
 [[nodiscard]] data::Table edge_table(const std::vector<BodyPath>& paths);
 

@@ -127,6 +127,11 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
   out.equations.push_back(equation);
 }
 
+// Where a body is told from what is not: at its silhouette, or at a border that may be the clearer.
+bool tells_outline(const OutlineSample& sample) {
+  return sample.silhouette || sample.edge == Edge::border;
+}
+
 constexpr double kSmoothPx = 2.0;  // closer samples of an outline are as well interpolated
 
 // What one round looked at.
@@ -146,13 +151,13 @@ struct Round {
   [[nodiscard]] bool may_show_rim(size_t i) const { return elsewhere.empty() || !elsewhere[i]; }
 };
 
-// Edges of the silhouette, each by itself.
+// Edges of the silhouette and, in luma, of a border, each by itself.
 void collect_roughly(const Scenery& scenery, const Round& round, const Search& search, bool colour,
                      Refined& out) {
   const std::vector<OutlineSample>& all = round.outline;
   StretchProfile look;
   for (size_t i = 0; i < all.size(); ++i)
-    if (all[i].silhouette && (colour || round.may_show_rim(i)) &&
+    if ((colour ? all[i].silhouette : tells_outline(all[i])) && (colour || round.may_show_rim(i)) &&
         look_at(scenery, all[i], round.sweep(i), nullptr, search, colour, look) &&
         fit_edge(look.profile, look.blur_px, look.plate, look.reach_px, look.edge)) {
       keep(all[i], look.edge, equation_of(all[i], look.edge, colour), out);
@@ -348,7 +353,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
 }
 
 // Length of the silhouette with an edge exactly there; a place seen in luma and in colour counts
-// once, by the better of the two.
+// once, by the better of the two, and a border on the face may stand in for the rim.
 double seen_px(const Search& search, const Round& round, const Refined& refined) {
   std::vector<double> seen(round.outline.size(), 0.0);
   const auto count = [&](size_t place, const ProfileEdge& edge) {
@@ -366,13 +371,13 @@ double seen_px(const Search& search, const Round& round, const Refined& refined)
     const size_t place = round.places[i];
     const StretchProfile& look = round.looks[i];
     ProfileEdge plain;
-    if (look.found && round.outline[place].silhouette && seen[place] < 1.0 &&
+    if (look.found && tells_outline(round.outline[place]) && seen[place] < 1.0 &&
         fit_edge(look.profile, look.blur_px, look.plate, kSeenReachPx, plain))
       count(place, plain);
   }
   double sum = 0.0;
   for (size_t i = 0; i < seen.size(); ++i) sum += seen[i] * round.outline[i].arc_px;
-  return sum;
+  return std::min(sum, refined.outline_px);
 }
 
 data::PoseMotion::Step prior_of(const data::PoseMotion& motion) {
@@ -413,10 +418,11 @@ std::optional<Refined> refine(const Scenery& scenery, const data::Pose<>& start,
   out.seen_px = seen_px(search, round, out);
   double accepted_px = 0.0;
   for (size_t i = 0; i < out.equations.size(); ++i)
-    if (out.samples[i].silhouette && out.equations[i].weight > 0.5)
+    if (tells_outline(out.samples[i]) && out.equations[i].weight > 0.5)
       accepted_px += out.samples[i].arc_px;
   const double channels = scenery.colour.empty() ? 1.0 : 2.0;
-  out.covered = out.outline_px > 0.0 ? accepted_px / (channels * out.outline_px) : 0.0;
+  out.covered =
+      out.outline_px > 0.0 ? std::min(1.0, accepted_px / (channels * out.outline_px)) : 0.0;
   return out;
 }
 

@@ -402,9 +402,9 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations,
   double fitted = 0.0;
   for (int i = 0; i < factorised.size(); ++i)
     fitted += 1.0 - prior(i, i) * variance[static_cast<size_t>(i)];
-  solution.correlation = correlation_factor(equations, scale2, fitted);
   // Noise grows with the correlation, what the edge models may be wrong by does not.
-  const double grown = solution.correlation * scale2 / (solution.scale * solution.scale);
+  const double grown =
+      correlation_factor(equations, scale2, fitted) * scale2 / (solution.scale * solution.scale);
   solution.covariance = grown * inverse;
   // Six answers tell a ratio roughly; a third of the belief stays with what the covariance says.
   constexpr double kMost = 25.0, kBelieved = 2.0 / 3.0;

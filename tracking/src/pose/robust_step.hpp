@@ -62,7 +62,6 @@ struct RobustSolution {
   /// the inverse of its variance [px^-2]; 0 where they do not tell.
   Eigen::Array2d colour_off_px = Eigen::Array2d::Zero();
   Eigen::Array2d colour_information = Eigen::Array2d::Zero();
-  double correlation = 1.0;  ///< variance of sums of errors over that of independent errors
 };
 
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:

@@ -25,8 +25,11 @@ struct Body {
   double radius_m = 0.0;        ///< outer rim, > 0 unless kind == top
   double inner_radius_m = 0.0;  ///< bore of a ring, 0 <= inner <= radius (equal: a thin hoop)
   double thickness_m = 0.0;     ///< >= 0
-  double axle_radius_m = 0.0;   ///< thin axle along k (tops), 0 = none
-  double axle_above_m = 0.0;    ///< how far the axle sticks out of the upper face
+  /// Where a border of another look begins on the faces (a coin's raised rim, a ring of print),
+  /// inner_radius_m < border <= radius_m; 0 = none. Physics does not know it.
+  double border_radius_m = 0.0;
+  double axle_radius_m = 0.0;  ///< thin axle along k (tops), 0 = none
+  double axle_above_m = 0.0;   ///< how far the axle sticks out of the upper face
   std::optional<double> mass_kg;
   std::optional<double> I_kg_m2;   ///< transverse moment; of tops about the pivot, else the CoM
   std::optional<double> Is_kg_m2;  ///< axial moment

@@ -16,6 +16,7 @@ struct OutlinePoint {
     side_wall,   ///< silhouette line of the cylinder wall between the rims
     upper_bore,  ///< inner rim of the face towards the camera
     lower_bore,  ///< inner rim of the far face seen through the bore
+    border,      ///< where a border begins on the face towards the camera
   };
   Edge edge;
   Eigen::Vector3d table_m;   ///< point in the table frame
