@@ -113,6 +113,9 @@ class Errors(unittest.TestCase):
                          model="top")
         with self.assertRaises(trochoid.InputError):
             trochoid.fit(17, model="top")
+        skew = np.tile([[1.0, 0.5], [0.4, 1.0]], (10, 1, 1))
+        with self.assertRaisesRegex(trochoid.InputError, r"covariance_m2\[0\] is not symmetric"):
+            trochoid.fit(trochoid.Track(t_s, np.zeros((10, 2)), skew), model="top")
 
     def test_a_wrong_kind_of_value_is_named_in_one_line(self):
         track, fit = noisy_track(), trochoid.fit
@@ -135,6 +138,14 @@ class Errors(unittest.TestCase):
             with self.subTest(compare), self.assertRaisesRegex(
                     trochoid.InputError, "start: no parameter is called 'lm'; " + whose):
                 trochoid.fit(noisy_track(), TOP, compare=compare, start={"lm": 0.1})
+
+    def test_a_first_guess_is_a_number(self):
+        with self.assertRaisesRegex(trochoid.InputError, "l_m = nan must be a finite number"):
+            trochoid.fit(noisy_track(), TOP, start={"l_m": float("nan")})
+
+    def test_a_scene_takes_no_attributes(self):
+        with self.assertRaises(AttributeError):
+            trochoid.Scene(TOP).fit = {"free": []}
 
     def test_what_is_wrong_with_a_moment_is_told_without_options_of_the_program(self):
         track = noisy_track()
@@ -225,6 +236,8 @@ class Fit(unittest.TestCase):
         self.assertIn("l_m", fit)
         self.assertNotIn("nope", fit)
         self.assertEqual(list(fit), list(fit.parameters))
+        self.assertEqual(dict(fit).keys(), fit.parameters.keys())
+        self.assertEqual([p.value for _, p in fit.items()], [p.value for p in fit.values()])
         with self.assertRaisesRegex(AttributeError, "cannot be changed"):
             fit.model = "rolling"
         with self.assertRaisesRegex(AttributeError, "a Fit has no attribute 'chi'"):
@@ -244,6 +257,12 @@ class Fit(unittest.TestCase):
                                 model="top")
         self.assertEqual(of_run["l_m"].value, of_track["l_m"].value)
         self.assertLess(len(repr(run)), 100)
+
+    def test_the_motion_a_fit_found_is_simulated_beyond_its_track(self):
+        longer = trochoid.simulate(trochoid.fit(noisy_track(), model="top"), until_s=2.0, rate_hz=200)
+        truth = trochoid.simulate(TOP, until_s=2.0)
+        # 301 positions of 1e-4 m leave a sixth of that, and half a second more triples it.
+        np.testing.assert_allclose(longer["x_m"], truth["x_m"], atol=1e-4)
 
     def test_a_fit_is_not_replayed_over_the_file_of_another_track(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -293,6 +312,9 @@ class Fit(unittest.TestCase):
         self.assertEqual(fit["l_m"].value, of_seen["l_m"].value)
         self.assertEqual(fit.arcs[0].samples, int(kept.sum()))
         self.assertIn("13 of 301 samples give no position and are left out: gaps", fit.warnings)
+        masked = noisy_track()
+        masked.centre_m = np.ma.masked_array(masked.centre_m, mask=np.isnan(track.centre_m))
+        self.assertEqual(trochoid.fit(masked, model="top")["l_m"].value, fit["l_m"].value)
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "nan.csv"
             np.savetxt(path, np.column_stack([track.t_s, track.centre_m]), delimiter=",",
@@ -327,6 +349,8 @@ class Fit(unittest.TestCase):
         np.testing.assert_array_equal(back.t_s, track.t_s)
         np.testing.assert_array_equal(back.centre_m, track.centre_m)
         self.assertTrue(np.isnan(back.theta_rad).all())
+        self.assertEqual(back, trochoid.Track(track.t_s, track.centre_m, track.covariance_m2,
+                                              quality=back.quality))
 
 
 class Threads(unittest.TestCase):

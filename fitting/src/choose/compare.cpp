@@ -60,7 +60,7 @@ data::ModelScore table_row(const Rung& rung, bool recommended) {
 
 std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {
   std::vector<data::ModelScore> table;
-  for (const Rung& rung : rungs) table.push_back(table_row(rung, &rung == chosen));
+  for (const Rung* rung : told(rungs, chosen)) table.push_back(table_row(*rung, rung == chosen));
   return table;
 }
 

@@ -56,22 +56,37 @@ std::string retrograde_sentence(const Rungs& rungs, const Rung& chosen, const La
 
 }  // namespace
 
+std::vector<const Rung*> told(const Rungs& rungs, const Rung* chosen) {
+  std::vector<const Rung*> some;
+  for (const Rung& rung : rungs) {
+    const auto known = std::find_if(some.begin(), some.end(),
+                                    [&](const Rung* other) { return other->name == rung.name; });
+    if (known == some.end())
+      some.push_back(&rung);
+    else if (&rung == chosen || (*known != chosen && likelier(&rung, *known)))
+      *known = &rung;
+  }
+  return some;
+}
+
 std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
+  std::string not_tried;
+  for (const std::string& term : ladder.left_out) not_tried += "; not tried: " + term;
+  const std::vector<const Rung*> all = told(rungs, &chosen);
   if (!chosen.fit.converged)
-    return fmt::format("none of the {} models tried explains the track; {} comes nearest.",
-                       rungs.size(), chosen.name);
+    return fmt::format("none of the {} models tried explains the track; {} comes nearest{}.",
+                       all.size(), chosen.name, not_tried);
   std::string words = fmt::format(
       "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
       chosen.name, chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white",
       chosen.held_back_rms_sigma);
   std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
-  for (const Rung& rung : rungs) {
-    // Of another minimum of the same model nothing is said.
-    if (!rung.fitted || rung.terms == chosen.terms) continue;
-    const bool larger = has_all_terms_of(rung, chosen);
-    if (larger && (!rung.fit.converged || ended_above(rung, chosen))) continue;
-    const bool near = rung.bic - chosen.bic < kVeryStrong;
-    (larger ? more : near ? alike : worse).push_back(&rung);
+  for (const Rung* rung : all) {
+    if (!rung->fitted || rung->terms == chosen.terms) continue;
+    const bool larger = has_all_terms_of(*rung, chosen);
+    if (larger && (!rung->fit.converged || ended_above(*rung, chosen))) continue;
+    const bool near = rung->bic - chosen.bic < kVeryStrong;
+    (larger ? more : near ? alike : worse).push_back(rung);
   }
   if (!more.empty())
     words += fmt::format("; neither needed nor ruled out: {}", listed(more, chosen.bic));
@@ -81,8 +96,7 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
     words +=
         fmt::format("; the next best, {}, is ruled out",
                     listed({*std::min_element(worse.begin(), worse.end(), likelier)}, chosen.bic));
-  for (const std::string& term : ladder.left_out) words += fmt::format("; not tried: {}", term);
-  return words + "." + retrograde_sentence(rungs, chosen, ladder);
+  return words + not_tried + "." + retrograde_sentence(rungs, chosen, ladder);
 }
 
 }  // namespace trochoid::fitting

@@ -6,6 +6,10 @@
 
 namespace trochoid::fitting {
 
+/// Those that are told of: of several minima of one model the likeliest, or the chosen one.
+/// @param chosen null where none is.
+[[nodiscard]] std::vector<const Rung*> told(const Rungs& rungs, const Rung* chosen);
+
 /// What the comparison of all rungs says, as a sentence or two.
 [[nodiscard]] std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder);
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
+
 #include "judge/body_doubt.hpp"
 #include "observe/observed.hpp"
 #include "trochoid/data/error.hpp"
@@ -52,10 +54,13 @@ std::set<std::string> parameters_of(const data::Scene& given) {
 
 void check_first_guess(const std::map<std::string, double>& guess, const std::string& whose,
                        const std::set<std::string>& known) {
-  for (const auto& [name, value] : guess)
+  for (const auto& [name, value] : guess) {
     if (!known.contains(without_arc(name)))
       throw InputError(fmt::format("start: no parameter is called '{}'; {} {}", name, whose,
                                    fmt::join(known, ", ")));
+    if (!std::isfinite(value))
+      throw InputError(fmt::format("start: {} = {} must be a finite number", name, value));
+  }
 }
 
 }  // namespace trochoid::fitting

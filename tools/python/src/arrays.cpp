@@ -148,12 +148,19 @@ data::Track track_of(const py::dict& arrays, const std::string& where) {
   const auto covariance_m2 = values_of(arrays, "covariance_m2", {n, 2, 2}, where);
   const auto centre_px = values_of(arrays, "centre_px", {n, 2}, where);
   const auto quality = values_of(arrays, "quality", {n}, where);
+  const auto asymmetric = [&](py::ssize_t i) {
+    const double a = covariance_m2->at(i, 0, 1), b = covariance_m2->at(i, 1, 0);
+    constexpr double kRounding = 1e-9;
+    return std::abs(a - b) > kRounding * std::max(std::abs(a), std::abs(b));
+  };
   data::Track track;
   if (arrays.contains("object")) track.object = arrays["object"].cast<int>();
   track.samples.resize(static_cast<std::size_t>(n));
   for (py::ssize_t i = 0; i < n; ++i) {
     TrackSample& sample = track.samples[static_cast<std::size_t>(i)];
     sample.t_s = t_s.at(i);
+    if (covariance_m2 && asymmetric(i))
+      throw InputError(fmt::format("{}: covariance_m2[{}] is not symmetric", where, i));
     if (frame) sample.frame = frame_number(frame->at(i), where);
     if (quality) sample.quality = quality->at(i);
     for (int a = 0; a < 2; ++a) {

@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "common/fit_job.hpp"
+#include "common/fitted_scene.hpp"
 #include "common/outputs.hpp"
 #include "common/prediction.hpp"
 #include "common/progress.hpp"
@@ -372,6 +373,9 @@ void add_scene(py::module_& module) {
            })
       .def_property_readonly("toml",
                              [](const SceneValue& value) { return data::to_toml(value.scene); });
+  module.def("fitted_scene", [](const data::Fit& fit, std::size_t arc) {
+    return SceneValue{tools::fitted_scene(fit, arc)};
+  });
   module.def("bundled_scenes", [] {
     std::map<std::string, std::string> names;
     for (const tools::BundledScene& scene : tools::bundled_scenes())

@@ -22,7 +22,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import reprlib
-from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
+from typing import (Any, Callable, ItemsView, Iterator, KeysView, Mapping, Optional, Sequence, Union,
+                    ValuesView)
 
 import numpy as np
 
@@ -86,7 +87,16 @@ def _outputs(inputs: Sequence[Any], **named: Optional[Path]) -> list[Optional[st
     return paths
 
 
+def _unknown(value: Any) -> bool:
+    """None, or an array of nothing but NaN or, of frames, -1: what a file does not hold."""
+    if not isinstance(value, np.ndarray):
+        return value is None
+    return bool(np.all(np.isnan(value) if value.dtype.kind == "f" else value == -1))
+
+
 def _same(a: Any, b: Any) -> bool:
+    if (a is None) != (b is None):
+        return _unknown(a) and _unknown(b)
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         a, b = np.asarray(a), np.asarray(b)
         return np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f")
@@ -151,6 +161,8 @@ class Scene:
     ``Scene("ring.toml")``, ``Scene("thesis-base")``, ``Scene({"body": {"radius_m": 0.03}})``.
     """
 
+    __slots__ = ("_value",)
+
     def __init__(self, scene: Union[None, Path, Mapping, "Scene"] = None):
         if scene is None:
             self._value = _core.SceneValue()
@@ -160,6 +172,16 @@ class Scene:
             self._value = _scene_of_dict(scene)
         else:
             self._value = _core.SceneValue.load(_path("scene", scene))
+
+    @classmethod
+    def of_fit(cls, fit: "Fit", arc: int = 0) -> "Scene":
+        """The scene of a fit with its start and coefficients replaced by what was found, so that
+        ``simulate`` runs the motion on; time 0 is where that arc begins."""
+        if not isinstance(fit, Fit):
+            raise _wrong("fit", fit, "a Fit")
+        scene = cls()
+        scene._value = _core.fitted_scene(fit._value, _whole("arc", arc))
+        return scene
 
     @classmethod
     def from_toml(cls, text: str) -> "Scene":
@@ -195,8 +217,8 @@ def scenes() -> dict[str, str]:
 class Track(_Record):
     """The path of one body; n samples, strictly increasing in time; frames without the body have none.
 
-    Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN; samples
-    without a position are gaps, which `fit` leaves out and counts among its ``warnings``.
+    Only ``t_s`` and ``centre_m`` are needed for a fit: ``Track(t_s, centre_m)``. Unknown is NaN or
+    masked; samples without a position are gaps, which `fit` leaves out and counts among its ``warnings``.
     """
 
     t_s: np.ndarray                                #: (n,) presentation time [s]
@@ -245,7 +267,9 @@ class TrackFile(_Record):
 def _track_dict(track: Track) -> dict[str, Any]:
     if not isinstance(track, Track):
         raise _wrong("track", track, "a Track")
-    return {**vars(track), "object": _whole("object", track.object)}
+    arrays = {name: np.ma.filled(value.astype(float), np.nan) if np.ma.isMaskedArray(value) else value
+              for name, value in vars(track).items()}
+    return {**arrays, "object": _whole("object", track.object)}
 
 
 def _file_dict(file: TrackFile) -> dict[str, Any]:
@@ -391,6 +415,18 @@ class Fit:
 
     def __len__(self) -> int:
         return len(self._value.parameters)
+
+    def keys(self) -> KeysView[str]:
+        """Names of the parameters."""
+        return self.parameters.keys()
+
+    def values(self) -> ValuesView[Parameter]:
+        """The parameters."""
+        return self.parameters.values()
+
+    def items(self) -> ItemsView[str, Parameter]:
+        """Pairs of name and parameter."""
+        return self.parameters.items()
 
     def __getitem__(self, name: str) -> Parameter:
         parameters = self.parameters
@@ -602,17 +638,19 @@ class Trajectory(_Record):
             raise KeyError(f"{column}; there are {', '.join(self.columns)}") from None
 
 
-def simulate(scene: Union[Path, Mapping, Scene], *, until_s: Optional[float] = None,
+def simulate(scene: Union[Path, Mapping, Scene, Fit], *, until_s: Optional[float] = None,
              rate_hz: Optional[float] = None, tolerance: Optional[float] = None, model: str = "",
              integrator: str = "", output: Optional[Path] = None) -> Trajectory:
     """Runs a scene's model (``trochoid simulate``); what is given overrides the scene.
 
+    scene             or a Fit: the motion it found, ``Scene.of_fit(fit)``
     until_s, rate_hz  end time [s] and output rate [Hz]
     tolerance         of the integration
     integrator        auto, dop853, taylor, radau, cvode-adams, cvode-bdf or arkode
     output            write the trajectory into this CSV
     """
-    value = Scene(scene)._value.with_run(
+    given = Scene.of_fit(scene) if isinstance(scene, Fit) else Scene(scene)
+    value = given._value.with_run(
         _optional(_number, "until_s", until_s), _optional(_number, "rate_hz", rate_hz),
         _optional(_number, "tolerance", tolerance), _text("model", model),
         _text("integrator", integrator))

@@ -157,8 +157,9 @@ std::string summary_csv(const std::vector<CampaignLine>& lines) {
     csv += fmt::format("{:.3f},{:.0f}", r.seconds, r.peak_mb);
     for (const std::string& name : names) {
       const data::FitParameter* p = line.fit ? line.fit->find(name) : nullptr;
-      csv +=
-          p != nullptr ? fmt::format(",{},{}", csv_number(p->value), csv_number(p->sigma)) : ",,";
+      csv += p != nullptr && p->identifiable
+                 ? fmt::format(",{},{}", csv_number(p->value), csv_number(p->sigma))
+                 : ",,";
     }
     csv += fmt::format(",{},{},{}\n", r.inputs.empty() ? "" : r.inputs.front().second, r.version,
                        csv_text(r.message));

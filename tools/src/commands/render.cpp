@@ -47,7 +47,7 @@ struct RenderOptions {
 class Motion {
  public:
   Motion(const model::Trajectory& run, double rate_hz)
-      : model_(run.model), rate_hz_(rate_hz), goes_on_(run.outcome == model::Outcome::reached_end) {
+      : model_(run.model), rate_hz_(rate_hz), outcome_(run.outcome) {
     for (const char* name : {"x_m", "y_m", "z_m", "theta_rad", "phi_rad", "psi_rad"}) {
       const auto at = std::find(run.columns.begin(), run.columns.end(), name);
       if (at == run.columns.end())
@@ -58,6 +58,7 @@ class Motion {
     }
   }
   [[nodiscard]] const std::string& model() const { return model_; }
+  [[nodiscard]] model::Outcome outcome() const { return outcome_; }
   [[nodiscard]] double end_s() const {
     return static_cast<double>(columns_.front().size() - 1) / rate_hz_;
   }
@@ -67,7 +68,8 @@ class Motion {
     const auto i = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(place)) - 1, 0,
                                             std::max<Eigen::Index>(0, last - 3));
     // Half of the last picture's exposure lies beyond the end of a run that would have gone on.
-    const double until = static_cast<double>(last) + (goes_on_ ? 0.5 * kPerFrame : 0.0);
+    const double until = static_cast<double>(last) +
+                         (outcome_ == model::Outcome::reached_end ? 0.5 * kPerFrame : 0.0);
     const double u = std::min(place, until) - static_cast<double>(i);
     const auto value = [&](std::size_t column) {
       const Eigen::VectorXd& v = columns_[column];
@@ -86,7 +88,7 @@ class Motion {
  private:
   std::string model_;
   double rate_hz_;
-  bool goes_on_;  ///< the run ended because its time was up
+  model::Outcome outcome_;
   std::vector<Eigen::VectorXd> columns_;
 };
 
@@ -348,6 +350,9 @@ void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Cam
     note(fmt::format(
         "the body's centre is outside the picture in {} of {} frames, first at {:.3g} s", outside,
         frames, first / scene.run.rate_hz));
+  if (motion.outcome() != model::Outcome::reached_end)
+    note(fmt::format("the motion ends at {:.3g} s of {:g} s: {}", motion.end_s(), scene.run.until_s,
+                     model::sentence(motion.outcome())));
   if (scene.tracking.objects > 1)
     note(fmt::format("one body is drawn; [tracking] objects = {} is for following a recording",
                      scene.tracking.objects));

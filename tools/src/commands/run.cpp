@@ -356,6 +356,7 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
     if (run.fit) {
       summary["model"] = run.fit->model;
       summary["converged"] = run.fit->converged;
+      summary["recommendation"] = run.fit->recommendation;
       summary["fit"] = (folder / (stem_of(options) + ".fit.json")).string();
     }
     print_json(summary);
@@ -371,6 +372,7 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
                    p.status == data::ParameterStatus::free      ? ""
                    : p.status == data::ParameterStatus::derived ? "   (derived)"
                                                                 : "   (from the prior)");
+  if (run.fit && !run.fit->recommendation.empty()) fmt::print("  {}\n", run.fit->recommendation);
   for (const std::string& remark : verdict.remarks) fmt::print("  note: {}\n", remark);
   fmt::print("Open {}\n", (folder / "report.html").string());
   fmt::print("also {}, {}{}\n", (folder / "overlay.mp4").string(), (folder / "path.png").string(),

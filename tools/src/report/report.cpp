@@ -237,7 +237,8 @@ std::string comparison_section(const data::Fit& fit) {
   for (const data::ModelScore& score : fit.comparison)
     if (score.aicc < least) least = score.aicc;
   std::string html =
-      "<section class=\"long\"><h2>Models compared</h2><div class=\"scroll\"><table "
+      "<section class=\"long\"><h2>Models compared</h2><p>" + escaped(fit.recommendation) +
+      "</p><div class=\"scroll\"><table "
       "id=\"comparison\"><thead><tr><th>model</th><th class=\"number\">parameters</th><th "
       "class=\"number\">ΔAICc</th><th class=\"number\">BIC</th><th class=\"number\">χ²</th><th "
       "class=\"number\">whiteness p</th><th class=\"number\">held-back part "
