@@ -151,6 +151,43 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   EXPECT_NEAR(length_m, 1.5 * (kDrawnFrames - 1) / 2000.0, 0.002 * length_m + 1e-4);
 }
 
+/// What the notes of a track say of how long the shutter was open [%]; 0: nothing. The disc slides
+/// by 7 px from picture to picture, drawn as the mean of many places over part of that.
+double told_exposure_percent(double exposure_fraction) {
+  constexpr double kStep_px = 7.0;
+  constexpr int kMoments = 16;
+  const ScratchFolder folder("shutter");
+  write_clip(folder / "clip.mkv", drawn_floor(400, 110, 170.0), 44, 1.0,
+             [&](cv::Mat& picture, int i) {
+               const cv::Mat floor = picture.clone();
+               picture = cv::Mat::zeros(floor.size(), CV_64F);
+               for (int k = 0; k < kMoments; ++k) {
+                 cv::Mat moment = floor.clone();
+                 const double share = exposure_fraction * ((k + 0.5) / kMoments - 0.5);
+                 draw_disc(moment, 40.0 + kStep_px * (i + share), 55.0, 24.0, 24.0, 0.0, 60.0);
+                 picture += moment / kMoments;
+               }
+             });
+  data::Scene scene;
+  scene.body.emplace();
+  scene.body->radius_m = 0.024, scene.body->thickness_m = 0.001;
+  scene.support.kind = data::SupportKind::flat;
+  data::Camera camera = data::Camera::from_scale(400, 110, 1000.0);
+  camera.transfer = data::Transfer::linear;
+  const std::string says = "edges in motion are smeared ";
+  for (const std::string& note : track_video(folder / "clip.mkv", scene, camera).file.notes)
+    if (const auto at = note.find(says); at != std::string::npos)
+      return std::stod(note.substr(note.find("ms, ", at) + 4));
+  return 0.0;
+}
+
+// Of edges smeared by 3 and 5 px that is known to a tenth.
+TEST(TrackVideo, TheSmearOfMovingEdgesTellsHowLongTheShutterWasOpen) {
+  EXPECT_NEAR(told_exposure_percent(0.4), 40.0, 4.0);
+  EXPECT_NEAR(told_exposure_percent(0.7), 70.0, 7.0);
+  EXPECT_EQ(told_exposure_percent(0.0), 0.0);
+}
+
 /// A disc that moves down and to the right.
 void draw_mover(cv::Mat& picture, int i) {
   draw_disc(picture, 30.0 + 1.5 * i, 30.0 + 0.8 * i, 14.0, 14.0, 0.0, 60.0);

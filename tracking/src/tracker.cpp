@@ -9,6 +9,7 @@
 #include "find/body_search.hpp"
 #include "find/camera_motion.hpp"
 #include "find/face_border.hpp"
+#include "find/open_shutter.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
 #include "link/linking.hpp"
@@ -58,8 +59,7 @@ class Tracking {
   TrackResult run() {
     while (read_window()) {
       settle();
-      while (bodies_missing() && follow_next_body()) {
-      }
+      follow_bodies();
       if (!bodies_missing()) recording_.stop_sampling();
       watch_camera();
       report_progress();
@@ -92,21 +92,25 @@ class Tracking {
   }
 
   void choose_finder() {
-    finder_ = has_shape(scene_) && camera_
-                  ? make_stoppable(make_cylinder_finder(*scene_.body, scene_.support, *camera_,
-                                                        exposure_fraction(), options_.effort),
-                                   options_.checkpoint)
-                  : rim_finder();
+    finder_ = has_shape(scene_) && camera_ ? cylinder_finder(exposure_fraction().value_or(0.0))
+                                           : rim_finder();
+  }
+
+  [[nodiscard]] std::unique_ptr<BodyFinder> cylinder_finder(double exposure_fraction) const {
+    return make_stoppable(make_cylinder_finder(*scene_.body, scene_.support, *camera_,
+                                               exposure_fraction, options_.effort),
+                          options_.checkpoint);
   }
 
   [[nodiscard]] std::unique_ptr<BodyFinder> rim_finder() const {
     return make_stoppable(make_rim_finder(), options_.checkpoint);
   }
 
-  [[nodiscard]] double exposure_fraction() const {
+  /// Nothing where neither scene nor camera say it and the pictures have not told.
+  [[nodiscard]] std::optional<double> exposure_fraction() const {
     if (scene_.camera.exposure_s)
       return *scene_.camera.exposure_s * recording_.info().frame_rate_hz;
-    return camera_ && camera_->exposure_fraction ? *camera_->exposure_fraction : 0.0;
+    return camera_ && camera_->exposure_fraction ? camera_->exposure_fraction : seen_exposure_;
   }
 
   [[nodiscard]] bool bodies_missing() const {
@@ -174,6 +178,56 @@ class Tracking {
     for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
     for (const BodyPath& path : paths_) explain(path);
     return true;
+  }
+
+  /// Bodies that are not followed yet, as long as the window shows any.
+  void follow_bodies() {
+    while (bodies_missing() && follow_next_body()) {
+    }
+    if (exposure_sought_ || exposure_fraction() || !first_path_is_posed()) return;
+    exposure_sought_ = true;
+    seen_exposure_ = find_exposure_fraction(
+        [this](double fraction) { return cylinder_finder(fraction); }, background_, moving_looks());
+    if (seen_exposure_) follow_anew();
+  }
+
+  [[nodiscard]] bool first_path_is_posed() const {
+    return !paths_.empty() && !paths_.front().frames.empty() &&
+           paths_.front().frames.begin()->second.seen.pose;
+  }
+
+  /// Of the first body: frames of the window in which it is well seen, as in the frame before.
+  [[nodiscard]] std::vector<MovingLook> moving_looks() const {
+    constexpr double kWell = 0.5;
+    const auto& frames = paths_.front().frames;
+    const auto well_seen = [&](std::int64_t index) -> const Sighting* {
+      const auto at = frames.find(index);
+      return at != frames.end() && at->second.seen.pose && at->second.seen.accepted > kWell
+                 ? &at->second.seen
+                 : nullptr;
+    };
+    std::vector<MovingLook> looks;
+    for (const Frame& frame : recording_.window()) {
+      const Sighting *seen = well_seen(frame.index), *before = well_seen(frame.index - 1);
+      if (seen != nullptr && before != nullptr) looks.push_back({&frame, seen, before});
+    }
+    return looks;
+  }
+
+  /// Follows the bodies of the window once more, knowing how long the shutter is open; as they were
+  /// if that finds fewer.
+  void follow_anew() {
+    auto finder = std::exchange(finder_, cylinder_finder(*seen_exposure_));
+    auto paths = std::exchange(paths_, {});
+    auto followers = std::exchange(followers_, {});
+    explained_.assign(recording_.window().size(), {});
+    while (bodies_missing() && follow_next_body()) {
+    }
+    if (paths_.size() >= paths.size()) return;
+    paths_ = std::move(paths);
+    followers_ = std::move(followers);  // which refer to that finder
+    finder_ = std::move(finder);
+    seen_exposure_.reset();
   }
 
   /// Where the bodies are in a frame, with their size.
@@ -571,6 +625,9 @@ class Tracking {
     if (camera_)
       if (auto note = note_about_edges(paths_, *camera_))
         result.file.notes.push_back(std::move(*note));
+    if (seen_exposure_)
+      result.file.notes.push_back(
+          note_about_seen_exposure(*seen_exposure_, recording_.info().frame_rate_hz));
     if (auto note = note_about_border()) result.file.notes.push_back(std::move(*note));
     if (!paths_.empty() && std::all_of(paths_.begin(), paths_.end(),
                                        [&](const auto& path) { return lies_throughout(path); }))
@@ -583,7 +640,7 @@ class Tracking {
                            .missing = missing_,
                            .repeated = recording_.repeated(),
                            .damaged = damaged_,
-                           .exposure_fraction = exposure_fraction()};
+                           .exposure_fraction = exposure_fraction().value_or(0.0)};
     for (std::string& note : notes_about_recording(recording_.info(), read))
       result.file.notes.push_back(std::move(note));
     result.file.camera = words;
@@ -602,6 +659,8 @@ class Tracking {
   Background background_;
   std::vector<Ellipse> in_plate_;  ///< rims of bodies that never move off the plate
   bool camera_moved_ = false;
+  bool exposure_sought_ = false;
+  std::optional<double> seen_exposure_;      ///< over the frame interval, by how edges are smeared
   std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;

@@ -22,8 +22,10 @@ struct ProfileEdge {
   double dimmed = 1.0;
   double wider_px = 0.0;  ///< by how much it is wider than edges of this picture usually are
   double wider_variance_px2 = 0.0;  ///< of that, from the noise of the samples
-  double gain = 0.0;                ///< log-likelihood over "no edge here", of one line
-  int lines = 1;                    ///< side by side that were looked at together
+  /// Variance of its blur beyond the model's, and the inverse of the variance of that from noise.
+  double beyond_blur2_px2 = 0.0, beyond_blur2_information = 0.0;
+  double gain = 0.0;  ///< log-likelihood over "no edge here", of one line
+  int lines = 1;      ///< side by side that were looked at together
 };
 
 /// Fits one level on either side (outside a multiple of the background plate, if `plate`) and the

@@ -576,6 +576,12 @@ void Fitting::compare_widths() {
     const double seen = 1.0 / (1.0 + variance / (kScatter_px * kScatter_px));
     profiles_[i].edge.wider_px = seen * (looks_[i].blur_step - usual);
     profiles_[i].edge.wider_variance_px2 = seen * seen * variance;
+    if (!looks_[i].usable) continue;
+    // The blur that is fitted is that of each step of an edge that moves.
+    const StretchProfile& p = profiles_[i];
+    const double per_px = 2.0 * (p.steps > 0 ? p.sharp_px : p.blur_px);
+    profiles_[i].edge.beyond_blur2_px2 = per_px * looks_[i].blur_step;
+    profiles_[i].edge.beyond_blur2_information = looks_[i].blur_information / (per_px * per_px);
   }
 }
 

@@ -128,6 +128,14 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
 }
 
+std::string note_about_seen_exposure(double fraction, double frame_rate_hz) {
+  return fmt::format(
+      "how long the shutter was open is not given: by how edges in motion are smeared {:.2g} ms, "
+      "{:.0f} % of the time from picture to picture, which is allowed for; exposure_s under "
+      "[camera] replaces it",
+      1e3 * fraction / frame_rate_hz, 100.0 * fraction);
+}
+
 double usual_accepted(const BodyPath& path) {
   std::vector<double> accepted;
   for (const auto& [index, at] : path.frames) accepted.push_back(at.seen.accepted);

@@ -35,6 +35,9 @@ struct WhatWasRead {
 [[nodiscard]] std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
                                                           const data::Camera& camera);
 
+/// How long the shutter was taken to be open, for want of better knowledge.
+[[nodiscard]] std::string note_about_seen_exposure(double fraction, double frame_rate_hz);
+
 /// Fraction 0..1 of the outline with an edge exactly there, in the median frame; 0 without frames.
 [[nodiscard]] double usual_accepted(const BodyPath& path);
 

@@ -293,6 +293,30 @@ void set_sigmas(const PoseSpread& spread, PoseMeasurement& m) {
   if (across < sine && sine > kLeastSine) m.sigma_phi_rad = across / sine;
 }
 
+// Edges that move across are more blurred than those that move along themselves: by regression on
+// how far each goes from picture to picture, about their means.
+// @param step the body's motion from picture to picture.
+ExposureEvidence exposure_evidence(const Refined& refined, const data::PoseMotion::Step& step) {
+  constexpr double kScatter_px2 = 0.15;    // of the blur's variance, whatever noise says
+  constexpr double kFarthest_px2 = 0.75;   // what is more is not linear
+  constexpr double kUniform = 1.0 / 12.0;  // the variance of a smear of length 1
+  double weights = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  for (std::size_t i = 0; i < refined.equations.size(); ++i) {
+    const EdgeEquation& e = refined.equations[i];
+    const ProfileEdge& edge = refined.edges[i];
+    if (e.colour || !refined.samples[i].silhouette || !(edge.beyond_blur2_information > 0.0))
+      continue;
+    const double smear2_px2 = kUniform * std::pow(refined.samples[i].motion.dot(step), 2);
+    const double beyond_px2 = std::clamp(edge.beyond_blur2_px2, -kFarthest_px2, kFarthest_px2);
+    const double w = e.weight / (1.0 / edge.beyond_blur2_information + kScatter_px2 * kScatter_px2);
+    weights += w, x += w * smear2_px2, y += w * beyond_px2;
+    xx += w * smear2_px2 * smear2_px2, xy += w * smear2_px2 * beyond_px2;
+  }
+  const double information = weights > 0.0 ? xx - x * x / weights : 0.0;
+  if (!(information > 0.0)) return {};
+  return {(xy - x * y / weights) / information, information};
+}
+
 PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   const Refined& r = fitted.refined;
   PoseMeasurement m;
@@ -439,6 +463,9 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
   find_uncertainty(scenery, *best);
   if (!believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
+  if (moving)
+    m.exposure =
+        exposure_evidence(best->refined, motion.step_between(*view.previous, starts.front()));
   // A body on a pin has no end up: its axis is named upwards.
   if (alike || is_on_a_pin(body_, support_, m.pose)) fold(m.pose);
   const bool either = mirrors && !alike && body_.axle_above_m <= 0.0;

@@ -34,6 +34,13 @@ struct PoseSpread {
   double across_rad2 = 0.0;  ///< of the axis, at right angles to theta
 };
 
+/// What the widths of edges say of how long the shutter is open: its time over the frame interval,
+/// squared, less that of OutlineView::exposure_fraction, and the inverse of the variance of that;
+/// 0 where they do not tell.
+struct ExposureEvidence {
+  double more = 0.0, information = 0.0;
+};
+
 /// What one frame says about the pose of the body, with the covariance of what was estimated.
 struct PoseMeasurement {
   data::Pose<> pose;               ///< psi only if a mark was read
@@ -74,6 +81,7 @@ struct PoseMeasurement {
   Eigen::Array2d colour_information = Eigen::Array2d::Zero();
   /// Light beside the outline in this picture, for others.
   std::shared_ptr<const ShadingMemory> shading;
+  ExposureEvidence exposure;
   std::vector<EdgePoint> edges;
 };
 

@@ -1,0 +1,82 @@
+#include "find/open_shutter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "trochoid/data/parallel.hpp"
+
+namespace trochoid::tracking {
+namespace {
+
+/// Of the squared fraction, over all looks.
+struct Estimate {
+  double more, sd;  // the latter by how the looks differ
+};
+
+Estimate mean_of(const std::vector<ExposureEvidence>& evidence) {
+  double weights = 0.0, sum = 0.0, scatter = 0.0;
+  for (const ExposureEvidence& e : evidence)
+    weights += e.information, sum += e.information * e.more;
+  const double mean = sum / weights;
+  for (const ExposureEvidence& e : evidence)
+    scatter += std::pow(e.information * (e.more - mean), 2);
+  return {mean, std::sqrt(scatter) / weights};
+}
+
+std::optional<Estimate> evaluate(const BodyFinder& finder, const Background& background,
+                                 const std::vector<MovingLook>& looks) {
+  constexpr std::size_t kFewest = 8;
+  std::vector<ExposureEvidence> all(looks.size());
+  data::in_parallel(looks.size(), 2, [&](std::size_t i) {
+    const Frame& frame = *looks[i].frame;
+    Plate plate = background.plate();
+    plate.luma = plate.luma.clone(), plate.chroma = plate.chroma.clone();
+    background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+    Look look{.frame = frame, .background = plate};
+    look.predicted = looks[i].seen, look.last = looks[i].before;
+    look.motion_px = looks[i].seen->centre_px - looks[i].before->centre_px;
+    if (const auto seen = finder.find(look); seen && seen->pose) all[i] = seen->pose->exposure;
+  });
+  std::erase_if(all, [](const ExposureEvidence& e) { return !(e.information > 0.0); });
+  if (all.size() < kFewest) return std::nullopt;
+  return mean_of(all);
+}
+
+}  // namespace
+
+std::optional<double> find_exposure_fraction(
+    const std::function<std::unique_ptr<BodyFinder>(double)>& finder_with,
+    const Background& background, std::vector<MovingLook> looks) {
+  // A tenth of the interval smears what moves by 5 px to half a pixel, which hardly matters.
+  constexpr double kClearly = 5.0, kLeast = 0.1, kSettled = 0.005, kWithin = 0.1;
+  constexpr std::size_t kLooks = 24;
+  constexpr int kRounds = 6;
+  std::stable_sort(looks.begin(), looks.end(), [](const MovingLook& a, const MovingLook& b) {
+    return a.seen->pose->exposure.information > b.seen->pose->exposure.information;
+  });
+  if (looks.size() > kLooks) looks.resize(kLooks);
+  struct Tried {
+    double square, more;
+  };
+  Tried less{0.0, 0.0};       // than the right one
+  std::optional<Tried> much;  // more than it
+  double square = 0.0, sd = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto found = evaluate(*finder_with(std::sqrt(square)), background, looks);
+    if (!found) return std::nullopt;
+    sd = found->sd;
+    if (std::abs(found->more) < kSettled) break;
+    (found->more > 0.0 ? less : much.emplace()) = {square, found->more};
+    if (square == (found->more > 0.0 ? 1.0 : 0.0)) break;
+    // What is still missing is not told to scale: once it is between two, where it would be were it
+    // linear between them.
+    square = much ? less.square +
+                        (much->square - less.square) *
+                            std::clamp(less.more / (less.more - much->more), kWithin, 1.0 - kWithin)
+                  : std::min(1.0, square + found->more);
+  }
+  if (square < std::max(kClearly * sd, kLeast * kLeast)) return std::nullopt;
+  return std::sqrt(square);
+}
+
+}  // namespace trochoid::tracking
