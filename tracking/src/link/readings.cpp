@@ -64,6 +64,9 @@ class Readings {
       if (glimpses[i].posed())
         nodes_.push_back(
             {i, glimpses[i].frame->t_s, {*glimpses[i].seen}, rejected_attitude(glimpses[i])});
+    // Of short recordings a dozen frames: by one or two of a few nothing is told.
+    constexpr std::size_t kMostStride = 12, kLooks = 12;
+    stride_ = std::clamp<std::size_t>(nodes_.size() / kLooks, 1, kMostStride);
     if (nodes_.size() > 1) frame_s_ = data::usual_step_s(nodes_, &ReadingNode::t_s);
   }
 
@@ -180,10 +183,10 @@ class Readings {
   /// Other readings of every so many frames that score about as high.
   [[nodiscard]] std::vector<Start> others() {
     constexpr double kAsGood = -0.05;
-    std::vector<std::vector<Start>> found(nodes_.size() / kStride);
+    std::vector<std::vector<Start>> found(nodes_.size() / stride_);
     as_tracked_.resize(found.size());
     on_all_cores(background_, finder_, found.size(), [&](Measuring& measure, std::size_t i) {
-      const std::size_t k = i * kStride + kStride / 2;
+      const std::size_t k = i * stride_ + stride_ / 2;
       const auto others = finder_.other_readings(nodes_[k].pose());
       for (std::size_t which = 0; which < others.size(); ++which) {
         const auto seen = read_otherwise(measure, k, others[which]);
@@ -209,11 +212,11 @@ class Readings {
     return true;
   }
 
-  /// Of every kStride-th frame of the path that was chosen.
+  /// Of every stride-th frame of the path that was chosen.
   [[nodiscard]] ReadingTallies tallies() const {
-    std::vector<Otherwises> frames(nodes_.size() / kStride);
+    std::vector<Otherwises> frames(nodes_.size() / stride_);
     on_all_cores(background_, finder_, frames.size(), [&](Measuring& measure, std::size_t i) {
-      const std::size_t k = i * kStride + kStride / 2;
+      const std::size_t k = i * stride_ + stride_ / 2;
       if (is_as_tracked(k)) {
         frames[i] = as_tracked_[i];
         return;
@@ -380,7 +383,7 @@ class Readings {
   /// A break costs at most what five frames gain in which another reading scores a tenth higher;
   /// a leap and the way back are four breaks.
   static constexpr double kMost = 6.0;
-  static constexpr std::size_t kStride = 12;  ///< of the frames that are read otherwise
+  std::size_t stride_ = 1;  ///< of the frames that are read otherwise
 
   const Background& background_;
   const BodyFinder& finder_;
@@ -388,7 +391,7 @@ class Readings {
   bool alike_;
   double frame_s_ = 1.0;
   std::vector<ReadingNode> nodes_;
-  std::vector<Otherwises> as_tracked_;  ///< of every kStride-th frame, beside how it was tracked
+  std::vector<Otherwises> as_tracked_;  ///< of every stride-th frame, beside how it was tracked
   Miss usual_{1.0, 1.0};
   PoseChange::Centre centre_ = PoseChange::Centre::straight;  ///< how it goes on
 };
@@ -445,7 +448,8 @@ double ReadingTally::expected_square() const {
   // spread over what is hardly likely is no error bar: it would be as wide as nothing that was
   // seen.
   constexpr double kShared = 0.2, kOfOne = 0.2, kHardly = 0.02;
-  if (found == 0.0) return 0.0;
+  constexpr double kChance = 1.0;  // frames
+  if (found <= kChance) return 0.0;
   const double sd = std::sqrt(kShared * kShared + kOfOne * kOfOne / found);
   const double likely =
       found / looked_at * 0.5 * std::erfc(-log_score_ratio / found / (sd * std::numbers::sqrt2));
