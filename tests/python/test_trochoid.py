@@ -256,6 +256,8 @@ class Fit(unittest.TestCase):
         of_track = trochoid.fit(trochoid.Track(run["t_s"], np.column_stack([run["x_m"], run["y_m"]])),
                                 model="top")
         self.assertEqual(of_run["l_m"].value, of_track["l_m"].value)
+        exact = trochoid.fit(trochoid.simulate("thesis-base", until_s=20), model="top")
+        self.assertIn(exact.verdict, ("good", "good_correlated"), exact.verdict_words)
         self.assertLess(len(repr(run)), 100)
 
     def test_the_motion_a_fit_found_is_simulated_beyond_its_track(self):

@@ -57,9 +57,21 @@ MissedEnd worst_missed_end(const Problem& problem, const Eigen::VectorXd& u, Gli
   return worst;
 }
 
+// A path that was simulated: what a fit leaves of it is rounding and the errors of integration,
+// which drift.
+bool is_exact(const ArcData& arc) {
+  constexpr double kRounding = 1e-9;
+  if (!arc.sigma_unknown || arc.observables[0] != model::Observable::x_m) return false;
+  const Eigen::MatrixX2d at_m = arc.positions_m();
+  const double extent_m = (at_m.colwise().maxCoeff() - at_m.colwise().minCoeff()).norm();
+  const double noise_m = noise_scale(arc, Channel::position) / arc.readings.front().whitener(0, 0);
+  return noise_m < kRounding * extent_m;
+}
+
 void doubt_if_drifting(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6, kNotWhite = 0.01;
   const Drift& drift = error.drift;
+  if (std::all_of(problem.arcs.begin(), problem.arcs.end(), is_exact)) return;
   if (!says_explained(fit) || error.whiteness.p_value > kNotWhite) return;
   if (chi2_upper_tail(drift.gain * drift.parameters, drift.parameters) > kByChance) return;
   if (is_tracked(problem) && drift.gain < kOfATracker) return;
