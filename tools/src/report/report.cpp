@@ -175,9 +175,12 @@ std::string correlation_table(const data::Fit& fit) {
                               size, kStrong)
                 : "<ul>" + list + "</ul>");
   }
-  html += "<div class=\"scroll\"><table class=\"matrix\"><tbody>";
+  html += "<div class=\"scroll\"><table class=\"matrix\"><thead><tr><th></th>";
+  for (Eigen::Index i = 0; i < size; ++i)
+    html += fmt::format("<th class=\"number\">{}</th>", i + 1);
+  html += "</tr></thead><tbody>";
   for (Eigen::Index i = 0; i < size; ++i) {
-    html += fmt::format("<tr><th><code>{}</code></th>", name(i));
+    html += fmt::format("<tr><th>{} <code>{}</code></th>", i + 1, name(i));
     for (Eigen::Index k = 0; k <= i; ++k) {
       const double value = correlation(i, k);
       html += i == k ? std::string("<td>1</td>")
