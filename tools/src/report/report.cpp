@@ -61,13 +61,14 @@ std::string verdict_section(const Verdict& verdict) {
 
 std::string picture_section(const ReportFacts& facts) {
   std::string html = "<section><div class=\"pair\">";
+  const bool both = facts.input.fit.has_value();
   if (facts.input.video)
     html += fmt::format(
-        "<figure class=\"noprint\"><h2>Recording with both paths</h2><video controls loop muted "
+        "<figure class=\"noprint\"><h2>Recording with {}</h2><video controls loop muted "
         "playsinline preload=\"auto\" src=\"data:video/mp4;base64,{}\"></video>"
-        "<figcaption>Click in any plot to see that moment. Blue: observed. Orange: "
-        "predicted.</figcaption></figure>",
-        base64(bytes_of(*facts.input.video)));
+        "<figcaption>Click in any plot to see that moment. Blue: observed.{}</figcaption></figure>",
+        both ? "both paths" : "its path", base64(bytes_of(*facts.input.video)),
+        both ? " Orange: predicted." : "");
   html += fmt::format(
       "<figure><h2>Path of the centre of mass from above</h2>{}</figure></div></section>\n",
       path_figure(facts));
@@ -293,7 +294,7 @@ std::string quality_section(const ReportFacts& facts) {
   if (std::isfinite(facts.median_sigma_m))
     entry("error of a position", fmt::format("{:.3g} mm per axis (median, as the tracker states)",
                                              facts.median_sigma_m * 1000.0));
-  if (std::isfinite(facts.rms_axis_sigma))
+  if (facts.input.fit && std::isfinite(facts.rms_axis_sigma))
     entry("normalised error",
           fmt::format("{:.3f} (residual rms over stated sigma; 1 when both are right)",
                       facts.rms_axis_sigma));
@@ -361,7 +362,7 @@ std::string origin_section(const ReportInput& input) {
   for (const auto& [name, digest] : checksums)
     row(name, digest.empty() ? "no checksum" : "sha256 " + digest);
   for (const auto& [stage, seconds] : input.times_s)
-    row("time to " + stage, fmt::format("{:.2f} s", seconds));
+    if (stage != "fit" || input.fit) row("time to " + stage, fmt::format("{:.2f} s", seconds));
   html += "</tbody></table></div>";
   if (input.scene)
     html += fmt::format(
