@@ -134,7 +134,9 @@ class LibavSource final : public FrameSource {
     series_ = find_image_sequence(path);
     if (series_ && !options_.frame_rate_hz) options_.frame_rate_hz = options_.untimed_rate_hz;
     if (series_ && !options_.frame_rate_hz)
-      fail("an image sequence carries no times; give its rate (rate, or camera.frame_rate_hz)");
+      fail(
+          "an image sequence carries no times; give its rate, frame_rate_hz under [camera] or as "
+          "an option");
     const fs::path& file = series_ ? series_->pictures.front() : path;
     if (!fs::exists(file)) fail("no such file");
     if (fs::is_regular_file(file) && fs::file_size(file) == 0)
@@ -328,7 +330,7 @@ class LibavSource final : public FrameSource {
       return static_cast<double>(stamp - first_stamp_) * av_q2d(stream_->time_base);
     const double rate_hz = options_.frame_rate_hz.value_or(info_.frame_rate_hz);
     if (!(rate_hz > 0.0))
-      fail("carries no time stamps; give its rate (rate, or camera.frame_rate_hz)");
+      fail("carries no time stamps; give its rate, frame_rate_hz under [camera] or as an option");
     return static_cast<double>(place_) / rate_hz;
   }
 
@@ -338,8 +340,8 @@ class LibavSource final : public FrameSource {
     if (!options_.apart_in_time || frame.t_s > before_s) return;
     fail(
         fmt::format("frame {} is shown at {:g} s and the one before it at {:g} s: the container's "
-                    "clock is too coarse, or its stamps are wrong; give the true rate (--rate, or "
-                    "camera.frame_rate_hz)",
+                    "clock is too coarse, or its stamps are wrong; give the true rate, "
+                    "frame_rate_hz under [camera] or as an option",
                     frame.index, frame.t_s, before_s));
   }
 
