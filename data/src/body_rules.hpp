@@ -19,9 +19,8 @@ struct BodyFault {
 };
 
 /// Sizes that contradict each other, whatever file they come from: a ring without a bore, a bore
-/// larger than the rim, a border outside of the
-/// face, an axle as wide as the body, a mark beyond the rim or in the bore. A top
-/// has no shape.
+/// larger than the rim, a border outside of the face, an axle as wide as the body, a mark beyond
+/// the rim or in the bore. A top has no shape.
 [[nodiscard]] std::optional<BodyFault> fault_of(const Body& body, const BodyKeys& keys);
 
 }  // namespace trochoid::data

@@ -317,6 +317,8 @@ class Fit(unittest.TestCase):
         masked = noisy_track()
         masked.centre_m = np.ma.masked_array(masked.centre_m, mask=np.isnan(track.centre_m))
         self.assertEqual(trochoid.fit(masked, model="top")["l_m"].value, fit["l_m"].value)
+        self.assertEqual(masked, track)
+        self.assertNotEqual(masked, noisy_track())
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "nan.csv"
             np.savetxt(path, np.column_stack([track.t_s, track.centre_m]), delimiter=",",

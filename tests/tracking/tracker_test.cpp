@@ -152,19 +152,19 @@ TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
 }
 
 /// What the notes of a track say of how long the shutter was open [%]; 0: nothing. The disc slides
-/// by 7 px from picture to picture, drawn as the mean of many places over part of that.
-double told_exposure_percent(double exposure_fraction) {
-  constexpr double kStep_px = 7.0;
-  constexpr int kMoments = 16;
+/// so far from picture to picture, drawn as the mean of many places over part of that.
+double told_exposure_percent(double exposure_fraction, double step_px) {
+  constexpr int kMoments = 24, kFrames = 44, kHeight = 110;
+  const int width = 90 + static_cast<int>(kFrames * step_px);
   const ScratchFolder folder("shutter");
-  write_clip(folder / "clip.mkv", drawn_floor(400, 110, 170.0), 44, 1.0,
+  write_clip(folder / "clip.mkv", drawn_floor(width, kHeight, 170.0), kFrames, 1.0,
              [&](cv::Mat& picture, int i) {
                const cv::Mat floor = picture.clone();
                picture = cv::Mat::zeros(floor.size(), CV_64F);
                for (int k = 0; k < kMoments; ++k) {
                  cv::Mat moment = floor.clone();
                  const double share = exposure_fraction * ((k + 0.5) / kMoments - 0.5);
-                 draw_disc(moment, 40.0 + kStep_px * (i + share), 55.0, 24.0, 24.0, 0.0, 60.0);
+                 draw_disc(moment, 40.0 + step_px * (i + share), 55.0, 24.0, 24.0, 0.0, 60.0);
                  picture += moment / kMoments;
                }
              });
@@ -172,7 +172,7 @@ double told_exposure_percent(double exposure_fraction) {
   scene.body.emplace();
   scene.body->radius_m = 0.024, scene.body->thickness_m = 0.001;
   scene.support.kind = data::SupportKind::flat;
-  data::Camera camera = data::Camera::from_scale(400, 110, 1000.0);
+  data::Camera camera = data::Camera::from_scale(width, kHeight, 1000.0);
   camera.transfer = data::Transfer::linear;
   const std::string says = "edges in motion are smeared ";
   for (const std::string& note : track_video(folder / "clip.mkv", scene, camera).file.notes)
@@ -181,11 +181,11 @@ double told_exposure_percent(double exposure_fraction) {
   return 0.0;
 }
 
-// Of edges smeared by 3 and 5 px that is known to a tenth.
+// By edges smeared by 3 and 5 px that is known to a tenth.
 TEST(TrackVideo, TheSmearOfMovingEdgesTellsHowLongTheShutterWasOpen) {
-  EXPECT_NEAR(told_exposure_percent(0.4), 40.0, 4.0);
-  EXPECT_NEAR(told_exposure_percent(0.7), 70.0, 7.0);
-  EXPECT_EQ(told_exposure_percent(0.0), 0.0);
+  EXPECT_NEAR(told_exposure_percent(0.4, 7.0), 40.0, 4.0);
+  EXPECT_NEAR(told_exposure_percent(0.7, 7.0), 70.0, 7.0);
+  EXPECT_EQ(told_exposure_percent(0.0, 7.0), 0.0);
 }
 
 /// A disc that moves down and to the right.

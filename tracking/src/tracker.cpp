@@ -198,7 +198,7 @@ class Tracking {
 
   /// Of the first body: frames of the window in which it is well seen, as in the frame before.
   [[nodiscard]] std::vector<MovingLook> moving_looks() const {
-    constexpr double kWell = 0.5;
+    constexpr double kWell = 0.3;
     const auto& frames = paths_.front().frames;
     const auto well_seen = [&](std::int64_t index) -> const Sighting* {
       const auto at = frames.find(index);
@@ -214,20 +214,41 @@ class Tracking {
     return looks;
   }
 
-  /// Follows the bodies of the window once more, knowing how long the shutter is open; as they were
-  /// if that finds fewer.
+  /// Follows the bodies of the window once more, each from where it is seen best, knowing how long
+  /// the shutter is open; as they were if one is then seen in clearly fewer frames.
   void follow_anew() {
+    constexpr double kFewer = 0.95;
     auto finder = std::exchange(finder_, cylinder_finder(*seen_exposure_));
     auto paths = std::exchange(paths_, {});
     auto followers = std::exchange(followers_, {});
     explained_.assign(recording_.window().size(), {});
-    while (bodies_missing() && follow_next_body()) {
+    for (const BodyPath& path : paths) {
+      Followed found = follow_from(best_seen(path));
+      if (static_cast<double>(found.path.frames.size()) <
+          kFewer * static_cast<double>(path.frames.size())) {
+        paths_ = std::move(paths);
+        followers_ = std::move(followers);  // which refer to that finder
+        finder_ = std::move(finder);
+        seen_exposure_.reset();
+        return;
+      }
+      explain(found.path);
+      add(std::move(found));
     }
-    if (paths_.size() >= paths.size()) return;
-    paths_ = std::move(paths);
-    followers_ = std::move(followers);  // which refer to that finder
-    finder_ = std::move(finder);
-    seen_exposure_.reset();
+  }
+
+  /// @param path of the window, with a pose.
+  [[nodiscard]] Seed best_seen(const BodyPath& path) const {
+    Seed seed;
+    double best_px = -1.0;
+    const auto& window = recording_.window();
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      const auto at = path.frames.find(window[i].index);
+      if (at == path.frames.end() || !at->second.seen.pose) continue;
+      const double support_px = at->second.seen.visible_support_px();
+      if (support_px > best_px) best_px = support_px, seed = {i, at->second.seen};
+    }
+    return seed;
   }
 
   /// Where the bodies are in a frame, with their size.
@@ -584,8 +605,8 @@ class Tracking {
     std::vector<DoubtfulLook> some;
     for (std::size_t k = 0; k < kLooks; ++k)
       some.push_back(looks[(2 * k + 1) * looks.size() / (2 * kLooks)]);
-    const auto border = likely_border(*scene_.body, scene_.support, *camera_, background_.plate(),
-                                      some, options_.checkpoint);
+    const auto border = likely_border(*scene_.body, scene_.support, *camera_, background_, some,
+                                      options_.checkpoint);
     return border ? std::optional(note_about_likely_border(seen, *border)) : std::nullopt;
   }
 

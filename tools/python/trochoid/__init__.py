@@ -87,6 +87,13 @@ def _outputs(inputs: Sequence[Any], **named: Optional[Path]) -> list[Optional[st
     return paths
 
 
+def _unmasked(name: str, value: Any) -> Any:
+    """What is masked is unknown: NaN, of frames -1."""
+    if not np.ma.isMaskedArray(value):
+        return value
+    return np.ma.filled(value, -1) if name == "frame" else np.ma.filled(value.astype(float), np.nan)
+
+
 def _unknown(value: Any) -> bool:
     """None, or an array of nothing but NaN or, of frames, -1: what a file does not hold."""
     if not isinstance(value, np.ndarray):
@@ -110,7 +117,8 @@ class _Record:
         if type(other) is not type(self):
             return NotImplemented
         names = [field.name for field in dataclasses.fields(self)]
-        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+        return all(_same(_unmasked(name, getattr(self, name)), _unmasked(name, getattr(other, name)))
+                   for name in names)
 
 
 def _toml_text(text: str) -> str:
@@ -161,7 +169,7 @@ class Scene:
     ``Scene("ring.toml")``, ``Scene("thesis-base")``, ``Scene({"body": {"radius_m": 0.03}})``.
     """
 
-    __slots__ = ("_value",)
+    __slots__ = ("_value", "__weakref__")
 
     def __init__(self, scene: Union[None, Path, Mapping, "Scene"] = None):
         if scene is None:
@@ -267,8 +275,7 @@ class TrackFile(_Record):
 def _track_dict(track: Track) -> dict[str, Any]:
     if not isinstance(track, Track):
         raise _wrong("track", track, "a Track")
-    arrays = {name: np.ma.filled(value.astype(float), np.nan) if np.ma.isMaskedArray(value) else value
-              for name, value in vars(track).items()}
+    arrays = {name: _unmasked(name, value) for name, value in vars(track).items()}
     return {**arrays, "object": _whole("object", track.object)}
 
 

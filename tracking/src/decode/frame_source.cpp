@@ -417,8 +417,9 @@ class LibavSource final : public FrameSource {
   void check_length() const {
     const double rate_hz = av_q2d(stream_->avg_frame_rate);
     if (info_.frames != 0 || first_stamp_ == AV_NOPTS_VALUE || !(rate_hz > 0.0)) return;
-    const double length_s = promised_length_s();
-    if (length_s == 0.0) return;
+    const std::optional<double> promised_s = promised_length_s();
+    if (!promised_s) return;
+    const double length_s = *promised_s;
     const double read_s =
         static_cast<double>(last_stamp_ - first_stamp_) * av_q2d(stream_->time_base);
     const double forgiven_s = std::max(3.0 / rate_hz, 0.02 * length_s);
@@ -428,18 +429,22 @@ class LibavSource final : public FrameSource {
           length_s));
   }
 
-  /// Of the pictures from the first on, as the container tells it; 0 where it does not. With sound
-  /// beside them its whole length may be the sound's, but the pictures may have a tag of theirs
-  /// that says when they end.
-  [[nodiscard]] double promised_length_s() const {
-    const AVDictionaryEntry* tag = av_dict_get(stream_->metadata, "DURATION", nullptr, 0);
+  /// Of the pictures from the first on, as the container tells it, if it does. With sound beside
+  /// them its whole length may be the sound's, but in Matroska the pictures have a tag of theirs
+  /// that says when they end. (Copied into other containers it tells of the file it came from.)
+  [[nodiscard]] std::optional<double> promised_length_s() const {
+    const bool matroska =
+        std::string_view(container_->iformat->name).find("matroska") != std::string_view::npos;
+    const AVDictionaryEntry* tag =
+        matroska ? av_dict_get(stream_->metadata, "DURATION", nullptr, 0) : nullptr;
     std::int64_t end_us = 0;
     if (tag != nullptr && av_parse_time(&end_us, tag->value, 1) >= 0)
       return static_cast<double>(end_us) / AV_TIME_BASE -
              static_cast<double>(first_stamp_) * av_q2d(stream_->time_base);
     const bool known = container_->nb_streams == 1 && container_->duration != AV_NOPTS_VALUE &&
                        container_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM;
-    return known ? static_cast<double>(container_->duration) / AV_TIME_BASE : 0.0;
+    if (!known) return std::nullopt;
+    return static_cast<double>(container_->duration) / AV_TIME_BASE;
   }
 
   /// Whoever asks for a part of a recording wants some of it.

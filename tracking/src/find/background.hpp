@@ -74,6 +74,12 @@ class Background {
   [[nodiscard]] double gain(const cv::Mat& luma) const;
   /// gain x plate within `box`, into a plate of the full size (pixels outside are left alone).
   void scaled_into(Plate& plate, double gain, const cv::Rect& box) const;
+  /// All of the plate at the brightness of a frame.
+  [[nodiscard]] Plate plate_of(const cv::Mat& luma) const {
+    Plate plate;
+    scaled_into(plate, gain(luma), cv::Rect({}, luma.size()));
+    return plate;
+  }
 
  private:
   static Background estimated(const BackgroundSamples& samples);

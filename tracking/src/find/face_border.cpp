@@ -21,7 +21,8 @@ Detection detection_of(const Ellipse& rim) {
 }
 
 // How well a body is seen, from what it was taken for or from afar, whichever is better [px].
-double support_px(const BodyFinder& finder, const Plate& background, const DoubtfulLook& look) {
+double support_px(const BodyFinder& finder, const Background& of_all, const DoubtfulLook& look) {
+  const Plate background = of_all.plate_of(look.frame->luma);
   Look near{.frame = *look.frame, .background = background, .predicted = look.seen};
   Look afar{.frame = *look.frame, .background = background};
   afar.detection = detection_of(look.seen->rim);
@@ -35,7 +36,7 @@ double support_px(const BodyFinder& finder, const Plate& background, const Doubt
 }  // namespace
 
 std::optional<double> likely_border(const data::Body& body, const data::Support& support,
-                                    const data::Camera& camera, const Plate& background,
+                                    const data::Camera& camera, const Background& background,
                                     const std::vector<DoubtfulLook>& looks,
                                     const std::function<void()>& checkpoint) {
   // Wider ones are not taken for the outline, narrower ones not told from it. Filmed bodies with a
@@ -55,6 +56,7 @@ std::optional<double> likely_border(const data::Body& body, const data::Support&
     return sum_px;
   };
   double most_px = kClearly * support_with(0.0);
+  if (most_px == 0.0) return std::nullopt;
   std::optional<double> likely;
   const double widest_px =
       std::min(kWidestPx, kWidestShare * radius_px * (1.0 - body.inner_radius_m / body.radius_m));

@@ -21,7 +21,7 @@ struct DoubtfulLook {
 [[nodiscard]] std::optional<double> likely_border(const data::Body& body,
                                                   const data::Support& support,
                                                   const data::Camera& camera,
-                                                  const Plate& background,
+                                                  const Background& background,
                                                   const std::vector<DoubtfulLook>& looks,
                                                   const std::function<void()>& checkpoint);
 

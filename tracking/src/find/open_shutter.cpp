@@ -29,9 +29,7 @@ std::optional<Estimate> evaluate(const BodyFinder& finder, const Background& bac
   std::vector<ExposureEvidence> all(looks.size());
   data::in_parallel(looks.size(), 2, [&](std::size_t i) {
     const Frame& frame = *looks[i].frame;
-    Plate plate = background.plate();
-    plate.luma = plate.luma.clone(), plate.chroma = plate.chroma.clone();
-    background.scaled_into(plate, background.gain(frame.luma), cv::Rect({}, frame.luma.size()));
+    const Plate plate = background.plate_of(frame.luma);
     Look look{.frame = frame, .background = plate};
     look.predicted = looks[i].seen, look.last = looks[i].before;
     look.motion_px = looks[i].seen->centre_px - looks[i].before->centre_px;
@@ -49,8 +47,8 @@ std::optional<double> find_exposure_fraction(
     const Background& background, std::vector<MovingLook> looks) {
   // A tenth of the interval smears what moves by 5 px to half a pixel, which hardly matters.
   constexpr double kClearly = 5.0, kLeast = 0.1, kSettled = 0.005, kWithin = 0.1;
-  constexpr std::size_t kLooks = 24;
-  constexpr int kRounds = 6;
+  constexpr std::size_t kLooks = 16;
+  constexpr int kRounds = 9;
   std::stable_sort(looks.begin(), looks.end(), [](const MovingLook& a, const MovingLook& b) {
     return a.seen->pose->exposure.information > b.seen->pose->exposure.information;
   });
@@ -60,23 +58,28 @@ std::optional<double> find_exposure_fraction(
   };
   Tried less{0.0, 0.0};       // than the right one
   std::optional<Tried> much;  // more than it
-  double square = 0.0, sd = 0.0;
+  double square = 0.0, stride = 1.0;
   for (int round = 0; round < kRounds; ++round) {
     const auto found = evaluate(*finder_with(std::sqrt(square)), background, looks);
     if (!found) return std::nullopt;
-    sd = found->sd;
-    if (std::abs(found->more) < kSettled) break;
+    const bool settled = std::abs(found->more) < kSettled ||
+                         (much && much->square - less.square < kSettled) ||
+                         (square == 1.0 && found->more > 0.0);
+    if (settled)
+      return square < std::max(kClearly * found->sd, kLeast * kLeast)
+                 ? std::nullopt
+                 : std::optional(std::sqrt(square));
+    if (square == 0.0 && found->more < 0.0) return std::nullopt;
     (found->more > 0.0 ? less : much.emplace()) = {square, found->more};
-    if (square == (found->more > 0.0 ? 1.0 : 0.0)) break;
-    // What is still missing is not told to scale: once it is between two, where it would be were it
-    // linear between them.
+    // What is missing is not told to scale, far too little where edges are smeared by several
+    // pixels: longer and longer strides lead beyond it, and from there the line between the two.
     square = much ? less.square +
                         (much->square - less.square) *
                             std::clamp(less.more / (less.more - much->more), kWithin, 1.0 - kWithin)
-                  : std::min(1.0, square + found->more);
+                  : std::min(1.0, square + stride * found->more);
+    stride *= 2.0;
   }
-  if (square < std::max(kClearly * sd, kLeast * kLeast)) return std::nullopt;
-  return std::sqrt(square);
+  return std::nullopt;
 }
 
 }  // namespace trochoid::tracking

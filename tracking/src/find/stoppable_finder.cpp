@@ -37,6 +37,9 @@ class StoppableFinder final : public BodyFinder {
   [[nodiscard]] double expected_major_px(const Eigen::Vector2d& at_px) const override {
     return finder_.expected_major_px(at_px);
   }
+  [[nodiscard]] double reach_px(const Sighting& seen) const override {
+    return finder_.reach_px(seen);
+  }
   [[nodiscard]] bool faces_look_alike() const override { return finder_.faces_look_alike(); }
   [[nodiscard]] double mark_rad() const override { return finder_.mark_rad(); }
 

@@ -130,7 +130,8 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
 
 std::string note_about_seen_exposure(double fraction, double frame_rate_hz) {
   return fmt::format(
-      "how long the shutter was open is not given: by how edges in motion are smeared {:.2g} ms, "
+      "how long the shutter was open is not given: by how edges in motion are smeared about {:.2g} "
+      "ms, "
       "{:.0f} % of the time from picture to picture, which is allowed for; exposure_s under "
       "[camera] replaces it",
       1e3 * fraction / frame_rate_hz, 100.0 * fraction);

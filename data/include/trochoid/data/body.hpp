@@ -26,7 +26,7 @@ struct Body {
   double inner_radius_m = 0.0;  ///< bore of a ring, 0 <= inner <= radius (equal: a thin hoop)
   double thickness_m = 0.0;     ///< >= 0
   /// Where a border of another look begins on the faces (a coin's raised rim, a ring of print),
-  /// inner_radius_m < border <= radius_m; 0 = none. Physics does not know it.
+  /// inner_radius_m < border < radius_m; 0 = none. Physics does not know it.
   double border_radius_m = 0.0;
   double axle_radius_m = 0.0;  ///< thin axle along k (tops), 0 = none
   double axle_above_m = 0.0;   ///< how far the axle sticks out of the upper face
