@@ -11,6 +11,14 @@ namespace trochoid::tracking {
 /// Whether an edge borders the bore of a ring rather than its outside.
 [[nodiscard]] bool is_bore(data::OutlinePoint::Edge edge);
 
+/// Whether a point of an outline tells the body from what is not: on its silhouette, or on a border
+/// of its face, which may be the clearer.
+/// @param point an OutlineSample or a data::OutlinePoint.
+template <class Point>
+[[nodiscard]] bool tells_outline(const Point& point) {
+  return point.silhouette || point.edge == data::OutlinePoint::Edge::border;
+}
+
 /// A point of the predicted outline with what a fit needs to know about it.
 struct OutlineSample {
   data::OutlinePoint::Edge edge;

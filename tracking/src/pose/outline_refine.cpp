@@ -127,11 +127,6 @@ void keep(const OutlineSample& sample, const ProfileEdge& edge, const EdgeEquati
   out.equations.push_back(equation);
 }
 
-// Where a body is told from what is not: at its silhouette, or at a border that may be the clearer.
-bool tells_outline(const OutlineSample& sample) {
-  return sample.silhouette || sample.edge == Edge::border;
-}
-
 constexpr double kSmoothPx = 2.0;  // closer samples of an outline are as well interpolated
 
 // What one round looked at.

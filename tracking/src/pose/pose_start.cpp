@@ -70,7 +70,7 @@ std::vector<CellPoint> silhouette_cells(const SilhouetteSearch& search, const da
   const Eigen::Vector2d centre = search.camera.image_from_table<double>(pose.centre_m);
   const double step_px = data::kTurn * search.radius_px / kPoints;
   for (const auto& p : data::visible_outline(search.body, pose, search.camera, step_px)) {
-    if (!p.silhouette && p.edge != data::OutlinePoint::Edge::border) continue;
+    if (!tells_outline(p)) continue;
     const Eigen::Vector2d off = (p.image_px - centre) / search.map.cell_px();
     cells.push_back({static_cast<int>(std::lround(off.x())), static_cast<int>(std::lround(off.y())),
                      EdgeMap::direction_of(p.normal_px.x(), p.normal_px.y())});
