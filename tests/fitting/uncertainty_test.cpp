@@ -255,6 +255,31 @@ TEST(SeveralRecordings, HaveEachItsOwnNoiseWhateverTheyState) {
   EXPECT_LT(pull(both, "l_m", 0.1), kFar);
 }
 
+// Four in five samples that state ten times too much pulled the noise of all below a tenth of what
+// the fifth state rightly, and the fit, which leans on these, was too sure by more than five times.
+TEST(OverstatedNoise, OfManySamplesDoesNotMakeTheOthersErrorBarsSmall) {
+  constexpr double kNoise_m = 1e-3, kOverstated = 10.0;
+  const data::Track honest = thesis_track(25.0, kNoise_m, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::Fit full = fit(std::span(&honest, 1), scene);
+  data::Track along = honest, everywhere = honest;
+  for (std::size_t i = 0; i < honest.samples.size(); ++i) {
+    if (i % 5 == 0) continue;
+    along.samples[i].covariance_m2(0, 0) *= kOverstated * kOverstated;
+    everywhere.samples[i].covariance_m2 *= kOverstated * kOverstated;
+  }
+  // The scale is known from some fifty samples: 7 %, of which 20 % is three times as much.
+  const data::Fit fifth = fit(std::span(&everywhere, 1), scene);
+  EXPECT_NEAR(fifth.noise_scale, 1.0, 0.2);
+  EXPECT_GT(fifth.find("l_m")->sigma, 1.7 * full.find("l_m")->sigma);
+  EXPECT_LT(pull(fifth, "l_m", 0.1), kFar);
+  // Of every sample at least one coordinate is known as stated.
+  const data::Fit across = fit(std::span(&along, 1), scene);
+  EXPECT_NEAR(across.noise_scale, 1.0, 0.15);
+  EXPECT_LT(pull(across, "l_m", 0.1), kFar);
+}
+
 TEST(SeveralRecordings, ThatDoNotShareWhatTheyShouldAreDoubtfulAndToldApart) {
   std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),
                                   thesis_track(25.0, 1e-3, 13)};

@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
 
-#include "observe/smoothing.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/angle.hpp"
 
@@ -42,11 +42,48 @@ bool tells_noise(const ArcData& arc, Channel channel) {
   return !arc.sigma_unknown || channel != Channel::position;
 }
 
+// The residual of one reading and what it counts for in the scale of their noise.
+struct Length {
+  double value = 0.0;  // 1 is expected of each coordinate
+  double weight = 1.0;
+};
+
 // Of the residuals of a channel in one recording, or in all that tell their noise.
 struct Lengths {
-  std::vector<double> values;
-  double used = 0.0;  // degrees of freedom that the parameters take of them
+  std::vector<Length> alike;     // each counts as much as any other
+  std::vector<Length> by_worth;  // each counts by its inverse variance
+  double used = 0.0;             // degrees of freedom that the parameters take of them
 };
+
+// A position may be doubted along one direction only: what it scatters by along the other counts.
+Length weighed(const Reading& reading, const Eigen::VectorXd& residuals) {
+  if (reading.channel != Channel::position)
+    return {std::abs(residuals[reading.row]), reading.whitener(0, 0) * reading.whitener(0, 0)};
+  const double size = reading.whitener.norm() * std::numbers::sqrt2 / 2.0;
+  if (!(size > 0.0)) return {0.0, 0.0};
+  return {(reading.whitener * residuals.segment<2>(reading.row)).norm() / size, size * size};
+}
+
+double weighted_median(std::vector<Length> lengths) {
+  std::sort(lengths.begin(), lengths.end(),
+            [](const Length& a, const Length& b) { return a.value < b.value; });
+  double half = 0.0;
+  for (const Length& length : lengths) half += 0.5 * length.weight;
+  for (const Length& length : lengths)
+    if ((half -= length.weight) <= 0.0) return length.value;
+  return 0.0;
+}
+
+// No reading counts for more than that which a tenth of them, ten at least, are better than.
+void cap_weights(std::vector<Length>& lengths) {
+  constexpr std::size_t kLeast = 10;
+  std::vector<double> best;
+  for (const Length& length : lengths) best.push_back(length.weight);
+  std::sort(best.begin(), best.end(), std::greater<>());
+  if (best.empty()) return;
+  const double most = best[std::min(std::max(kLeast, best.size() / 10), best.size() - 1)];
+  for (Length& length : lengths) length.weight = std::min(length.weight, most);
+}
 
 // What one recording alone determines is its own; what is common takes of each by its share.
 Lengths lengths_of(const Problem& problem, const RawResiduals& raw, Channel channel, int track) {
@@ -61,7 +98,8 @@ Lengths lengths_of(const Problem& problem, const RawResiduals& raw, Channel chan
     if (!among(data)) continue;
     for (const Reading& reading : data.readings) {
       if (reading.channel != channel) continue;
-      lengths.values.push_back(length(reading, raw.per_arc[arc]));
+      lengths.alike.push_back({length(reading, raw.per_arc[arc]), 1.0});
+      lengths.by_worth.push_back(weighed(reading, raw.per_arc[arc]));
       of_channel[data.track] += rows_of(channel);
     }
   }
@@ -71,6 +109,7 @@ Lengths lengths_of(const Problem& problem, const RawResiduals& raw, Channel chan
       own += parameter.arc >= 0 && problem.arcs[parameter.arc].track == of;
     lengths.used += own * count / rows[of] + problem.shared_count() * count / problem.rows();
   }
+  cap_weights(lengths.by_worth);
   return lengths;
 }
 
@@ -79,20 +118,17 @@ struct Scale {
   double dof = 0.0;  // that it is known from
 };
 
-// Scale from the weighted squares of the inliers, nothing where too few are read; robust start from
-// the median.
-std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
-  const std::vector<double>& values = lengths.values;
-  if (values.size() < 5) return std::nullopt;
+// Scale from the weighted squares of the inliers; robust start from the median.
+Scale scale_of(const std::vector<Length>& lengths, double used, bool planar) {
+  const double width = planar ? 2.0 : 1.0;
   // Median of |N(0,1)| is 0.6745, of the Rayleigh distribution 1.1774.
-  double scale = median_or_zero(values) / (planar ? 1.1774 : 0.6745);
+  double scale = weighted_median(lengths) / (planar ? 1.1774 : 0.6745);
   for (int round = 0; round < 5; ++round) {
-    double squares = 0.0;
-    int inliers = 0;
-    for (const double d : values)
-      if (d <= kInlier * scale) {
-        squares += d * d;
-        ++inliers;
+    double squares = 0.0, inliers = 0.0;
+    for (const Length& d : lengths)
+      if (d.value <= kInlier * scale) {
+        squares += d.weight * d.value * d.value;
+        inliers += d.weight;
       }
     // Variance of what lies within kInlier sigmas.
     constexpr double kHalfSquare = 0.5 * kInlier * kInlier;
@@ -101,11 +137,26 @@ std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
         planar ? 2.0 * (1.0 - beyond * (1.0 + kHalfSquare)) / (1.0 - beyond)
                : 1.0 - 2.0 * kInlier * beyond /
                            (std::sqrt(2.0 * data::kPi) * std::erf(kInlier / std::numbers::sqrt2));
-    scale = std::sqrt(squares / std::max(1.0, kept * inliers));
+    scale = inliers > 0.0 ? std::sqrt(squares / (kept * inliers)) : 0.0;
   }
-  const double rows = static_cast<double>(values.size()) * (planar ? 2.0 : 1.0);
-  const double dof = std::max(1.0, rows - lengths.used);
-  return Scale{std::max(scale * std::sqrt(rows / dof), 1e-12), dof};
+  double sum = 0.0, squares = 0.0;
+  for (const Length& d : lengths) sum += d.weight, squares += d.weight * d.weight;
+  const double rows = width * static_cast<double>(lengths.size());
+  const double left = 1.0 - std::min(used, rows - 1.0) / rows;
+  const double dof = std::max(1.0, width * sum * sum / squares * left);
+  return {std::max(scale / std::sqrt(left), 1e-12), dof};
+}
+
+// Nothing where too few are read. A fit leans on its readings by their inverse variances: those
+// known to be vague, which lie far nearer than they state, do not make the error bars of the others
+// smaller.
+std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
+  if (lengths.alike.size() < 5) return std::nullopt;
+  const Scale alike = scale_of(lengths.alike, lengths.used, planar);
+  if (alike.value >= 1.0) return alike;
+  Scale best = scale_of(lengths.by_worth, lengths.used, planar);
+  best.value = std::clamp(best.value, alike.value, 1.0);
+  return best;
 }
 
 // Trackers misjudge their noise alike in recordings that are alike: what the others say counts as
