@@ -42,6 +42,23 @@ Rung rung_of(std::set<int> terms, std::vector<data::FitParameter> parameters, do
   return rung;
 }
 
+// About an upright body each set of losses names its own face; half a turn of phi and twice the
+// spin were taken for what it had moved, and the error bars were thousands of times too wide.
+TEST(Rivals, ThatNameTheOtherFaceOfAnUprightBodyAreTheSameMotion) {
+  const auto standing = [](double theta, double phi, double w1, double w3) {
+    std::vector<data::FitParameter> all{loss("theta_rad", theta, 1e-3), loss("phi_rad", phi, 1e-3),
+                                        loss("w1_rad_s", w1, 0.01), loss("w3_rad_s", w3, 0.005)};
+    all[0].unit = all[1].unit = "rad";
+    return all;
+  };
+  Rung chosen = rung_of({1}, standing(1.569, 0.3, 0.4, -22.0), 100.0, 100.0);
+  const Rungs rungs{chosen,
+                    rung_of({2}, standing(M_PI - 1.5685, 0.3 + M_PI, -0.4, 22.005), 100.0, 100.0)};
+  allow_for_rivals(rungs, rungs[0], chosen.fit);
+  EXPECT_LT(chosen.fit.find("w3_rad_s")->sigma, 0.01);
+  EXPECT_LT(chosen.fit.find("phi_rad")->sigma, 0.002);
+}
+
 // A search that ended elsewhere was told of as neither needed nor ruled out, at BIC +11507.
 TEST(Sentence, NamesTheLikeliestFewAndNothingThatEndedElsewhere) {
   Rungs rungs{rung_of({1}, {loss("air_N_m_s", 1.0, 0.1)}, 100.0, 100.0)};

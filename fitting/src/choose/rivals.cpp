@@ -15,6 +15,8 @@
 namespace trochoid::fitting {
 namespace {
 
+constexpr const char* kOfAttitude[]{"theta_rad", "phi_rad", "w1_rad_s", "w3_rad_s"};
+
 // Which error bars a rival widens as far as it goes; the others within_bounds().
 enum class Unbounded { all, coefficients, none };
 
@@ -110,6 +112,44 @@ Unbounded unbounded(const Standing& standing) {
   return standing.open && !standing.independent ? Unbounded::coefficients : Unbounded::all;
 }
 
+// Squared distance in error bars of what says how a body of two faces stands and turns in an arc.
+double distance(const data::Fit& here, const data::Fit& there, const std::string& arc) {
+  double sum = 0.0;
+  for (const char* name : kOfAttitude) {
+    const data::FitParameter &a = *here.find(name + arc), &b = *there.find(name + arc);
+    const double off = b.value - a.value;
+    const double bars = (a.unit == "rad" ? data::wrapped(off) : off) / a.sigma;
+    sum += std::isfinite(bars) ? bars * bars : 0.0;
+  }
+  return sum;
+}
+
+// Another rung's fit with its attitudes named by the same of the two faces as the chosen one's:
+// about an upright body each rung takes its own, and the motion is the same.
+data::Fit named_alike(const data::Fit& here, data::Fit there) {
+  for (std::size_t i = 0; i < here.arcs.size(); ++i) {
+    const std::string arc = i > 0 ? fmt::format("@{}", i) : "";
+    const auto has = [&](const data::Fit& fit, const std::string& name) {
+      const auto is_it = [&](const auto& parameter) { return parameter.name == name + arc; };
+      return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_it);
+    };
+    const auto has_all = [&](const data::Fit& fit) {
+      return std::all_of(std::begin(kOfAttitude), std::end(kOfAttitude),
+                         [&](const char* name) { return has(fit, name); });
+    };
+    if (!has_all(here) || !has_all(there) || has(here, "psi_rad")) continue;
+    data::Fit turned = there;
+    for (data::FitParameter& parameter : turned.parameters) {
+      if (parameter.name == "theta_rad" + arc) parameter.value = data::kPi - parameter.value;
+      if (parameter.name == "phi_rad" + arc) parameter.value += data::kPi;
+      if (parameter.name == "w1_rad_s" + arc || parameter.name == "w3_rad_s" + arc)
+        parameter.value = -parameter.value;
+    }
+    if (distance(here, turned, arc) < distance(here, there, arc)) there = std::move(turned);
+  }
+  return there;
+}
+
 // What a parameter is in another rung, less what it is here. A loss that is not there is none; of
 // the velocity of the centre a rung without it says nothing.
 double shift_of(const data::FitParameter& here, const data::Fit& other) {
@@ -148,10 +188,11 @@ std::vector<Rival> rivals_of(const Rungs& rungs, const Rung& chosen, const Rival
     rival.weight = std::exp(0.5 * lead_of(rung, chosen, standing));
     rival.unbounded = unbounded(standing);
     rival.shift = rival.further = Eigen::VectorXd::Zero(count);
+    const data::Fit other = named_alike(chosen.fit, rung.fit);
     for (Eigen::Index i = 0; i < count; ++i) {
       const data::FitParameter& here = parameters[static_cast<std::size_t>(i)];
       if (here.status == data::ParameterStatus::fixed) continue;
-      rival.shift[i] = shift_of(here, rung.fit);
+      rival.shift[i] = shift_of(here, other);
       if (standing.larger)
         rival.further[i] = further_variance(rung.fit, chosen.fit, here.name, grounds.losses);
     }
@@ -231,29 +272,31 @@ void warn_of_rivals(const std::vector<Rival>& rivals, const std::vector<data::Fi
 void warn_of_larger_ones(const Rungs& rungs, const Rung& chosen, data::Fit& fit) {
   constexpr double kFar = 3.0;  // error bars
   const Rung* moving = nullptr;
-  const data::FitParameter *moved = nullptr, *there = nullptr;
-  double most = kFar;
+  const data::FitParameter* moved = nullptr;
+  data::FitParameter there;
+  double most = kFar, shifted = 0.0;
   for (const Rung& rung : rungs) {
     if (!in_question(rung, chosen) || !has_all_terms_of(rung, chosen)) continue;
+    const data::Fit named = named_alike(fit, rung.fit);
     for (const data::FitParameter& parameter : fit.parameters) {
       // Where Coulomb's law does beside one loss more, the speed over which friction sets in is
       // gone.
-      const data::FitParameter* other = rung.fit.find(parameter.name);
+      const data::FitParameter* other = named.find(parameter.name);
       if (parameter.status != data::ParameterStatus::free || other == nullptr) continue;
-      const double shift = std::abs(shift_of(parameter, rung.fit));
+      const double shift = std::abs(shift_of(parameter, named));
       const double bars = std::max(shift, other->sigma) / parameter.sigma;
       if (!(bars > most)) continue;
-      most = bars, moving = &rung, moved = &parameter, there = other;
+      most = bars, moving = &rung, moved = &parameter, there = *other, shifted = shift;
     }
   }
   if (moving == nullptr) return;
-  const bool open = !std::isfinite(there->sigma);
-  const double shift = std::abs(shift_of(*moved, moving->fit)) / moved->sigma;
+  const bool open = !std::isfinite(there.sigma);
+  const double shift = shifted / moved->sigma;
   fit.warnings.push_back(fmt::format(
       "{} is neither needed nor ruled out: with it, {} would {}; the {:.4g} ± {:.2g} given here "
       "is {}",
       moving->name, moved->name,
-      open ? "not be determined" : fmt::format("be {:.4g} ± {:.2g}", there->value, there->sigma),
+      open ? "not be determined" : fmt::format("be {:.4g} ± {:.2g}", there.value, there.sigma),
       moved->value, moved->sigma,
       !open && shift > kFar ? fmt::format("away from that by {:.2g} times its own error bar", shift)
                             : "what holds without it"));

@@ -60,6 +60,10 @@ bool is_camera_off(const std::string& parameter) {
   return parameter.starts_with(kCameraOff);
 }
 
+int first_camera_off(const model::Predictor& predictor) {
+  return predictor.index_of(fmt::format("{}1]", kCameraOff));
+}
+
 std::unique_ptr<model::Predictor> with_camera_off(const model::Predictor& predictor,
                                                   const Eigen::VectorXd& likely,
                                                   data::Scene& scene) {

@@ -13,6 +13,9 @@ inline constexpr const char* kDeviations = "sd";  ///< the unit of these paramet
 /// Whether a parameter is by how many of its likely deviations the camera is off, "camera_off[1]".
 [[nodiscard]] bool is_camera_off(const std::string& parameter);
 
+/// The index of the first of these parameters, which the others follow; -1: there is none.
+[[nodiscard]] int first_camera_off(const model::Predictor& predictor);
+
 /// A predictor with that as further parameters (role observation), one for each likely deviation of
 /// the camera; what they do to a prediction is worked out where the samples are known
 /// (problem.hpp). Writes their priors into scene.fit.prior.

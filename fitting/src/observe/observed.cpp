@@ -3,8 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "observe/timing.hpp"
 #include "trochoid/data/error.hpp"
@@ -18,14 +21,46 @@ using model::ParameterInfo;
 using model::Prediction;
 using model::PredictRequest;
 
+// A known radius by which the metres went: where they are wrong, the body is as much smaller or
+// larger than the model has it.
+struct MetresByRadius {
+  data::Scene scene;         // of the model
+  double measured_m = 0.0;   // the radius times the scale
+  double usual_scale = 1.0;  // that of the model's own body
+};
+
+// A prediction's positions as measured.
+void scale_positions(const PredictRequest& request, double scale, Prediction& out) {
+  const std::size_t observables = request.observables.size();
+  for (Eigen::Index row = 0; row < out.values.size(); ++row) {
+    const Observable what = request.observables[static_cast<std::size_t>(row) % observables];
+    if (what != Observable::x_m && what != Observable::y_m) continue;
+    out.values[row] *= scale;
+    out.jacobian.row(row) *= scale;
+  }
+}
+
+// By central differences; from one side where the other has no prediction any more.
+Eigen::VectorXd derivative(const Eigen::VectorXd& here, const Eigen::VectorXd& later,
+                           const Eigen::VectorXd& earlier, double step) {
+  Eigen::VectorXd out = 0.5 / step * (later - earlier);
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
+    if (std::isfinite(out[i]) || !std::isfinite(here[i])) continue;
+    const double ahead = later[i] - here[i], back = here[i] - earlier[i];
+    out[i] = std::isfinite(ahead) ? ahead / step : std::isfinite(back) ? back / step : 0.0;
+  }
+  return out;
+}
+
 class ObservedPredictor : public model::Predictor {
  public:
   struct Asked {
     bool scale = false, factor = false, readout = false, delay = false;
     [[nodiscard]] bool any() const { return scale || factor || readout || delay; }
   };
-  ObservedPredictor(const model::Predictor& plain, const Asked& asked, double readout_s)
-      : plain_(plain), infos_(plain.parameters()), own_(static_cast<int>(infos_.size())) {
+  ObservedPredictor(const model::Predictor& plain, const Asked& asked, double readout_s,
+                    std::optional<MetresByRadius> by_radius)
+      : plain_(plain), infos_(plain.parameters()), by_radius_(std::move(by_radius)) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const auto add = [&](const char* name, const char* unit, double value, const char* meaning) {
       infos_.push_back({name, unit, ParameterInfo::Role::observation,
@@ -44,66 +79,74 @@ class ObservedPredictor : public model::Predictor {
                                    const PredictRequest& request) const override;
 
  private:
-  // The model's own prediction with durations stretched, without the scale.
-  [[nodiscard]] Prediction stretched(const Eigen::Ref<const Eigen::VectorXd>& values,
-                                     PredictRequest request, double factor) const {
-    std::vector<double> t_s(request.t_s.begin(), request.t_s.end());
-    for (double& t : t_s) t = request.start_s + factor * (t - request.start_s);
-    request.t_s = t_s;
-    return plain_.predict(values.head(own_), request);
-  }
-  void fill_factor(const Eigen::Ref<const Eigen::VectorXd>& values, PredictRequest request,
-                   double factor, Eigen::Index column, Prediction& out) const;
+  // Of a body as large as the metres are by this scale; null: as the model has it.
+  [[nodiscard]] std::unique_ptr<model::Predictor> resized(double scale) const;
+  // What the model itself has no derivative by.
+  void fill(const Eigen::Ref<const Eigen::VectorXd>& values, const PredictRequest& request,
+            Eigen::Index column, Prediction& out) const;
 
   const model::Predictor& plain_;
   std::vector<ParameterInfo> infos_;
-  int own_, scale_ = -1, factor_ = -1;
+  int scale_ = -1, factor_ = -1;
+  std::optional<MetresByRadius> by_radius_;
 };
 
-// By central differences: the path's own rate is not among a model's observables.
-void ObservedPredictor::fill_factor(const Eigen::Ref<const Eigen::VectorXd>& values,
-                                    PredictRequest request, double factor, Eigen::Index column,
-                                    Prediction& out) const {
+std::unique_ptr<model::Predictor> ObservedPredictor::resized(double scale) const {
+  if (!by_radius_ || scale == by_radius_->usual_scale) return nullptr;
+  data::Scene scene = by_radius_->scene;
+  scene.body->radius_m = by_radius_->measured_m / scale;
+  return model::make_predictor(scene);
+}
+
+void ObservedPredictor::fill(const Eigen::Ref<const Eigen::VectorXd>& values,
+                             const PredictRequest& request, Eigen::Index column,
+                             Prediction& out) const {
   constexpr double kStep = 1e-4;
-  request.derivatives.clear();
-  const Prediction later = stretched(values, request, factor * (1.0 + kStep));
-  const Prediction earlier = stretched(values, request, factor * (1.0 - kStep));
-  const double inverse = 0.5 / (kStep * factor);
-  out.jacobian.col(column) = inverse * (later.values - earlier.values);
+  const int index = request.derivatives[static_cast<std::size_t>(column)];
+  PredictRequest without = request;
+  without.derivatives.clear();
+  Eigen::VectorXd moved = values;
+  const auto at = [&](double share) {
+    moved[index] = values[index] * (1.0 + share);
+    return predict(moved, without);
+  };
+  const Prediction later = at(kStep), earlier = at(-kStep);
+  const double step = kStep * values[index];
+  out.jacobian.col(column) = derivative(out.values, later.values, earlier.values, step);
   if (request.want_end_state)
-    out.end_state_jacobian.col(column) = inverse * (later.end_state - earlier.end_state);
+    out.end_state_jacobian.col(column) =
+        derivative(out.end_state, later.end_state, earlier.end_state, step);
 }
 
 Prediction ObservedPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values,
                                       const PredictRequest& request) const {
   const double scale = scale_ >= 0 ? values[scale_] : 1.0;
   const double factor = factor_ >= 0 ? values[factor_] : 1.0;
+  const auto other = resized(scale);
+  const model::Predictor& model = other ? *other : plain_;
+  const auto own = static_cast<int>(model.parameters().size());
   PredictRequest inner = request;
-  std::erase_if(inner.derivatives, [&](int index) { return index >= own_; });
-  const Prediction plain = stretched(values, inner, factor);
+  std::vector<double> t_s(request.t_s.begin(), request.t_s.end());
+  for (double& t : t_s) t = request.start_s + factor * (t - request.start_s);
+  inner.t_s = t_s;
+  std::erase_if(inner.derivatives, [&](int index) { return index >= own; });
+  Prediction plain = model.predict(values.head(own), inner);
   Prediction out = plain;
   const auto width = static_cast<Eigen::Index>(request.derivatives.size());
   out.jacobian.setZero(plain.values.size(), width);
   if (request.want_end_state) out.end_state_jacobian.setZero(plain.end_state.size(), width);
   Eigen::Index from = 0;
   for (Eigen::Index c = 0; c < width; ++c) {
-    const int index = request.derivatives[static_cast<std::size_t>(c)];
-    if (index == factor_) fill_factor(values, inner, factor, c, out);
-    if (index >= own_) continue;
+    if (request.derivatives[static_cast<std::size_t>(c)] >= own) continue;
     out.jacobian.col(c) = plain.jacobian.col(from);
     if (request.want_end_state) out.end_state_jacobian.col(c) = plain.end_state_jacobian.col(from);
     ++from;
   }
-  const auto observables = static_cast<Eigen::Index>(request.observables.size());
-  for (Eigen::Index row = 0; row < plain.values.size(); ++row) {
-    const Observable what = request.observables[static_cast<std::size_t>(row % observables)];
-    if (what != Observable::x_m && what != Observable::y_m) continue;
-    out.values[row] *= scale;
-    out.jacobian.row(row) *= scale;
-    for (Eigen::Index c = 0; c < width; ++c)
-      if (request.derivatives[static_cast<std::size_t>(c)] == scale_)
-        out.jacobian(row, c) = plain.values[row];
-  }
+  scale_positions(request, scale, out);
+  for (Eigen::Index c = 0; c < width; ++c)
+    if (const int index = request.derivatives[static_cast<std::size_t>(c)];
+        index == factor_ || index == scale_)
+      fill(values, request, c, out);
   return out;
 }
 
@@ -116,6 +159,16 @@ const data::Prior& positive(const std::string& name, const data::Prior& prior) {
   if (!(prior.value > 0.0))
     throw InputError(fmt::format("[fit] prior: {} = {} must be greater than 0", name, prior.value));
   return prior;
+}
+
+std::optional<MetresByRadius> metres_of(const data::Scene& scene, const std::string& model) {
+  const auto radius = scene.fit.prior.find("radius_m"), scale = scene.fit.prior.find(kScale);
+  if (radius == scene.fit.prior.end() || scale == scene.fit.prior.end() || !scene.body ||
+      !metres_by_radius(scene))
+    return std::nullopt;
+  MetresByRadius metres{scene, radius->second.value * scale->second.value, scale->second.value};
+  metres.scene.model.name = model;
+  return metres;
 }
 
 }  // namespace
@@ -158,7 +211,8 @@ std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, da
       scene.fit.free_scale || prior.contains(kScale), prior.contains(kTimeFactor),
       asked_for(kReadout, scene.camera.readout_s), asked_for(kAngleDelay, 0.0)};
   if (!asked.any()) return nullptr;
-  return std::make_unique<ObservedPredictor>(predictor, asked, scene.camera.readout_s);
+  return std::make_unique<ObservedPredictor>(predictor, asked, scene.camera.readout_s,
+                                             metres_of(scene, predictor.model_name()));
 }
 
 }  // namespace trochoid::fitting

@@ -114,7 +114,7 @@ std::pair<double, double> Transform::limits() const {
 }
 
 bool Problem::frees_camera() const {
-  return is_camera_off(predictor->parameters().back().name);
+  return first_camera_off(*predictor) >= 0;
 }
 
 int Problem::shared_count() const {
@@ -511,7 +511,7 @@ model::Prediction predicted(const Problem& problem, const ArcData& data,
 void measure_by_right_camera(const Problem& problem, const ArcData& data,
                              const Eigen::VectorXd& values, const std::vector<int>& columns,
                              Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) {
-  const auto first = values.size() - std::ssize(data.camera_shifts);
+  const Eigen::Index first = first_camera_off(*problem.predictor);
   for (std::size_t k = 0; k < data.camera_shifts.size(); ++k) {
     const Eigen::Index index = first + static_cast<Eigen::Index>(k);
     const Eigen::VectorXd shift = whitened(data, data.camera_shifts[k]);
