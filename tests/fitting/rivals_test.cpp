@@ -69,7 +69,7 @@ TEST(Sentence, NamesTheLikeliestFewAndNothingThatEndedElsewhere) {
     larger.name = fmt::format("with {:g}", bic);
   }
   for (Rung& rung : rungs) rung.fit.model = "puck";  // of a rim's mean path more is said
-  const std::string words = sentence(rungs, rungs[0], {});
+  const std::string words = sentence(rungs, rungs[0], {}, data::FitVerdict::good);
   EXPECT_THAT(words,
               testing::HasSubstr("neither needed nor ruled out: with 106 (BIC +6.0), with 107 "
                                  "(BIC +7.0), with 108 (BIC +8.0) and 1 more."));

@@ -540,6 +540,31 @@ TEST(TopFit, FollowsASpinThatDies) {
   EXPECT_LT(result.find("omega_s_rad_s")->sigma, 0.1);
 }
 
+// The ratio was that of the first recording, whatever spin its scene had: 133 for 5.
+TEST(TopFit, TellsTheMomentsByTheMarkOfWhicheverRecordingShowsIt) {
+  const DyingTop top = dying_top();
+  data::Track unmarked = top.track;
+  unmarked.samples.erase(unmarked.samples.begin());
+  for (data::TrackSample& sample : unmarked.samples) sample.psi.reset();
+  const data::Fit result = fit(std::vector{unmarked, top.track}, top.scene);
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(pull(result, "I_over_Is", 5.0), kFar);
+}
+
+// By its rate at first a top that falls from near the upright and rises again would not nutate.
+TEST(TopFit, CountsTheNutationsOfATopThatHardlySleeps) {
+  Planted planted;
+  planted.values = {
+      {"a_1_s2", 10.0}, {"b_1_s", 1.0}, {"l_m", 0.1}, {"theta_rad", 0.1}, {"dphi_rad_s", 0.5}};
+  planted.duration_s = 10.0;
+  const data::Fit result = fit_one(planted_track(planted));
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_THAT(result.warnings, testing::Not(testing::Contains(testing::HasSubstr("nutation"))));
+  planted.duration_s = 0.8;
+  EXPECT_THAT(fit_one(planted_track(planted)).warnings,
+              testing::Contains(testing::HasSubstr("nutation periods long")));
+}
+
 // The rendered top's truth, of another program: it loses nothing. Its scene knows nothing of its
 // spin, by which first values of drags should have been scaled.
 struct FreeTop {

@@ -117,6 +117,28 @@ TEST(ProfileLikelihood, IsNotBoundedOnBothSidesByAFractionOfANutation) {
               testing::AnyOf(data::ProfileVerdict::one_sided, data::ProfileVerdict::flat));
 }
 
+// Secant steps that ended too soon, from where the other parameters were lost, gave a "95 %" bound
+// where chi-square had risen by 0.5.
+TEST(ProfileLikelihood, OfALossThatIsNotThereIsBoundedWhereChiSquareHasRisenByIt) {
+  FitOptions options;
+  options.profile = true;
+  options.bootstrap = 3;
+  data::Scene scene;
+  scene.model.name = "top";
+  scene.body.emplace().kind = data::BodyKind::top;
+  scene.model.drag_spin_N_m_s = 1e-3;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const data::Track track = thesis_track(25.0, 5e-4, seed);
+    const data::Fit result = fit(std::span(&track, 1), scene, options);
+    const data::Profile& drag = profile_of(result, "gamma3_1_s");
+    const auto upper = std::find(drag.values.begin(), drag.values.end(), drag.upper_95);
+    ASSERT_NE(upper, drag.values.end());
+    constexpr double kQuantile95 = 3.8415;  // of a chi-square, one degree of freedom
+    EXPECT_NEAR(drag.delta_chi2[static_cast<std::size_t>(upper - drag.values.begin())], kQuantile95,
+                0.05 * kQuantile95);
+  }
+}
+
 TEST(Bootstrap, AgreesWithTheCovarianceOfWhiteNoiseAndRepeatsItself) {
   FitOptions options;
   options.bootstrap = 200;
@@ -306,6 +328,23 @@ TEST(Prior, ThatContradictsTheTrackMakesTheFitDoubtful) {
   EXPECT_EQ(torn.verdict, data::FitVerdict::doubtful) << torn.verdict_words;
   EXPECT_THAT(torn.verdict_words, testing::HasSubstr("the prior l_m = 0.1046"));
   EXPECT_THAT(torn.verdict_words, testing::HasSubstr("which alone says about 0.0996"));
+}
+
+// A length fixed at a little too much was taken for true: a and b came out 30 error bars off,
+// "good".
+TEST(FixedValue, ThatContradictsTheTrackMakesTheFitDoubtful) {
+  const data::Track track = thesis_track(25.0, 1e-3, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  scene.fit.fixed["l_m"] = 0.1;
+  const data::Fit agreed = fit_of(track, scene);
+  EXPECT_EQ(agreed.verdict, data::FitVerdict::good) << agreed.verdict_words;
+  EXPECT_THAT(agreed.warnings, testing::Not(testing::Contains(testing::HasSubstr("is fixed"))));
+
+  scene.fit.fixed["l_m"] = 0.105;
+  const data::Fit torn = fit_of(track, scene);
+  EXPECT_EQ(torn.verdict, data::FitVerdict::doubtful) << torn.verdict_words;
+  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("l_m = 0.105 is fixed, and the track alone says"));
 }
 
 TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {

@@ -153,7 +153,7 @@ data::Fit fit_at(const data::Track& track, const std::map<std::string, double>& 
   solution.usable = solution.converged = true;
   data::Fit fit;
   judge(problem, solution, {}, cut_short, fit);
-  doubt_as_a_whole(problem, solution.u, {}, fit);
+  doubt_as_a_whole(problem, solution.u, {}, {}, fit);
   return fit;
 }
 

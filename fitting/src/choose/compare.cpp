@@ -58,9 +58,11 @@ data::ModelScore table_row(const Rung& rung, bool recommended) {
       rung.parameters, recommended,          recommended && rung.fit.converged ? "" : rung.reason};
 }
 
+// What never came to be tried has no row.
 std::vector<data::ModelScore> table_of(const Rungs& rungs, const Rung* chosen) {
   std::vector<data::ModelScore> table;
-  for (const Rung* rung : told(rungs, chosen)) table.push_back(table_row(*rung, rung == chosen));
+  for (const Rung* rung : told(rungs, chosen))
+    if (rung->fitted || !rung->reason.empty()) table.push_back(table_row(*rung, rung == chosen));
   return table;
 }
 
@@ -170,7 +172,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
   }
   result.fit.comparison = table_of(rungs, chosen);
-  result.fit.recommendation = sentence(rungs, *chosen, ladder);
+  result.fit.recommendation = sentence(rungs, *chosen, ladder, result.fit.verdict);
   return result;
 }
 

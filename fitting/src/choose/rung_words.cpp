@@ -69,7 +69,8 @@ std::vector<const Rung*> told(const Rungs& rungs, const Rung* chosen) {
   return some;
 }
 
-std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
+std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder,
+                     data::FitVerdict verdict) {
   std::string not_tried;
   for (const std::string& term : ladder.left_out) not_tried += "; not tried: " + term;
   const std::vector<const Rung*> all = told(rungs, &chosen);
@@ -77,8 +78,10 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
     return fmt::format("none of the {} models tried explains the track; {} comes nearest{}.",
                        all.size(), chosen.name, not_tried);
   std::string words = fmt::format(
-      "{} suffices ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)",
-      chosen.name, chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white",
+      "{} {} ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)", chosen.name,
+      verdict == data::FitVerdict::doubtful ? "comes nearest, and does not explain the track"
+                                            : "suffices",
+      chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white",
       chosen.held_back_rms_sigma);
   std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
   for (const Rung* rung : all) {

@@ -11,6 +11,7 @@ namespace trochoid::fitting {
 [[nodiscard]] std::vector<const Rung*> told(const Rungs& rungs, const Rung* chosen);
 
 /// What the comparison of all rungs says, as a sentence or two.
-[[nodiscard]] std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder);
+[[nodiscard]] std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder,
+                                   data::FitVerdict verdict);
 
 }  // namespace trochoid::fitting

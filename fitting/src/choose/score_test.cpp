@@ -1,11 +1,15 @@
 #include "choose/score_test.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
 #include "judge/second_thoughts.hpp"
 #include "judge/statistics.hpp"
@@ -252,10 +256,37 @@ double variance_inflation(std::span<const data::Track> tracks, const data::Scene
   return widened * widened;
 }
 
+namespace {
+
+// An error bar may have been widened beyond all that a parameter can be. Of a loss that rivals do
+// without the bar says enough.
+void tell_open(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
+  std::vector<std::string> open;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const auto parameter =
+        std::find_if(fit.parameters.begin(), fit.parameters.end(),
+                     [&](const data::FitParameter& p) { return p.name == problem.name(i); });
+    if (parameter == fit.parameters.end() || !parameter->identifiable ||
+        parameter->status != data::ParameterStatus::free || is_loss(problem, problem.free[i]) ||
+        parameter->sigma < natural_size(problem, i, u))
+      continue;
+    parameter->identifiable = false;
+    open.push_back(parameter->name);
+  }
+  if (open.empty() || !says_explained(fit)) return;
+  const bool first = fit.verdict != data::FitVerdict::weak;
+  fit.verdict = data::FitVerdict::weak;
+  fit.verdict_words +=
+      fmt::format("{}{}", first ? "; not determined: " : ", ", fmt::join(open, ", "));
+}
+
+}  // namespace
+
 void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,
                       const FitOptions& options, data::Fit& fit) {
   const Minimum at(tracks, scene, options);
-  doubt_as_a_whole(at.problem, at.u, uncertainty(at.problem, at.u), fit);
+  tell_open(at.problem, at.u, fit);
+  doubt_as_a_whole(at.problem, at.u, uncertainty(at.problem, at.u), scene.fit, fit);
 }
 
 }  // namespace trochoid::fitting

@@ -51,7 +51,8 @@ struct ScoreTest {
 [[nodiscard]] double variance_inflation(std::span<const data::Track> tracks,
                                         const data::Scene& scene, const FitOptions& options);
 
-/// doubt_as_a_whole() (second_thoughts.hpp) for a fit whose values `options.start` holds.
+/// doubt_as_a_whole() (second_thoughts.hpp) for a fit whose values `options.start` holds; what its
+/// error bars, wider by now, leave open of the motion is not identifiable, and the verdict weak.
 void doubt_as_a_whole(std::span<const data::Track> tracks, const data::Scene& scene,
                       const FitOptions& options, data::Fit& fit);
 

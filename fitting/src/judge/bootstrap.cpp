@@ -116,11 +116,13 @@ data::Bootstrap bootstrap(const Problem& problem, const Solution& solution,
     }
     values[draw] = fit_again(std::move(drawn), solution);
   });
+  std::erase_if(values, [](const std::vector<double>& draw) { return draw.empty(); });
+  result.failed = draws - static_cast<int>(values.size());
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    if (problem.free[i].held) continue;  // in all draws alike, which tells nothing
     std::vector<double> of_parameter;
     for (const std::vector<double>& draw : values)
-      if (!draw.empty()) of_parameter.push_back(draw[static_cast<std::size_t>(i)]);
-    result.failed = draws - static_cast<int>(of_parameter.size());
+      of_parameter.push_back(draw[static_cast<std::size_t>(i)]);
     if (of_parameter.size() > 1)
       result.parameters.push_back(spread_of(problem.name(i), std::move(of_parameter)));
   }

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "judge/adequacy.hpp"
@@ -12,6 +14,7 @@
 #include "judge/whiteness.hpp"
 #include "observe/decompositions.hpp"
 #include "problem/linearise.hpp"
+#include "trochoid/data/error.hpp"
 
 namespace trochoid::fitting {
 
@@ -94,6 +97,27 @@ Demand demand_of(const Problem& problem, const Linearised& all, int track) {
   return demand;
 }
 
+// What a track asks for, in words; a step by the slope may lead out of what a parameter can be.
+std::string wish_of(const Problem& problem, const Eigen::VectorXd& u, const Demand& demand,
+                    double widened) {
+  const std::string name = problem.name(demand.parameter);
+  const model::ParameterInfo& info =
+      problem.predictor->parameters()[problem.free[demand.parameter].index];
+  const double value = problem.value(demand.parameter, u) + demand.step;
+  if (value < info.lower || value > info.upper)
+    return fmt::format("a {} {}", demand.step > 0.0 ? "larger" : "smaller", name);
+  return fmt::format("{} = {:.4g} ± {:.2g}", name, value, widened * demand.sigma);
+}
+
+// To where the tracks together lead, by the derivatives, if no prior pulled.
+void leave_out_priors(const Problem& problem, Linearised& all) {
+  const Eigen::Index rows = problem.rows();
+  if (all.jacobian.rows() == rows) return;
+  const Eigen::VectorXd size = all.jacobian.colwise().norm().cwiseMax(1e-300);
+  const Eigen::MatrixXd seen = all.jacobian.topRows(rows) * size.cwiseInverse().asDiagonal();
+  all.residuals.head(rows) -= seen * NearestLeastSquares(seen).solve(all.residuals.head(rows));
+}
+
 }  // namespace
 
 void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u,
@@ -125,6 +149,65 @@ void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u
   }
 }
 
+namespace {
+
+// A parameter that [fit] fixes, free beside the others.
+struct Freed {
+  Problem problem;
+  Eigen::VectorXd u;
+  int at = 0;  // among the free ones
+};
+
+std::optional<Freed> freed(const Problem& problem, const Eigen::VectorXd& u,
+                           const std::string& name) {
+  const int index = problem.predictor->index_of(name);
+  if (index < 0) return std::nullopt;
+  const bool own = problem.predictor->parameters()[static_cast<std::size_t>(index)].role ==
+                   model::ParameterInfo::Role::initial;
+  if (own && problem.arcs.size() > 1) return std::nullopt;
+  Freed out{problem, Eigen::VectorXd(u.size() + 1), own ? static_cast<int>(u.size()) : 0};
+  FreeParameter parameter;
+  parameter.index = index;
+  parameter.arc = own ? 0 : -1;
+  out.problem.free.insert(out.problem.free.begin() + out.at, parameter);
+  const double value = problem.base.front()[index];
+  out.u << u.head(out.at), value, u.tail(u.size() - out.at);
+  return out;
+}
+
+// What the tracks say of it.
+std::optional<Contrast> contrast_of(Freed one, double fixed) {
+  const Solution solution = minimise(one.problem, one.u);
+  if (!solution.usable || !solution.converged) return std::nullopt;
+  try {
+    const Uncertainty error = uncertainty(one.problem, solution.u);
+    const double value = one.problem.value(one.at, solution.u);
+    const double sigma = std::sqrt(error.covariance(one.at, one.at));
+    if (!error.identifiable[static_cast<std::size_t>(one.at)]) return std::nullopt;
+    return Contrast{std::abs(value - fixed) / sigma, value, sigma};
+  } catch (const NumericalError&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
+                               const data::FitSettings& settings, data::Fit& fit) {
+  constexpr double kWorthWords = 3.0, kTooFar = 5.0;
+  for (const auto& [name, value] : settings.fixed) {
+    if (value == 0.0) continue;  // a loss that is left out, a direction that is chosen
+    const auto one = freed(problem, u, name);
+    const auto says = one ? contrast_of(*one, value) : std::nullopt;
+    if (!says || !(says->apart > kWorthWords)) continue;
+    tell(fmt::format("{} = {:.6g} is fixed, and the track alone says {:.6g} ± {:.2g}, {:.2g} "
+                     "standard deviations from it",
+                     name, value, says->value, says->sigma, says->apart),
+         ": one of them is wrong, or the model, and the error bars are too small",
+         says->apart > kTooFar, fit);
+  }
+}
+
 void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
                             const Uncertainty& error, data::Fit& fit) {
   constexpr double kByChance = 1e-6;
@@ -132,7 +215,8 @@ void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
   for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
   if (tracks.size() < 2 || problem.shared_count() == 0 || problem.predictor->model_name() == "puck")
     return;
-  const Linearised all = linearise(problem, u);
+  Linearised all = linearise(problem, u);
+  leave_out_priors(problem, all);
   double gain = 0.0;
   int dof = -problem.shared_count();
   Demand odd;
@@ -148,11 +232,8 @@ void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
   if (dof < 1 || chi2_upper_tail(gain, dof) > kByChance) return;
   const std::string words = fmt::format(
       "the tracks ask for different values of what they share (chi-square would fall by {:.3g} "
-      "times its noise for {} parameters more), above all track {}: for {} = {:.4g} ± {:.2g} "
-      "rather "
-      "than {:.4g}",
-      gain, dof, odd.track + 1, problem.name(odd.parameter),
-      problem.value(odd.parameter, u) + odd.step, error.widened * odd.sigma,
+      "times its noise for {} parameters more), above all track {}: for {} rather than {:.4g}",
+      gain, dof, odd.track + 1, wish_of(problem, u, odd, error.widened),
       problem.value(odd.parameter, u));
   tell(words, "; fit each alone to see which does not belong",
        !is_tracked(problem) || gain > kOfATracker * dof, fit);

@@ -12,6 +12,11 @@ namespace trochoid::fitting {
 void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u,
                                 const Uncertainty& error, data::Fit& fit);
 
+/// The same of values other than 0 that [fit] fixes, by a fit in which one of them is free. Those
+/// of a start are looked at in a single arc only.
+void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
+                               const data::FitSettings& settings, data::Fit& fit);
+
 /// Tells where several tracks ask for different values of the parameters that they share, by the
 /// derivatives at the minimum: which track, and of which parameter above all. The verdict is
 /// doubtful then, but of filmed tracks only where that says more than trackers err with the motion.

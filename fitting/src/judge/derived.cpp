@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -28,8 +29,9 @@ Given given(const data::Scene& scene, const std::string& name, std::optional<dou
 // fit and the givens' own sigmas.
 class Propagation {
  public:
-  Propagation(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance)
-      : problem_(problem), covariance_(covariance), values_(problem.values(0, u)) {}
+  Propagation(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance,
+              int arc)
+      : problem_(problem), covariance_(covariance), arc_(arc), values_(problem.values(arc, u)) {}
 
   using Function = std::function<double(const Eigen::VectorXd& values, const std::vector<double>&)>;
 
@@ -39,7 +41,7 @@ class Propagation {
     Given result{true, f(values_, g), 0.0};
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(covariance_.rows());
     for (int i = 0; i < gradient.size(); ++i) {
-      if (problem_.free[i].arc > 0) continue;
+      if (problem_.free[i].arc >= 0 && problem_.free[i].arc != arc_) continue;
       const double sigma = std::sqrt(covariance_(i, i));
       if (!(sigma > 0.0) || !std::isfinite(sigma)) continue;
       Eigen::VectorXd shifted = values_;
@@ -66,6 +68,7 @@ class Propagation {
  private:
   const Problem& problem_;
   const Eigen::MatrixXd& covariance_;
+  int arc_;
   Eigen::VectorXd values_;
 };
 
@@ -109,11 +112,12 @@ Given combined(const Given& one, const Given& other) {
           1.0 / std::sqrt(of_one + of_other)};
 }
 
-bool is_free(const Problem& problem, const char* name) {
+// The first arc in which a parameter of its own is free; -1: none.
+int arc_that_frees(const Problem& problem, const char* name) {
   const int index = problem.predictor->index_of(name);
   for (const FreeParameter& parameter : problem.free)
-    if (parameter.index == index) return true;
-  return false;
+    if (parameter.index == index) return std::max(0, parameter.arc);
+  return -1;
 }
 
 // What a top's a, b and l become with what else is known of it. Its moments are given about the
@@ -122,11 +126,11 @@ class DerivedTop {
  public:
   DerivedTop(const Problem& problem, const Eigen::VectorXd& u, const Eigen::MatrixXd& covariance,
              const data::Scene& scene, data::Fit& fit)
-      : propagate_(problem, u, covariance),
+      : seen_in_(arc_that_frees(problem, "omega_s_rad_s")),
+        propagate_(problem, u, covariance, std::max(0, seen_in_)),
         fit_(fit),
         body_(scene.body.value_or(data::Body{})),
         shaped_(scene.body && body_.kind != data::BodyKind::top && body_.radius_m > 0.0),
-        sees_spin_(is_free(problem, "omega_s_rad_s")),
         a_(problem.predictor->index_of("a_1_s2")),
         b_(problem.predictor->index_of("b_1_s")),
         l_(problem.predictor->index_of("l_m")),
@@ -135,10 +139,13 @@ class DerivedTop {
         axial_(given(scene, "Is_kg_m2", body_.Is_kg_m2)),
         mass_(given(scene, "mass_kg", body_.mass_kg)),
         gravity_(given(scene, "gravity_m_s2", scene.model.gravity_m_s2)),
-        spin_(given(scene, "omega_s_rad_s", std::nullopt)) {}
+        spin_(given(scene, "omega_s_rad_s", std::nullopt)),
+        radius_(given(scene, "radius_m", body_.radius_m)),
+        inner_radius_(given(scene, "inner_radius_m", body_.inner_radius_m)),
+        thickness_(given(scene, "thickness_m", body_.thickness_m)) {}
 
   void add_ratio_and_spin() const {
-    if (sees_spin_)
+    if (seen_in_ >= 0)
       by_mark();
     else if (moment_.known && axial_.known)
       by_moments();
@@ -164,10 +171,11 @@ class DerivedTop {
  private:
   using Values = Eigen::VectorXd;
   using Givens = std::vector<double>;
-  enum : std::size_t { kMoment, kAxial, kMass, kGravity, kSpin };
+  enum : std::size_t { kMoment, kAxial, kMass, kGravity, kSpin, kRadius, kInner, kThickness };
 
   [[nodiscard]] Given of(const Propagation::Function& f) const {
-    return propagate_(f, {moment_, axial_, mass_, gravity_, spin_});
+    return propagate_(
+        f, {moment_, axial_, mass_, gravity_, spin_, radius_, inner_radius_, thickness_});
   }
   [[nodiscard]] double mass_of_moment(const Values& v, const Givens& g) const {
     return v[a_] * g[kMoment] / (v[l_] * (g[kGravity] - (shaped_ ? v[a_] * v[l_] : 0.0)));
@@ -216,22 +224,26 @@ class DerivedTop {
     unit.mass_kg = 1.0;
     unit.I_kg_m2.reset();
     unit.Is_kg_m2.reset();
-    const model::CentralInertia inertia = model::central_inertia(unit);
-    const auto of_shape = [=, this](const Values& v) {
+    const auto of_shape = [=, this](const Values& v, const Givens& g) {
+      data::Body body = unit;
+      body.radius_m = g[kRadius];
+      body.inner_radius_m = g[kInner];
+      body.thickness_m = g[kThickness];
+      const model::CentralInertia inertia = model::central_inertia(body);
       return (inertia.transverse_kg_m2 + v[l_] * v[l_]) / inertia.axial_kg_m2;
     };
-    add_ratio(of([=](const Values& v, const Givens&) { return of_shape(v); }),
-              "from the body's shape and the fitted l");
-    add_spin(of([=, this](const Values& v, const Givens&) { return v[b_] * of_shape(v); }),
+    add_ratio(of(of_shape), "from the body's shape and the fitted l");
+    add_spin(of([=, this](const Values& v, const Givens& g) { return v[b_] * of_shape(v, g); }),
              "b I / Is, I / Is from the body's shape and the fitted l");
   }
 
+  int seen_in_;  // the arc in which a mark shows the spin; -1: none does
   Propagation propagate_;
   data::Fit& fit_;
   data::Body body_;
-  bool shaped_, sees_spin_;
+  bool shaped_;
   int a_, b_, l_, omega_;  // places among the parameters
-  Given moment_, axial_, mass_, gravity_, spin_;
+  Given moment_, axial_, mass_, gravity_, spin_, radius_, inner_radius_, thickness_;
 };
 
 }  // namespace

@@ -50,7 +50,9 @@ void report_parameters(const Problem& problem, const Uncertainty& error,
           fmt::format("; ± {:.2g} between clips of this scale and frame rate", one_camera[i]);
     if (free.held && free.transform.is_over_decades())
       parameter.note +=
-          fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
+          at_its_limit(free, parameter.value)
+              ? "; not seen but for being large enough"
+              : fmt::format("; not seen: between 0 and {:.2g} at 95 %", 1.96 * parameter.sigma);
     if (free.prior && parameter.sigma > 0.9 * free.prior->sigma)
       parameter.status = data::ParameterStatus::prior;
     if (!std::isfinite(parameter.sigma)) parameter.identifiable = false;
@@ -96,34 +98,58 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
                     error.whiteness.correlation_time_s, error.widened));
 }
 
-// Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes.
-void warn_short_top(const Problem& problem, data::Fit& fit) {
+// From the first frame to the last as predicted, whatever gaps the record has.
+Eigen::VectorXd seen_in_first_arc(const Problem& problem, const Eigen::VectorXd& u,
+                                  model::Observable what) {
+  constexpr int kTimes = 1000;
+  const ArcData& arc = problem.arcs[0];
+  std::vector<double> t_s;
+  for (int i = 0; i <= kTimes; ++i) t_s.push_back(arc.t_s.front() + arc.duration_s() * i / kTimes);
+  model::PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = arc.start_s;
+  request.observables = {what};
+  request.tolerance = problem.tolerance;
+  request.rolls_at_first = problem.rolls_at_first;
+  return problem.predictor->predict(problem.values(0, u), request).values;
+}
+
+// Half the number of times that the tilt turns back, by more than a tenth of all it does.
+double nutations_of(const Eigen::VectorXd& theta) {
+  constexpr double kOfAll = 0.1, kLeast_rad = 1e-3;
+  const double turns_back = std::max(kOfAll * (theta.maxCoeff() - theta.minCoeff()), kLeast_rad);
+  double from = theta[0], way = 0.0;  // the farthest so far, and in which sense it is sought
+  int reversals = 0;
+  for (const double tilt : theta) {
+    if (way == 0.0 && std::abs(tilt - from) > turns_back) way = tilt > from ? 1.0 : -1.0;
+    if (way != 0.0 && way * (tilt - from) > 0.0) from = tilt;
+    if (way == 0.0 || way * (from - tilt) < turns_back) continue;
+    ++reversals;
+    from = tilt, way = -way;
+  }
+  return 0.5 * reversals;
+}
+
+// Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes; large
+// ones, as of a top that nearly sleeps or hangs, are counted.
+void warn_short_top(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
   const auto* b = fit.find("b_1_s");
   const auto* rate = fit.find("dphi_rad_s");
   const auto* theta = fit.find("theta_rad");
   if (b == nullptr || rate == nullptr || theta == nullptr) return;
   const double frequency = std::abs(b->value - 2.0 * rate->value * std::cos(theta->value));
-  const double periods = problem.arcs[0].duration_s() * frequency / data::kTurn;
+  const Eigen::VectorXd tilt = seen_in_first_arc(problem, u, model::Observable::theta_rad);
+  const double periods = std::max(problem.arcs[0].duration_s() * frequency / data::kTurn,
+                                  tilt.allFinite() ? nutations_of(tilt) : 0.0);
   if (periods >= 1.0) return;
   fit.warnings.push_back(fmt::format(
       "the track is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
       periods));
 }
 
-// From the first frame to the last as predicted: the rate at the first one says little of a body
-// that nutates widely or speeds up as it falls.
+// The rate at the first frame says little of a body that nutates widely or speeds up as it falls.
 double turns_of_node_line(const Problem& problem, const Eigen::VectorXd& u) {
-  const ArcData& arc = problem.arcs[0];
-  constexpr int kTimes = 1000;  // whatever gaps the record has
-  std::vector<double> t_s;
-  for (int i = 0; i <= kTimes; ++i) t_s.push_back(arc.t_s.front() + arc.duration_s() * i / kTimes);
-  model::PredictRequest request;
-  request.t_s = t_s;
-  request.start_s = arc.start_s;
-  request.observables = {model::Observable::phi_rad};
-  request.tolerance = problem.tolerance;
-  request.rolls_at_first = problem.rolls_at_first;
-  const Eigen::VectorXd phi = problem.predictor->predict(problem.values(0, u), request).values;
+  const Eigen::VectorXd phi = seen_in_first_arc(problem, u, model::Observable::phi_rad);
   double turned = 0.0;
   for (Eigen::Index i = 1; i < phi.size() && std::isfinite(phi[i]); ++i)
     turned += std::abs(data::wrapped(phi[i] - phi[i - 1]));
@@ -194,7 +220,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   add_derived_velocity(problem, solution.u, error.covariance, fit);
   if (fit.model.starts_with("top")) {
     add_derived_top(problem, solution.u, error.covariance, scene, fit);
-    warn_short_top(problem, fit);
+    warn_short_top(problem, solution.u, fit);
     admit_steady_precession(problem, solution.u, fit);
   }
   const auto broken = broken_degeneracies(problem, solution.u, fit);

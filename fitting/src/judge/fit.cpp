@@ -178,6 +178,9 @@ Solution polish(Problem& problem, Solution solution, const FitOptions& options, 
   hold_vanished(problem, solution.u);
   name_attitudes(problem);
   solution.u = problem.here();
+  // Under the weights that hold now; those it was reached under may have been others.
+  if (const Solution here = minimise(problem, solution.u, {.iterations = 0}); here.usable)
+    solution.chi2 = here.chi2;
   return solution;
 }
 
@@ -367,7 +370,7 @@ data::Fit OneFit::described(Bars bars) {
   judge(problem_, solution_, error, cut_short_, fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);
-  if (purpose_ == Purpose::answer) doubt_as_a_whole(problem_, solution_.u, error, fit);
+  if (purpose_ == Purpose::answer) doubt_as_a_whole(problem_, solution_.u, error, scene_.fit, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
     fit.converged = false;
     fit.outcome = data::FitOutcome::unexplained;

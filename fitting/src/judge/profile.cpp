@@ -44,6 +44,9 @@ class OneParameter {
     others_ = best.u;
     return best.chi2 + outside(u) - solution_.chi2;
   }
+  /// Of the other free parameters, where the last call ended.
+  [[nodiscard]] const Eigen::VectorXd& others() const { return others_; }
+  void start_from(const Eigen::VectorXd& others) { others_ = others; }
 
  private:
   // What the held parameter's own prior adds.
@@ -62,25 +65,37 @@ class OneParameter {
   Eigen::VectorXd others_;
 };
 
-// Between an offset below the threshold and one above: secant steps on the root of the rise, which
-// is nearly a straight line.
-void close_in(OneParameter& parameter, double threshold, Side& side) {
+// Between an offset below the threshold and one above: the root of the rise is nearly a straight
+// line where the model is, and halves help where it is not. Each trial starts where the last one
+// inside ended; from beyond, the others may lead elsewhere.
+void close_in(OneParameter& parameter, const Eigen::VectorXd& others_inside, double threshold,
+              Side& side) {
+  constexpr int kMost = 16;
+  constexpr double kClose = 0.02;
   const std::size_t n = side.offsets.size();
+  const double wanted = std::sqrt(threshold);
   double inner = n > 1 ? side.offsets[n - 2] : 0.0, outer = side.offsets[n - 1];
   double inner_root = n > 1 ? std::sqrt(std::max(side.rises[n - 2], 0.0)) : 0.0;
   double outer_root = std::sqrt(side.rises[n - 1]);
-  const double wanted = std::sqrt(threshold);
-  for (int i = 0; i < 4; ++i) {
-    const double share = (wanted - inner_root) / std::max(outer_root - inner_root, 1e-300);
-    side.bound = inner + std::clamp(share, 0.02, 0.98) * (outer - inner);
+  Eigen::VectorXd inside = others_inside;
+  for (int i = 0; i < kMost; ++i) {
+    const double straight = (wanted - inner_root) / std::max(outer_root - inner_root, 1e-300);
+    const double share = i % 3 < 2 ? std::clamp(straight, 0.05, 0.95) : 0.5;
+    side.bound = inner + share * (outer - inner);
+    parameter.start_from(inside);
     const double rise = parameter.rise(side.bound);
-    if (!std::isfinite(rise)) break;
-    side.offsets.push_back(side.bound);
-    side.rises.push_back(rise);
     const double root = std::sqrt(std::max(rise, 0.0));
-    if (std::abs(root - wanted) < 0.02 * wanted) break;
-    (root < wanted ? inner : outer) = side.bound;
-    (root < wanted ? inner_root : outer_root) = root;
+    if (std::isfinite(rise)) {
+      side.offsets.push_back(side.bound);
+      side.rises.push_back(rise);
+      if (std::abs(root - wanted) < kClose * wanted) break;
+    }
+    if (root < wanted) {
+      inner = side.bound, inner_root = root;
+      inside = parameter.others();
+    } else {
+      outer = side.bound, outer_root = std::min(root, 1e3 * wanted);
+    }
   }
   side.bounded = true;
 }
@@ -91,6 +106,7 @@ Side walk(const Problem& problem, const Solution& solution, int index, double fi
   Side side;
   double offset = 0.0, step = first_step;
   for (int point = 0; point < kMostPoints && std::abs(offset) < farthest; ++point) {
+    const Eigen::VectorXd inside = parameter.others();
     const double rise = parameter.rise(offset + step);
     if (!std::isfinite(rise)) {  // perhaps only too long a step
       step *= 0.25;
@@ -101,7 +117,7 @@ Side walk(const Problem& problem, const Solution& solution, int index, double fi
     side.offsets.push_back(offset);
     side.rises.push_back(rise);
     if (rise > threshold) {
-      close_in(parameter, threshold, side);
+      close_in(parameter, inside, threshold, side);
       break;
     }
     if (rise < 0.5 * threshold) step *= 1.6;
@@ -191,7 +207,7 @@ std::vector<data::Profile> profiles(const Problem& problem, const Solution& solu
     const int index = chosen[i / 2];
     const Transform& transform = problem.free[index].transform;
     const double slope = std::abs(transform.slope(solution.u[index]));
-    const bool logarithmic = transform.kind == Transform::Kind::log;
+    const bool logarithmic = transform.is_over_decades();
     double sd = std::sqrt(error.covariance(index, index)) / std::max(slope, 1e-300);
     // An unidentifiable parameter has no scale of its own: a tenth of its size.
     const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(solution.u[index]), 1e-3);

@@ -149,11 +149,12 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
 }  // namespace
 
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
-                      data::Fit& fit) {
+                      const data::FitSettings& settings, data::Fit& fit) {
   // A body that slips at first makes the halves differ, too: that it slips says more.
   doubt_if_an_end_is_missed(problem, u, error, fit);
   doubt_if_drifting(problem, error, fit);
   doubt_if_priors_contradict(problem, u, error, fit);
+  doubt_if_fixed_contradict(problem, u, settings, fit);
   doubt_if_tracks_differ(problem, u, error, fit);
 }
 

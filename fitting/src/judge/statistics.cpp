@@ -289,7 +289,10 @@ namespace {
 std::vector<int> vanished(const Problem& problem) {
   std::vector<int> out;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
-    if (problem.free[i].held && problem.free[i].transform.is_over_decades()) out.push_back(i);
+    if (const FreeParameter& parameter = problem.free[i];
+        parameter.held && parameter.transform.is_over_decades() &&
+        !at_its_limit(parameter, problem.base.front()[parameter.index]))
+      out.push_back(i);
   return out;
 }
 

@@ -78,6 +78,12 @@ struct FreeParameter {
   bool held = false;   ///< stays where it is for now
 };
 
+/// Whether it came to lie where it is no longer sought, as a friction that is never overcome.
+[[nodiscard]] inline bool at_its_limit(const FreeParameter& parameter, double value) {
+  return parameter.transform.kind == Transform::Kind::limited &&
+         value > 0.98 * parameter.transform.upper;
+}
+
 /// Velocity of the centre of a body that may slide and rolls.
 struct RollingVelocity {
   Eigen::Vector2d m_s;

@@ -53,6 +53,7 @@ struct Lengths {
   std::vector<Length> alike;     // each counts as much as any other
   std::vector<Length> by_worth;  // each counts by its inverse variance
   double used = 0.0;             // degrees of freedom that the parameters take of them
+  bool of_several = false;       // recordings, which state their noise each in its own way
 };
 
 // A position may be doubted along one direction only: what it scatters by along the other counts.
@@ -110,6 +111,7 @@ Lengths lengths_of(const Problem& problem, const RawResiduals& raw, Channel chan
     lengths.used += own * count / rows[of] + problem.shared_count() * count / problem.rows();
   }
   cap_weights(lengths.by_worth);
+  lengths.of_several = of_channel.size() > 1;
   return lengths;
 }
 
@@ -153,7 +155,7 @@ Scale scale_of(const std::vector<Length>& lengths, double used, bool planar) {
 std::optional<Scale> scale_of(const Lengths& lengths, bool planar) {
   if (lengths.alike.size() < 5) return std::nullopt;
   const Scale alike = scale_of(lengths.alike, lengths.used, planar);
-  if (alike.value >= 1.0) return alike;
+  if (alike.value >= 1.0 || lengths.of_several) return alike;
   Scale best = scale_of(lengths.by_worth, lengths.used, planar);
   best.value = std::clamp(best.value, alike.value, 1.0);
   return best;

@@ -11,9 +11,11 @@ bool Valley::displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) 
   Eigen::VectorXd at = u;
   for (Eigen::Index i = 0; i < u.size(); ++i) {
     const Transform& transform = problem.free[i].transform;
-    const double value = transform.value(u[i]) + step[i];
+    const double here = transform.value(u[i]), value = here + step[i];
     at[i] = transform.inverse(value);
-    if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + 1e-12))
+    // Beyond a bound the value stops short; that of a light body's couple may be as small as any.
+    const double rounding = 1e-12 * std::abs(here);
+    if (!(std::abs(transform.value(at[i]) - value) <= 1e-3 * std::abs(step[i]) + rounding))
       return false;
   }
   Eigen::VectorXd there;
