@@ -113,7 +113,7 @@ TEST(Timing, CountsOnFromTheReadoutTheTrackAllowedFor) {
   EXPECT_GT(pull(fit, "readout_s", kAllowed_s), kFar);
 }
 
-TEST(Timing, FindsHowFarAnglesLagBehindPositions) {
+TEST(Timing, FindsHowMuchLaterAnglesAreThanPositions) {
   for (const double delay_s : {0.007, -0.009}) {
     data::Scene with = scene();
     with.fit.free = {"angle_delay_s"};
