@@ -252,6 +252,30 @@ TEST(Compare, TakesABodyThatStraysFromItsPivotForATop) {
   EXPECT_THAT(turning.verdict_words, testing::HasSubstr("strays"));
 }
 
+// One wrong place in three hundred, a hand before the time chosen, or the scatter of places whose
+// errors are not stated made a top of a disc that turned where it was.
+TEST(Compare, TakesNoGlitchNoHandAndNoScatterForAWayFromThePivot) {
+  data::Scene scene = spin_down();
+  scene.model.spin_down_dry_rad_s2 = 0.8;
+  const data::Track still = track_of(scene, {{"w3_rad_s", 20.0}}, 6.0, 300, 0.01, 13);
+  const auto verdict = [&](const data::Track& track, const FitOptions& options = {}) {
+    return fit(std::span(&track, 1), scene, options).verdict_words;
+  };
+  const auto explained = testing::StartsWith("the model explains the track");
+  data::Track glitch = still, led = still, unstated = still;
+  glitch.samples[150].centre_m.x() = 10.0;
+  EXPECT_THAT(verdict(glitch), explained);
+  FitOptions later;
+  later.from = "1.0";
+  for (data::TrackSample& sample : led.samples)
+    if (sample.t_s < 0.9) sample.centre_m.x() += 1.0 - sample.t_s;
+  EXPECT_THAT(verdict(led), testing::HasSubstr("strays"));
+  EXPECT_THAT(verdict(led, later), explained);
+  scene.body.reset();
+  for (data::TrackSample& sample : unstated.samples) sample.covariance_m2.setConstant(NAN);
+  EXPECT_THAT(verdict(unstated), explained);
+}
+
 data::Scene ring() {
   data::Scene scene;
   data::Body& body = scene.body.emplace();

@@ -126,7 +126,7 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   if (!options.model.empty()) named.model.name = options.model;
   // A body held at a pivot that leans there is a top, one that lies on it only turns.
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
-  if (open && leaves_pivot(tracks, named)) named.model.name = "top";
+  if (open && leaves_pivot(tracks, named, options)) named.model.name = "top";
   if (!named.body && named.model.name == "auto")
     throw InputError(
         "models can be compared for a [body] with its kind and radius_m; without one name the "

@@ -371,14 +371,14 @@ data::Fit OneFit::described(Bars bars) {
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);
   if (purpose_ == Purpose::answer) doubt_as_a_whole(problem_, solution_.u, error, scene_.fit, fit);
-  if (fit.model == "pivot" && leaves_pivot(tracks_, scene_)) {
+  if (fit.model == "pivot" && leaves_pivot(tracks_, scene_, options_)) {
     fit.converged = false;
     fit.outcome = data::FitOutcome::unexplained;
     fit.verdict = data::FitVerdict::unexplained;
     fit.reason = fit.verdict_words = fmt::format(
-        "the body's centre strays by {:.2g} m rms: a disc that only turns on its pivot stays where "
+        "the body's centre strays by {:.2g} m: a disc that only turns on its pivot stays where "
         "it is; is it a top?",
-        straying_m(tracks_));
+        straying_m(tracks_, options_));
   }
   add_what_was_asked_for(problem_, solution_, error, options_, fit);
   return fit;
