@@ -154,6 +154,20 @@ TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
     EXPECT_LT(std::abs(common->value - own), 4.0 * common->sigma);
 }
 
+// Alone, an arc counted a sample that the fit had given up in full, and leaned on what was known of
+// the friction as much as all of them together did.
+TEST(PuckFit, AsksTheArcsAloneWhetherOneFrictionExplainsThem) {
+  Throw thrown(5);
+  thrown.slide({1.0, 0.3}, 0.3).slide({-0.2, 0.6}, 0.2).slide({0.7, -0.4}, 0.3);
+  const auto explains = testing::Contains(testing::HasSubstr("coefficient explains the 3 arcs"));
+  data::Track missed = thrown.track();
+  missed.samples[80].centre_m += 400.0 * kPuckSigma_m * Eigen::Vector2d(-0.3, 0.9);
+  EXPECT_THAT(fitting::fit(std::span(&missed, 1), puck_scene()).warnings, explains);
+  data::Scene misled = puck_scene();
+  misled.fit.prior["friction"] = {0.21, 0.0005};
+  EXPECT_THAT(fitting::fit(std::span(&thrown.track(), 1), misled).warnings, explains);
+}
+
 TEST(PuckFit, LeavesOutWhatAHandDoes) {
   Throw thrown(2);
   thrown.push({6.0, 0.0}, 0.15).slide({0.9, 0.0}, 0.3);

@@ -31,6 +31,8 @@ Estimate friction_of(const Problem& problem, int arc, int friction) {
   int place = -1;
   for (int i = 0; i < static_cast<int>(alone.free.size()); ++i)
     if (alone.free[i].index == friction) place = i;
+  // What is known beforehand is known of all of them together: it says nothing of one.
+  if (place >= 0) alone.free[place].prior.reset();
   if (place < 0 || alone.rows() <= static_cast<int>(alone.free.size())) return {};
   const Solution solution = solve(alone, alone.start());
   if (!solution.usable || !solution.converged) return {};

@@ -245,7 +245,7 @@ Problem single_arc(const Problem& problem, int arc) {
   Problem part = problem;
   part.arcs = {problem.arcs[arc]};
   part.base = {problem.base[arc]};
-  part.row_weights = {Eigen::VectorXd()};
+  part.row_weights = {problem.row_weights[arc]};
   part.free.clear();
   for (FreeParameter parameter : problem.free)
     if (parameter.arc < 0 || parameter.arc == arc) {

@@ -136,7 +136,7 @@ enum class Weights { kept, dropped };
 /// with or without the robust weights.
 [[nodiscard]] Problem in_stated_sigmas(Problem problem, Weights weights);
 
-/// One arc of a problem with the parameters it sees.
+/// One arc of a problem, weighted as in it, with the parameters it sees.
 [[nodiscard]] Problem single_arc(const Problem& problem, int arc);
 
 /// Whether a free parameter is the strength of a loss: short windows do not see it, and it may be
