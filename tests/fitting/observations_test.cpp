@@ -76,5 +76,25 @@ TEST(Observations, APathReachesNoFartherForAGlitchFarAway) {
   EXPECT_DOUBLE_EQ(extent_m(arc_of(track)), 2.0 * kRadius_m);
 }
 
+// One row without them, and those of all others counted for nothing.
+TEST(Observations, APositionWithoutCovarianceLeavesTheOthersTheirs) {
+  constexpr double kStated_m = 1e-4, kCareful_m = 1e-5;
+  data::Track track = half_circle();
+  track.samples[0].covariance_m2 *= std::pow(kCareful_m / kStated_m, 2);
+  track.samples[kFrame].covariance_m2.setConstant(NAN);
+  const ArcData arc = arc_of(track);
+  EXPECT_FALSE(arc.sigma_unknown);
+  const auto sigma_m = [&](int sample) {
+    for (const Reading& reading : arc.readings)
+      if (reading.sample == sample && reading.channel == Channel::position)
+        return 1.0 / reading.whitener(1, 1);
+    return 0.0;
+  };
+  EXPECT_DOUBLE_EQ(sigma_m(0), kCareful_m);
+  EXPECT_DOUBLE_EQ(sigma_m(kFrame), kStated_m);
+  for (data::TrackSample& sample : track.samples) sample.covariance_m2.setConstant(NAN);
+  EXPECT_TRUE(arc_of(track).sigma_unknown);
+}
+
 }  // namespace
 }  // namespace trochoid::fitting

@@ -98,6 +98,17 @@ void guess_position_noise(ArcData& arc) {
   set_position_noise(arc, noise_about_smooth_curve(kept.t_s, kept.positions_m()));
 }
 
+// Where some samples state their noise the others are as noisy as those are as a rule.
+// @param unstated  indices of the others' positions among the readings.
+void complete_position_noise(ArcData& arc, const std::vector<std::size_t>& unstated,
+                             std::vector<double> stated_m) {
+  if (!unstated.empty() && stated_m.empty() && arc.t_s.size() >= 3) guess_position_noise(arc);
+  if (stated_m.empty()) return;
+  const double usual_m = median_or_zero(std::move(stated_m));
+  for (const std::size_t i : unstated)
+    arc.readings[i].whitener = Eigen::Matrix2d::Identity() / usual_m;
+}
+
 }  // namespace
 
 int ArcData::observable_index(Observable observable) const {
@@ -155,7 +166,8 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
   arc.object = track.object;
   arc.folded = folded;
   if (choice.position) arc.observables = {Observable::x_m, Observable::y_m};
-  bool any_covariance_missing = false;
+  std::vector<double> stated_m;
+  std::vector<std::size_t> unstated;
   for (int i = first; i < last; ++i) {
     const data::TrackSample& sample = track.samples[i];
     if (choice.position && !sample.has_metres()) continue;
@@ -163,10 +175,12 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
     if (choice.position) {
       check_place(sample);
       Reading reading{.sample = index, .channel = Channel::position, .value = sample.centre_m};
-      if (sample.has_covariance())
+      if (sample.has_covariance()) {
         reading.whitener = whitener_of(sample);
-      else
-        any_covariance_missing = true;
+        stated_m.push_back(std::sqrt(0.5 * sample.covariance_m2.trace()));
+      } else {
+        unstated.push_back(arc.readings.size());
+      }
       arc.readings.push_back(reading);
     }
     if (choice.theta) add_angle(arc, index, Channel::theta, sample, sample.theta, "theta");
@@ -183,7 +197,7 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
   }
   number_rows(arc);
   if (!arc.t_s.empty()) arc.start_s = arc.t_s.front();
-  if (any_covariance_missing && arc.t_s.size() >= 3) guess_position_noise(arc);
+  complete_position_noise(arc, unstated, std::move(stated_m));
   return arc;
 }
 

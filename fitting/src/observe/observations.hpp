@@ -46,7 +46,7 @@ struct ArcData {
   bool filmed = false;  ///< has pixel positions: measured in images, with their common errors
   std::vector<CameraShifts> camera_shifts;  ///< of the deviations that matter (camera_error.hpp)
   bool held = false;           ///< samples before these were left out: the body was held or pushed
-  bool sigma_unknown = false;  ///< positions came without covariance; whitener is a first guess
+  bool sigma_unknown = false;  ///< no position came with covariance; whitener is a first guess
   /// By which the noise differs from what the whiteners state, for each channel.
   std::array<double, kChannels> noise_scale{1.0, 1.0, 1.0, 1.0};
 
@@ -77,7 +77,8 @@ struct ChannelChoice {
 };
 
 /// Reads samples [first, last) of a track. Samples without metres are left out when positions are
-/// wanted. Unknown covariances are replaced by a guess from the scatter about a smooth curve.
+/// wanted. Positions without covariance are as uncertain as the median of those with one; where
+/// none has one, as a guess from the scatter about a smooth curve.
 /// @throws TrackError naming the sample and the column for an error of nothing and for a place
 /// farther than 10 km away.
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
