@@ -321,6 +321,29 @@ TEST(TopFit, AdmitsThatSteadyPrecessionHidesTheTop) {
   EXPECT_TRUE(fit_one(planted_track({})).find("l_m")->identifiable);
 }
 
+// Of a recording that shows everything a twentieth too large and half as fast, about a pivot away
+// from the origin: its circle was looked for about another point and told as it was measured.
+TEST(TopFit, TellsSteadyPrecessionInTrueLengthsAndTimes) {
+  constexpr double kScale = 1.05, kFactor = 0.5, kTilt_rad = 1.0, kRate_rad_s = 0.5, kB_1_s = 0.75;
+  Planted planted;
+  planted.values["theta_rad"] = kTilt_rad;
+  planted.values["dphi_rad_s"] = kRate_rad_s;
+  planted.values["b_1_s"] = kB_1_s;
+  planted.values["a_1_s2"] = kRate_rad_s * (kB_1_s - kRate_rad_s * std::cos(kTilt_rad));
+  planted.duration_s = 20.0;
+  planted.sigma_m = 1e-4;
+  planted.pivot_m = {0.3, 0.2};
+  data::Track track = planted_track(planted);
+  for (data::TrackSample& sample : track.samples) sample.centre_m *= kScale, sample.t_s /= kFactor;
+  data::Scene scene = top_scene(planted.pivot_m);
+  scene.fit.prior["scale"] = {kScale, 1e-4};
+  scene.fit.prior["frame_rate_factor"] = {kFactor, 1e-4};
+  const data::Fit result = fit_one(track, scene);
+  EXPECT_FALSE(result.find("b_1_s")->identifiable);
+  EXPECT_THAT(result.warnings, testing::Contains(testing::ContainsRegex(
+                                   "sin.theta. = 0.0841[0-9]* m, the rate W = 0.(500|4999)")));
+}
+
 // Nutation of a tenth of a millimetre at thirty turns a second, in twice that noise: no integral
 // over the path sees it, its line in the spectrum does.
 TEST(TopFit, FindsAFastTopByItsTremble) {

@@ -11,6 +11,7 @@
 #include "judge/degeneracies.hpp"
 #include "observe/angles.hpp"
 #include "observe/decompositions.hpp"
+#include "observe/observed.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -103,6 +104,23 @@ bool known_beforehand(const Problem& problem, const char* name) {
   return true;  // not fitted at all
 }
 
+// What the recording's lengths and times are to true ones (observed.hpp), and where it shows the
+// pivot.
+struct Measure {
+  double scale, factor;
+  Eigen::Vector2d pivot_m;
+};
+
+Measure measure_of(const Problem& problem, const Eigen::VectorXd& values) {
+  const auto value_or = [&](const char* name, double otherwise) {
+    const int index = problem.predictor->index_of(name);
+    return index >= 0 ? values[index] : otherwise;
+  };
+  const double scale = value_or(kScale, 1.0);
+  return {scale, value_or(kTimeFactor, 1.0),
+          scale * Eigen::Vector2d(value_or("pivot_x_m", 0.0), value_or("pivot_y_m", 0.0))};
+}
+
 // Weighted as in the fit. @pre problem's only arc has no spin.
 double chi2_of(const Problem& problem, const Steady& steady, const Eigen::Vector2d& pivot_m) {
   const ArcData& arc = problem.arcs[0];
@@ -130,10 +148,7 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   // At a known tilt and rate either of a and b tells the other.
   if (tilt_seen && (known_beforehand(problem, "a_1_s2") || known_beforehand(problem, "b_1_s")))
     return;
-  const Eigen::VectorXd values = problem.values(0, u);
-  const int px = problem.predictor->index_of("pivot_x_m");
-  const int py = problem.predictor->index_of("pivot_y_m");
-  const Eigen::Vector2d pivot_m(px >= 0 ? values[px] : 0.0, py >= 0 ? values[py] : 0.0);
+  const auto [scale, factor, pivot_m] = measure_of(problem, problem.values(0, u));
   const Problem path = without_spin(problem);
   Eigen::VectorXd residuals;
   if (!evaluate(path, 0, u, residuals, nullptr)) return;
@@ -163,7 +178,7 @@ void admit_steady_precession(const Problem& problem, const Eigen::VectorXd& u, d
   fit.warnings.push_back(fmt::format(
       "no nutation is seen: steady precession determines {}l sin(theta) = {:.6g} m, the rate W = "
       "{:.6g} rad/s, and a + W^2 cos(theta) = b W; not {}",
-      tilt_seen ? "the tilt, " : "", steady.distance_m[0], steady.azimuth_rad[1],
+      tilt_seen ? "the tilt, " : "", steady.distance_m[0] / scale, steady.azimuth_rad[1] / factor,
       tilt_seen ? "a and b" : "a, b and l"));
 }
 
