@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -166,6 +167,25 @@ TEST(PuckFit, AsksTheArcsAloneWhetherOneFrictionExplainsThem) {
   data::Scene misled = puck_scene();
   misled.fit.prior["friction"] = {0.21, 0.0005};
   EXPECT_THAT(fitting::fit(std::span(&thrown.track(), 1), misled).warnings, explains);
+}
+
+double held_back_of_chosen(const data::Track& track) {
+  for (const data::ModelScore& row : compare(std::span(&track, 1), puck_scene(), {}).fit.comparison)
+    if (row.recommended) return row.held_back_rms_sigma;
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+// The right model missed the last third by hundreds of sigmas where the puck was hit in it, and by
+// as much as a single wrong place weighs among the others.
+TEST(PuckFit, PredictsOfWhatIsHeldBackTheStretchItFollows) {
+  constexpr double kAsNoise = 2.0;
+  Throw hit(8), free(9);
+  hit.slide({1.4, 0.3}, 0.5).slide({-0.2, 0.6}, 0.1);
+  EXPECT_LT(held_back_of_chosen(hit.track()), kAsNoise);
+  free.slide({1.4, 0.3}, 0.5);
+  data::Track missed = free.track();
+  missed.samples[100].centre_m.y() += 400.0 * kPuckSigma_m;
+  EXPECT_LT(held_back_of_chosen(missed), kAsNoise);
 }
 
 TEST(PuckFit, LeavesOutWhatAHandDoes) {

@@ -2,15 +2,15 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
+#include <numbers>
 
-#include "observe/angles.hpp"
 #include "observe/arcs.hpp"
-#include "trochoid/data/angle.hpp"
+#include "observe/observations.hpp"
+#include "problem/problem.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/model/predictor.hpp"
 
@@ -24,63 +24,74 @@ constexpr double kHeldBack = 1.0 / 3.0;
 struct SumOfSquares {
   double sum = 0.0;
   int rows = 0;
-  void add(double deviation) {
-    sum += deviation * deviation;
-    ++rows;
+  void add(const Eigen::Ref<const Eigen::VectorXd>& deviations) {
+    // Where the model ends before the body does it has no prediction.
+    sum += deviations.allFinite() ? deviations.squaredNorm() : kInfinity;
+    rows += static_cast<int>(deviations.size());
   }
 };
 
-void add_squares(const data::TrackSample& sample, const Eigen::Vector3d& predicted, bool angle_only,
-                 SumOfSquares& squares) {
-  if (angle_only && sample.psi) {
-    const double off = data::wrapped(predicted[2] - sample.psi->value_rad);
-    squares.add(off / sample.psi->sigma_rad);
-  }
-  if (angle_only || !sample.has_metres()) return;
-  const Eigen::Vector2d off = predicted.head<2>() - sample.centre_m;
-  // Without covariances in metres; the caller divides by the fitted part's rms.
-  const Eigen::Matrix2d covariance =
-      sample.has_covariance() ? sample.covariance_m2 : Eigen::Matrix2d::Identity();
-  const Eigen::Matrix2d L = covariance.llt().matrixL();
-  const Eigen::Vector2d whitened = L.triangularView<Eigen::Lower>().solve(off);
-  squares.add(whitened.x());
-  squares.add(whitened.y());
+// Of what was fitted and of what was held back.
+struct Split {
+  SumOfSquares seen, unseen;
+  bool sigma_known = true;
+};
+
+// The last arc of a track in a fit that begins by then; null: it has none.
+const data::FitArc* last_arc(const data::Fit& fit, int track, double by_s = kInfinity) {
+  const data::FitArc* last = nullptr;
+  for (const data::FitArc& arc : fit.arcs)
+    if (arc.track == track && arc.from_s <= by_s) last = &arc;
+  return last;
 }
 
-// Sum of squares of the samples [first, last) of a track, predicted from the fit's last arc of that
-// track.
-SumOfSquares squares_of(const data::Track& track, int first, int last, int track_index,
-                        const data::Scene& scene, const data::Fit& fit) {
-  SumOfSquares squares;
-  int arc = -1;
-  for (std::size_t i = 0; i < fit.arcs.size(); ++i)
-    if (fit.arcs[i].track == track_index) arc = static_cast<int>(i);
-  if (arc < 0) return squares;
-  std::vector<double> t_s, row_px;
-  std::vector<const data::TrackSample*> samples;
-  for (int i = first; i < last; ++i) {
-    const data::TrackSample& sample = track.samples[static_cast<std::size_t>(i)];
-    if (sample.t_s < fit.arcs[static_cast<std::size_t>(arc)].from_s) continue;
-    t_s.push_back(sample.t_s);
-    row_px.push_back(sample.centre_px.y());
-    samples.push_back(&sample);
-  }
+// A fit's residuals of readings that need not be those it was made from.
+Eigen::VectorXd residuals_of(const ArcData& readings, const data::Fit& fit,
+                             const data::FitArc& fitted, const data::Scene& scene) {
   model::PredictRequest request;
-  request.t_s = t_s;
-  request.start_s = fit.arcs[static_cast<std::size_t>(arc)].from_s;
-  request.observables.push_back(model::Observable::psi_rad);
+  request.t_s = readings.t_s;
+  request.start_s = fitted.from_s;
+  request.observables = readings.observables;
   request.lies_where_it_fell = true;
-  const bool angle_only = fit.model == "pivot";
-  const model::Prediction run =
-      fitted_prediction(fit, scene, static_cast<std::size_t>(arc), request, row_px);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const Eigen::Vector3d at = run.values.segment<3>(3 * static_cast<Eigen::Index>(i));
-    if (at.allFinite())
-      add_squares(*samples[i], at, angle_only, squares);
-    else
-      squares.add(kInfinity);  // the model ends before the body does
+  const auto index = static_cast<std::size_t>(&fitted - fit.arcs.data());
+  const model::Prediction run = fitted_prediction(fit, scene, index, request, readings.row_px);
+  Eigen::VectorXd residuals;
+  whiten(readings, run.values, {}, residuals, nullptr);
+  return residuals;
+}
+
+// The stretch of a track that the fit of its first part follows, to where that of the whole does:
+// no model knows of an impact that is still to come.
+ArcData stretch_of(const data::Track& track, SampleRange range, double from_s, double to_s,
+                   bool angle_only) {
+  const auto time_s = [&](int i) { return track.samples[static_cast<std::size_t>(i)].t_s; };
+  auto [first, last] = range;
+  while (first < last && time_s(first) < from_s) ++first;
+  while (last > first && time_s(last - 1) > to_s) --last;
+  return make_arc(track, first, last, {.position = !angle_only, .psi = angle_only}, false);
+}
+
+void add_track(const data::Track& track, int index, SampleRange range, const Rung& rung,
+               const data::Fit& early, Split& split) {
+  // What the fit of the whole weighs by less than half.
+  constexpr double kGivenUp = kInlier * std::numbers::sqrt2;
+  const data::FitArc* part = last_arc(early, index);
+  const data::FitArc* whole = part ? last_arc(rung.fit, index, part->to_s) : nullptr;
+  if (whole == nullptr) return;
+  const ArcData readings = stretch_of(track, range, std::max(part->from_s, whole->from_s),
+                                      whole->to_s, early.model == "pivot");
+  if (readings.readings.empty()) return;
+  split.sigma_known = split.sigma_known && !readings.sigma_unknown;
+  const Eigen::VectorXd off = residuals_of(readings, early, *part, rung.scene);
+  const Eigen::VectorXd off_whole = residuals_of(readings, rung.fit, *whole, rung.scene);
+  const int kept = kept_samples(range.first, range.second, kHeldBack);
+  const double seen_s = track.samples[static_cast<std::size_t>(kept - 1)].t_s;
+  for (const Reading& reading : readings.readings) {
+    const int rows = rows_of(reading.channel);
+    if (off_whole.segment(reading.row, rows).norm() > kGivenUp * whole->noise_scale) continue;
+    const bool seen = readings.t_s[static_cast<std::size_t>(reading.sample)] <= seen_s;
+    (seen ? split.seen : split.unseen).add(off.segment(reading.row, rows));
   }
-  return squares;
 }
 
 // Fits the first two thirds, predicts the rest.
@@ -96,21 +107,11 @@ double held_back(std::span<const data::Track> tracks, const Rung& rung, FitOptio
   const data::Fit early =
       fit_one_of_several(tracks, rung.scene, options, Bars::by_curvature, rung.settled);
   if (!usable(early)) return kInfinity;
-  SumOfSquares seen, unseen;
-  bool sigma_known = true;
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    const auto [first, last] = chosen_range(tracks[i], options.from, options.to);
-    const int split = kept_samples(first, last, kHeldBack);
-    const int index = static_cast<int>(i);
-    const SumOfSquares before = squares_of(tracks[i], first, split, index, rung.scene, early);
-    const SumOfSquares after = squares_of(tracks[i], split, last, index, rung.scene, early);
-    seen.sum += before.sum, seen.rows += before.rows;
-    unseen.sum += after.sum, unseen.rows += after.rows;
-    for (int k = first; k < last; ++k)
-      sigma_known =
-          sigma_known && (early.model == "pivot" ||
-                          tracks[i].samples[static_cast<std::size_t>(k)].has_covariance());
-  }
+  Split split;
+  for (std::size_t i = 0; i < tracks.size(); ++i)
+    add_track(tracks[i], static_cast<int>(i), chosen_range(tracks[i], options.from, options.to),
+              rung, early, split);
+  const auto& [seen, unseen, sigma_known] = split;
   if (unseen.rows == 0 || seen.rows == 0) return std::numeric_limits<double>::quiet_NaN();
   const double rms = std::sqrt(unseen.sum / unseen.rows);
   return sigma_known ? rms : rms / std::sqrt(std::max(seen.sum / seen.rows, 1e-300));
