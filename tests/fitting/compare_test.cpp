@@ -276,6 +276,20 @@ TEST(Compare, TakesNoGlitchNoHandAndNoScatterForAWayFromThePivot) {
   EXPECT_THAT(verdict(unstated), explained);
 }
 
+// A track that counts whole turns tells them apart where a turn takes less than two frames: the
+// angle was brought within half a turn of the one before, and no start led to the motion.
+TEST(Compare, FollowsASpinOfMoreThanHalfATurnFromFrameToFrame) {
+  constexpr double kSpin_rad_s = 400.0, kDry_rad_s2 = 20.0;
+  data::Scene scene = spin_down();
+  scene.model.spin_down_dry_rad_s2 = kDry_rad_s2;
+  const data::Track track = track_of(scene, {{"w3_rad_s", kSpin_rad_s}}, 6.0, 601, 0.01, 14);
+  scene.model.spin_down_dry_rad_s2 = 0.1;
+  const data::Fit turning = fit(std::span(&track, 1), scene);
+  ASSERT_TRUE(turning.converged) << turning.reason;
+  EXPECT_LT(pull(turning, "w3_rad_s", kSpin_rad_s), kFar);
+  EXPECT_LT(pull(turning, "spin_down_dry_rad_s2", kDry_rad_s2), kFar);
+}
+
 data::Scene ring() {
   data::Scene scene;
   data::Body& body = scene.body.emplace();

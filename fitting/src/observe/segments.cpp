@@ -261,12 +261,12 @@ int released_at(const data::Track& track, SampleRange range) {
   for (int i = range.first; i < range.second; ++i) {
     const data::TrackSample& one = track.samples[i];
     if (!one.psi) continue;
-    const double before = psi.empty() ? one.psi->value_rad : psi.back();
-    psi.push_back(continued(one.psi->value_rad, before));
+    psi.push_back(one.psi->value_rad);
     t_s.push_back(one.t_s);
     sample.push_back(i);
   }
   if (psi.size() < 4 * kHeld) return range.first;
+  psi = continued_along_rate(t_s, psi);
   const Eigen::Map<const Eigen::VectorXd> angle(psi.data(), static_cast<Eigen::Index>(psi.size()));
   const Eigen::VectorXd speed = smooth(t_s, angle, kHalfWidth).first.col(0).cwiseAbs();
   const double greatest = speed.maxCoeff();

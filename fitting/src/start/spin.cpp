@@ -1,10 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <functional>
 
 #include "observe/angles.hpp"
-#include "observe/smoothing.hpp"
 #include "start/strategy.hpp"
 #include "trochoid/data/angle.hpp"
 
@@ -51,23 +49,10 @@ SpinDifference spin_difference(const Problem& problem, int arc, int psi, int ome
   return difference;
 }
 
-// Continues the angles along their own rate: the next value lies where the latest rates take it,
-// not merely within half a turn. Returns slope and value at t = 0 of the line through them.
+// Slope and value at t = 0 of the line through the angles, continued along their rate.
 std::pair<double, double> line_through(const SpinDifference& raw) {
-  constexpr std::size_t kLatest = 31;
-  const std::vector<double>&t = raw.turn_s, &d = raw.angle_rad;
-  // As the track continues its angle, at first: it may know of more than half a turn a step.
-  std::deque<double> rates;
-  for (std::size_t i = 1; i < t.size() && rates.size() < kLatest; ++i)
-    rates.push_back((d[i] - d[i - 1]) / (t[i] - t[i - 1]));
-  std::vector<double> angle{d.front()};
-  for (std::size_t i = 1; i < t.size(); ++i) {
-    const double step_s = t[i] - t[i - 1];
-    const double expected = angle.back() + median_or_zero({rates.begin(), rates.end()}) * step_s;
-    angle.push_back(continued(d[i], expected));
-    rates.push_back((angle[i] - angle[i - 1]) / step_s);
-    rates.pop_front();
-  }
+  const std::vector<double>& t = raw.turn_s;
+  const std::vector<double> angle = continued_along_rate(t, raw.angle_rad);
   const int n = static_cast<int>(angle.size());
   const Eigen::Map<const Eigen::VectorXd> turn(t.data(), n), along(angle.data(), n);
   const Eigen::VectorXd centred = turn.array() - turn.mean();
