@@ -20,8 +20,8 @@ using data::FitOutcome, data::FitVerdict;
 namespace {
 
 // Where the prediction, which has no noise, scatters about a smooth curve as the samples do, frames
-// are too few to tell noise from motion: then it is at most so many times the stated.
-constexpr double kMisjudged = 2.0, kMostlyMotion = 0.5;
+// are too few to tell noise from motion.
+constexpr double kMostlyMotion = 0.5;
 
 }  // namespace
 
@@ -41,7 +41,8 @@ Squares squares(const Problem& problem, const Solution& solution) {
       return plainly.size() > 0 ? noise_about_smooth_curve(data.t_s, predicted_m(data, plainly))
                                 : 0.0;
     };
-    const bool motion = !data.sigma_unknown && predicted_noise_m() > kMostlyMotion * noise_m;
+    const bool motion = !data.sigma_unknown && (std::ssize(data.t_s) < kFewestForNoise ||
+                                                predicted_noise_m() > kMostlyMotion * noise_m);
     for (const Reading& reading : data.readings) {
       if (reading.channel != Channel::position) continue;
       const Eigen::Matrix2d wt = reading.whitener.transpose();

@@ -7,8 +7,9 @@ namespace trochoid::fitting {
 
 /// Squares of the positions, in units of the track's sigmas: about the prediction, as far as a
 /// robust loss lets them count, about their mean, and about a smooth curve. The last is noise only
-/// where frames follow each other closely enough; where the prediction scatters likewise it counts
-/// for twice the sigmas at most.
+/// where frames follow each other closely enough; where the prediction scatters likewise, or
+/// samples are fewer than kFewestForNoise, it counts for kMisjudged times the stated sigmas at
+/// most.
 struct Squares {
   bool ok = true;
   double residual = 0.0, motion = 0.0, scatter = 0.0;

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <limits>
 
 #include "observe/angles.hpp"
 #include "observe/consensus.hpp"
@@ -344,7 +345,9 @@ double excess_scatter(const ArcData& arc, Channel channel) {
       Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
   if (planar) curve = arc.positions_m();
   const double noise = std::min(noise_about_smooth_curve(t_s, curve), white_noise(t_s, curve));
-  return std::max(1.0, noise / median_or_zero(std::move(sigmas)));
+  const double most =
+      std::ssize(values) < kFewestForNoise ? kMisjudged : std::numeric_limits<double>::infinity();
+  return std::clamp(noise / median_or_zero(std::move(sigmas)), 1.0, most);
 }
 
 bool shows_direction(const ArcData& arc, std::size_t i) {

@@ -94,8 +94,12 @@ struct ChannelChoice {
 /// is a tenth of the samples or more.
 [[nodiscard]] double extent_m(const ArcData& arc);
 
+/// By as much a tracker may misjudge its noise: where samples do not tell noise from motion, their
+/// scatter about a smooth curve is believed up to so many times the stated sigmas.
+inline constexpr double kMisjudged = 2.0;
+
 /// Factor, at least 1, by which a channel's readings scatter more about a smooth curve than their
-/// own sigmas say.
+/// own sigmas say; at most kMisjudged where they are fewer than kFewestForNoise.
 [[nodiscard]] double excess_scatter(const ArcData& arc, Channel channel);
 
 /// Whether a reading and the next one are the tilt and the precession of one sample, to be compared

@@ -159,7 +159,7 @@ Eigen::VectorXd difference_weights(std::span<const double> t_s, int first, int o
 double white_noise(std::span<const double> t_s, const Eigen::MatrixXd& samples) {
   const int n = static_cast<int>(t_s.size());
   double least = std::numeric_limits<double>::infinity();
-  if (n < 20) return least;
+  if (n < kFewestForNoise) return least;
   for (const int order : {6, 8}) {
     std::vector<double> differences;
     for (int first = 0; first + order < n; ++first) {

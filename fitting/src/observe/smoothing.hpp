@@ -25,10 +25,13 @@ struct SmoothCurve {
 [[nodiscard]] double noise_about_smooth_curve(std::span<const double> t_s,
                                               const Eigen::MatrixXd& samples);
 
+/// Samples of which fewer do not tell white noise from motion.
+inline constexpr int kFewestForNoise = 20;
+
 /// Standard deviation of one coordinate's white noise, from divided differences of order 6 and 8,
 /// the smaller: fast motion (eight samples to a turn) adds nothing to them, noise that hangs
-/// together over several samples little. Robust to a few outliers; infinite for fewer than 20
-/// samples.
+/// together over several samples little. Robust to a few outliers; infinite for fewer than
+/// kFewestForNoise samples.
 [[nodiscard]] double white_noise(std::span<const double> t_s, const Eigen::MatrixXd& samples);
 
 /// Median; 0 for an empty list.
