@@ -10,12 +10,26 @@ data::Scene scene_as_fitted(const data::Scene& given) {
   return completed(given, {});
 }
 
+namespace {
+
+// What a fit found of a parameter for an arc. A state that it tells of the first arc alone is none
+// of the others', in which it stayed as the scene has it.
+const data::FitParameter* found_for(const data::Fit& fit, const model::ParameterInfo& info,
+                                    std::size_t arc) {
+  const data::FitParameter* found = fit.find(info.name, arc);
+  const bool of_first = found != nullptr && arc > 0 && found->name == info.name &&
+                        found->status != data::ParameterStatus::fixed;
+  return of_first && info.role == model::ParameterInfo::Role::initial ? nullptr : found;
+}
+
+}  // namespace
+
 Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
                               std::size_t arc) {
   const auto& parameters = predictor.parameters();
   Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const data::FitParameter* fitted = fit.find(parameters[i].name, arc);
+    const data::FitParameter* fitted = found_for(fit, parameters[i], arc);
     values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
   }
   return values;

@@ -365,6 +365,16 @@ TEST(PuckFit, DoesNotTakeASpinForTheAir) {
   EXPECT_THAT(chosen.fit.warnings, testing::Contains(testing::HasSubstr("which way round")));
 }
 
+// Half of what such a spin bends the path by was taken for friction, without a word of it.
+TEST(PuckFit, TakesNoFirstValueOfASpinThatNothingShowsForTrue) {
+  Turning turning{.generator = std::mt19937_64(13)};
+  turning.slide({{"vx_m_s", 0.8}}, 100).blind();
+  const double plain = fit(std::span(&turning.track, 1), turning.scene).find("friction")->value;
+  turning.scene.start.w3_rad_s = turning.spin_rad_s(1.0, 0.8);
+  const data::Fit result = fit(std::span(&turning.track, 1), turning.scene);
+  EXPECT_DOUBLE_EQ(result.find("friction")->value, plain);
+}
+
 // What the data show and a prior tells as well is one parameter, not two.
 TEST(PuckFit, APriorOnTheAngleOfAMarkCountsBesideTheMark) {
   Turning turning{.generator = std::mt19937_64(12)};

@@ -330,6 +330,18 @@ TEST(Prior, ThatContradictsTheTrackMakesTheFitDoubtful) {
   EXPECT_THAT(torn.verdict_words, testing::HasSubstr("which alone says about 0.0996"));
 }
 
+TEST(Prior, OnAnAngleIsAsNearByWholeTurns) {
+  const data::Track track = thesis_track(25.0, 1e-3, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  const double alone = fit_of(track, scene).find("phi_rad")->value;
+  scene.fit.prior["phi_rad"] = {alone + 2.0 * M_PI + 0.05, 0.1};
+  const data::Fit result = fit_of(track, scene);
+  EXPECT_EQ(result.verdict, data::FitVerdict::good) << result.verdict_words;
+  EXPECT_NEAR(result.find("phi_rad")->value, alone, 0.01);
+  EXPECT_THAT(result.warnings, testing::Not(testing::Contains(testing::HasSubstr("prior"))));
+}
+
 // A length fixed at a little too much was taken for true: a and b came out 30 error bars off,
 // "good".
 TEST(FixedValue, ThatContradictsTheTrackMakesTheFitDoubtful) {
@@ -344,7 +356,8 @@ TEST(FixedValue, ThatContradictsTheTrackMakesTheFitDoubtful) {
   scene.fit.fixed["l_m"] = 0.105;
   const data::Fit torn = fit_of(track, scene);
   EXPECT_EQ(torn.verdict, data::FitVerdict::doubtful) << torn.verdict_words;
-  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("l_m = 0.105 is fixed, and the track alone says"));
+  EXPECT_THAT(torn.verdict_words,
+              testing::HasSubstr("l_m = 0.105 is fixed, and the track alone says"));
 }
 
 TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {

@@ -146,6 +146,20 @@ w3_rad_s = 20.0
                           {{"contact_radius_m", 0.012}, {"friction", 0.08}}));
 }
 
+// After an impact a puck went on with the spin that its mark had shown before.
+TEST(FittedScene, HasOfALaterArcNoStateThatWasFoundOfTheFirstAlone) {
+  data::Fit fit = fit_of(
+      "[body]\nkind = \"disc\"\nradius_m = 0.03\nmass_kg = 0.05\n[support]\nkind = \"flat\"\n"
+      "[model]\nname = \"puck\"\nfriction = 0.2\n",
+      {{"w3_rad_s", 40.0}, {"vx_m_s", 1.2}});
+  fit.arcs.push_back({.track = 0, .object = 0, .from_s = 1.6, .to_s = 2.5, .samples = 91});
+  fit.parameters.push_back({.name = "vx_m_s@1", .value = -0.4, .unit = "m/s", .note = {}});
+  const data::Scene later = fitted_scene(fit, 1);
+  EXPECT_EQ(later.start.vx_m_s, -0.4);
+  EXPECT_EQ(later.start.w3_rad_s.value_or(0.0), 0.0);
+  EXPECT_EQ(later.model.friction, 0.2);
+}
+
 TEST(FittedScene, SaysHowManyArcsThereAre) {
   try {
     (void)fitted_scene(data::Fit{}, 0);

@@ -124,9 +124,10 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
                    const FitOptions& options) {
   data::Scene named = scene;
   if (!options.model.empty()) named.model.name = options.model;
-  // A body held at a pivot that leans there is a top, one that lies on it only turns.
+  // A body held at a pivot that leans there is a top, one that lies on it only turns: to which a
+  // body has to be known.
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
-  if (open && leaves_pivot(tracks, named, options)) named.model.name = "top";
+  if (open && (!named.body || leaves_pivot(tracks, named, options))) named.model.name = "top";
   if (!named.body && named.model.name == "auto")
     throw InputError(
         "models can be compared for a [body] with its kind and radius_m; without one name the "

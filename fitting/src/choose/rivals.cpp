@@ -169,7 +169,8 @@ double further_variance(const data::Fit& larger, const data::Fit& chosen, const 
   if (here == nullptr || there == nullptr || !std::isfinite(there->sigma)) return 0.0;
   const double further = there->sigma * there->sigma - here->sigma * here->sigma;
   const double all = std::max(std::abs(here->value), std::abs(there->value));
-  return std::max(0.0, losses.contains(name) ? std::min(further, all * all) : further);
+  const bool never_negative = losses.contains(name) || name == "friction";
+  return std::max(0.0, never_negative ? std::min(further, all * all) : further);
 }
 
 // Those that may be right as well, and those against which there is strong evidence, but only for

@@ -57,8 +57,7 @@ Tangent tangent(const Problem& problem, const Eigen::VectorXd& u) {
     const FreeParameter& parameter = problem.free[i];
     const double slope = parameter.transform.slope(u[i]), value = problem.value(i, u);
     all.jacobian.col(i) *= slope;
-    if (parameter.prior)
-      all.residuals[row++] = (value - parameter.prior->value) / parameter.prior->sigma;
+    if (parameter.prior) all.residuals[row++] = off_prior(*parameter.prior, value, parameter.turns);
     at.nothing[i] = -value / slope;
     at.positive[i] =
         is_loss(problem, parameter) && problem.predictor->parameters()[parameter.index].logarithmic;
@@ -258,16 +257,19 @@ double variance_inflation(std::span<const data::Track> tracks, const data::Scene
 
 namespace {
 
-// An error bar may have been widened beyond all that a parameter can be. Of a loss that rivals do
-// without the bar says enough.
+// An error bar may have been widened beyond all that a parameter can be. Of a loss or a friction
+// that rivals do without the bar says enough.
 void tell_open(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
   std::vector<std::string> open;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const std::string name = problem.name(i);
     const auto parameter =
         std::find_if(fit.parameters.begin(), fit.parameters.end(),
-                     [&](const data::FitParameter& p) { return p.name == problem.name(i); });
-    if (parameter == fit.parameters.end() || !parameter->identifiable ||
-        parameter->status != data::ParameterStatus::free || is_loss(problem, problem.free[i]) ||
+                     [&](const data::FitParameter& p) { return p.name == name; });
+    const bool coefficient =
+        is_loss(problem, problem.free[i]) || name == "friction" || name == kSlipScale;
+    if (parameter == fit.parameters.end() || !parameter->identifiable || coefficient ||
+        parameter->status != data::ParameterStatus::free ||
         parameter->sigma < natural_size(problem, i, u))
       continue;
     parameter->identifiable = false;

@@ -39,9 +39,11 @@ struct Contrast {
 
 // @param leverage  share of what is known of the parameter that the prior brings, 0..1.
 // @param inflation  of the tracks' variance.
-Contrast contrast_of(const data::Prior& prior, double value, double leverage, double inflation) {
+Contrast contrast_of(const FreeParameter& parameter, double value, double leverage,
+                     double inflation) {
+  const data::Prior& prior = *parameter.prior;
   const double ratio = leverage / (1.0 - leverage);  // the tracks' variance over the prior's
-  const double pulled = value - prior.value;
+  const double pulled = prior.sigma * off_prior(prior, value, parameter.turns);
   return {std::abs(pulled) * (1.0 + ratio) / (prior.sigma * std::sqrt(1.0 + inflation * ratio)),
           value + pulled * ratio, prior.sigma * std::sqrt(inflation * ratio)};
 }
@@ -138,7 +140,7 @@ void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u
     if (!(leverage < 1.0 - kPriorAlone)) continue;
     const data::Prior& prior = *parameter.prior;
     const Contrast says =
-        contrast_of(prior, problem.value(i, u), leverage, error.chi2_inflation[i]);
+        contrast_of(parameter, problem.value(i, u), leverage, error.chi2_inflation[i]);
     if (!(says.apart > kWorthWords)) continue;
     const std::string words = fmt::format(
         "the prior {} = {:.6g} ± {:.2g} and the track, which alone says about {:.6g} ± {:.2g}, are "

@@ -20,7 +20,7 @@ void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
 /// Tells where several tracks ask for different values of the parameters that they share, by the
 /// derivatives at the minimum: which track, and of which parameter above all. The verdict is
 /// doubtful then, but of filmed tracks only where that says more than trackers err with the motion.
-/// Of pucks tell_whether_one_friction() says more.
+/// Of pucks doubt_if_frictions_differ() says more.
 /// @param u  a minimum, by which the problem's weights are set.
 void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
                             const Uncertainty& error, data::Fit& fit);

@@ -9,7 +9,6 @@
 
 #include "judge/degeneracies.hpp"
 #include "judge/derived.hpp"
-#include "judge/one_friction.hpp"
 #include "judge/steady_top.hpp"
 #include "observe/observed.hpp"
 #include "trochoid/data/angle.hpp"
@@ -214,7 +213,6 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
   report_parameters(problem, error, scene.fit, fit);
   describe_arcs(problem, fit);
   warn(problem, error, fit);
-  tell_whether_one_friction(problem, fit);
   warn_short_rim(problem, solution.u, fit);
   warn_thick_air(scene, fit);
   add_derived_velocity(problem, solution.u, error.covariance, fit);

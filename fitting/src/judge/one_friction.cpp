@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "judge/adequacy.hpp"
 #include "judge/statistics.hpp"
 #include "judge/widen.hpp"
 #include "observe/observed.hpp"
@@ -59,7 +60,7 @@ void widen_friction(double times, data::Fit& fit) {
 
 }  // namespace
 
-void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
+void doubt_if_frictions_differ(const Problem& problem, data::Fit& fit) {
   const int friction = problem.predictor->index_of("friction");
   const int arcs = static_cast<int>(problem.arcs.size());
   if (problem.predictor->model_name() != "puck" || friction < 0 || arcs < 2) return;
@@ -84,12 +85,19 @@ void tell_whether_one_friction(const Problem& problem, data::Fit& fit) {
     chi2 += std::pow((one.value - sum / weights) / one.sigma, 2);
   const double dof = static_cast<double>(estimates.size()) - 1.0;
   const double p = chi2_upper_tail(chi2, dof);
-  constexpr double kDoubtful = 0.01;
+  constexpr double kDoubtful = 0.01, kBeyondChance = 1e-6;
   if (p <= kDoubtful) widen_friction(std::sqrt(chi2 / dof), fit);
-  fit.warnings.push_back(fmt::format(
+  const std::string words = fmt::format(
       "one friction coefficient {} the {} arcs (chi-square {:.3g} for {:.0f}, p = {:.2g}); alone: "
       "{}",
-      p > kDoubtful ? "explains" : "does not explain", estimates.size(), chi2, dof, p, list));
+      p > kDoubtful ? "explains" : "does not explain", estimates.size(), chi2, dof, p, list);
+  fit.warnings.push_back(words);
+  if (p > kBeyondChance || !says_explained(fit)) return;
+  fit.verdict = data::FitVerdict::doubtful;
+  fit.verdict_words = fmt::format(
+      "the model follows the track, but does not explain it: one friction coefficient does not "
+      "explain its {} arcs (p = {:.2g}); the body, the floor or the model is another",
+      estimates.size(), p);
 }
 
 }  // namespace trochoid::fitting

@@ -53,8 +53,7 @@ class OneParameter {
   [[nodiscard]] double outside(double u) const {
     const FreeParameter& parameter = problem_.free[index_];
     if (!parameter.prior) return 0.0;
-    const double off =
-        (parameter.transform.value(u) - parameter.prior->value) / parameter.prior->sigma;
+    const double off = off_prior(*parameter.prior, parameter.transform.value(u), parameter.turns);
     return off * off;
   }
 

@@ -10,6 +10,7 @@
 #include "judge/adequacy.hpp"
 #include "judge/contradictions.hpp"
 #include "judge/counting.hpp"
+#include "judge/one_friction.hpp"
 
 namespace trochoid::fitting {
 
@@ -156,6 +157,7 @@ void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Un
   doubt_if_priors_contradict(problem, u, error, fit);
   doubt_if_fixed_contradict(problem, u, settings, fit);
   doubt_if_tracks_differ(problem, u, error, fit);
+  doubt_if_frictions_differ(problem, fit);
 }
 
 }  // namespace trochoid::fitting

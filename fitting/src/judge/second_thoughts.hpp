@@ -16,6 +16,7 @@ namespace trochoid::fitting {
 ///     times as many as hang together: the body moves there as the model does not let it, and the
 ///     state at the first sample is the model's path followed back to it. Of three or more a
 ///     tracker may have missed, and a warning tells;
+///   - a puck's arcs have frictions that differ beyond all chance (one_friction.hpp);
 ///   - a prior, a fixed value, or one of several tracks contradicts the rest (contradictions.hpp).
 /// @param settings  [fit] of the scene.
 /// @param u  a minimum, by which the problem's weights are set.

@@ -29,7 +29,7 @@ bool all_rows(const Problem& problem, const Eigen::VectorXd& u, Eigen::VectorXd&
     const FreeParameter& known = problem.free[i];
     // A held parameter still pays for its distance from what was known of it.
     if (known.prior)
-      add(i, (known.transform.value(u[i]) - known.prior->value) / known.prior->sigma,
+      add(i, off_prior(*known.prior, known.transform.value(u[i]), known.turns),
           known.held ? 0.0 : known.transform.slope(u[i]) / known.prior->sigma);
     if (known.soft_prior && !known.held)
       add(i, (u[i] - known.soft_prior->value) / known.soft_prior->sigma,

@@ -59,7 +59,7 @@ void check_new(std::span<const data::Track> tracks, std::size_t i) {
 std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::string& model,
                              const data::Scene& scene, const FitOptions& options) {
   const bool folded = scene.body && scene.body->kind != data::BodyKind::top &&
-                      scene.body->faces_look_alike() && model != "top";
+                      scene.body->faces_look_alike() && !model.starts_with("top");
   std::vector<ArcData> arcs;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     data::check(tracks[i], fmt::format("track {}", i + 1));
@@ -127,7 +127,11 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
         problem.free.push_back(free_parameter(*problem.predictor, scene.fit, index, arc, value));
       if (told && !seen && name == std::string("w3_rad_s"))
         start_turning(prior->second, problem.base[arc][index]);
-      if (!seen && !told && is_free) std::erase_if(problem.free, same);
+      if (seen || told) continue;
+      if (is_free) std::erase_if(problem.free, same);
+      // A first value says nothing of how fast it turns: as if it did not, which the error bars
+      // allow for.
+      if (name == std::string("w3_rad_s")) problem.base[arc][index] = 0.0;
     }
   }
   // A face that is crowned rests further in than its rim; path and spin together tell.

@@ -384,8 +384,14 @@ FreeParameter free_parameter(const model::Predictor& predictor, const data::FitS
   const ParameterInfo& info = predictor.parameters()[index];
   FreeParameter parameter{index, arc, transform_of(info, predictor.model_name(), settings), {}, {}};
   parameter.given = value;
+  parameter.turns = info.name == "phi_rad" || info.name == "psi_rad";
   if (const auto* prior = said_of(info.name, settings.prior)) parameter.prior = *prior;
   return parameter;
+}
+
+double off_prior(const data::Prior& prior, double value, bool turns) {
+  const double off = value - prior.value;
+  return (turns ? data::wrapped(off) : off) / prior.sigma;
 }
 
 Problem make_problem(const model::Predictor& predictor, std::vector<ArcData> arcs,

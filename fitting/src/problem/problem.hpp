@@ -76,7 +76,12 @@ struct FreeParameter {
   std::optional<data::Prior> soft_prior;  ///< on u, while exploring: short windows see no friction
   double given = 0.0;  ///< value before any fitting: the scene's, or the model's default
   bool held = false;   ///< stays where it is for now
+  bool turns = false;  ///< an angle that whole turns bring back
 };
+
+/// How far a value is from what is known of it beforehand [standard deviations].
+/// @param turns  whole turns are no distance.
+[[nodiscard]] double off_prior(const data::Prior& prior, double value, bool turns);
 
 /// Whether it came to lie where it is no longer sought, as a friction that is never overcome.
 [[nodiscard]] inline bool at_its_limit(const FreeParameter& parameter, double value) {

@@ -55,14 +55,14 @@ class ArcCost : public ceres::CostFunction {
 // What is known from outside, (value - prior)/sigma; or a soft prior, the same on u itself.
 class PriorCost : public ceres::CostFunction {
  public:
-  PriorCost(const Transform& transform, const data::Prior& prior, int size, int entry)
-      : transform_(transform), prior_(prior), size_(size), entry_(entry) {
+  PriorCost(const Transform& transform, const data::Prior& prior, bool turns, int size, int entry)
+      : transform_(transform), prior_(prior), turns_(turns), size_(size), entry_(entry) {
     set_num_residuals(1);
     mutable_parameter_block_sizes()->push_back(size);
   }
   bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
     const double u = blocks[0][entry_];
-    residuals[0] = (transform_.value(u) - prior_.value) / prior_.sigma;
+    residuals[0] = off_prior(prior_, transform_.value(u), turns_);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       std::fill_n(jacobians[0], size_, 0.0);
       jacobians[0][entry_] = transform_.slope(u) / prior_.sigma;
@@ -73,6 +73,7 @@ class PriorCost : public ceres::CostFunction {
  private:
   Transform transform_;
   data::Prior prior_;
+  bool turns_;
   int size_, entry_;
 };
 
@@ -118,16 +119,17 @@ void add_costs(const Problem& problem, const Blocks& blocks, Eigen::VectorXd& u,
     if (blocks.size[arc + 1] > 0) used.push_back(u.data() + blocks.first[arc + 1]);
     ceres_problem.AddResidualBlock(new ArcCost(problem, arc), nullptr, used);
   }
-  const auto add_prior = [&](int i, const Transform& transform, const data::Prior& prior) {
+  const auto add_prior = [&](int i, const Transform& transform, const data::Prior& prior,
+                             bool turns) {
     const int block = problem.free[i].arc + 1;
     ceres_problem.AddResidualBlock(
-        new PriorCost(transform, prior, blocks.size[block], i - blocks.first[block]), nullptr,
-        u.data() + blocks.first[block]);
+        new PriorCost(transform, prior, turns, blocks.size[block], i - blocks.first[block]),
+        nullptr, u.data() + blocks.first[block]);
   };
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     const FreeParameter& parameter = problem.free[i];
-    if (parameter.prior) add_prior(i, parameter.transform, *parameter.prior);
-    if (parameter.soft_prior) add_prior(i, Transform{}, *parameter.soft_prior);
+    if (parameter.prior) add_prior(i, parameter.transform, *parameter.prior, parameter.turns);
+    if (parameter.soft_prior) add_prior(i, Transform{}, *parameter.soft_prior, false);
   }
 }
 

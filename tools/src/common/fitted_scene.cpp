@@ -47,10 +47,14 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
     {"spin_down_imbalance_sin_rad_s2", &ModelSettings::spin_down_imbalance_sin_rad_s2},
     {"spin_down_imbalance_cos_rad_s2", &ModelSettings::spin_down_imbalance_cos_rad_s2}};
 
-/// The fit's value of a parameter in one arc; initial states of later arcs are marked "@arc".
+/// The fit's value of a parameter in one arc; initial states of later arcs are marked "@arc", and
+/// one that the fit tells of the first arc alone is none of theirs.
 std::optional<double> value_of(const data::Fit& fit, const std::string& name, std::size_t arc) {
   const data::FitParameter* found = fit.find(name, arc);
-  return found != nullptr ? std::optional(found->value) : std::nullopt;
+  if (found == nullptr) return std::nullopt;
+  const bool of_first = arc > 0 && kStart.contains(name) && found->name == name &&
+                        found->status != data::ParameterStatus::fixed;
+  return of_first ? std::nullopt : std::optional(found->value);
 }
 
 /// An air couple has one coefficient for both transverse axes and one for the symmetry axis.
