@@ -260,6 +260,7 @@ namespace {
 // An error bar may have been widened beyond all that a parameter can be. Of a loss or a friction
 // that rivals do without the bar says enough.
 void tell_open(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
+  constexpr double kFarBeyond = 3.0;  // a spin near nothing may be as uncertain as it is large
   std::vector<std::string> open;
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
     const std::string name = problem.name(i);
@@ -270,7 +271,7 @@ void tell_open(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit)
         is_loss(problem, problem.free[i]) || name == "friction" || name == kSlipScale;
     if (parameter == fit.parameters.end() || !parameter->identifiable || coefficient ||
         parameter->status != data::ParameterStatus::free ||
-        parameter->sigma < natural_size(problem, i, u))
+        parameter->sigma < kFarBeyond * natural_size(problem, i, u))
       continue;
     parameter->identifiable = false;
     open.push_back(parameter->name);
