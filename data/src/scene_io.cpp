@@ -331,6 +331,7 @@ std::vector<std::string> given_keys(const Scene& scene) {
       names.push_back(fmt::format("{}.{}", table, key));
     });
   };
+  add("support", scene.support, [](auto&& v) { support_keys(v); });
   add("model", scene.model, [](auto&& v) { model_keys(v); });
   add("start", scene.start, [](auto&& v) { start_keys(v); });
   add("run", scene.run, [](auto&& v) { run_keys(v); });

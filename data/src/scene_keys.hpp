@@ -28,8 +28,11 @@ constexpr Range kNonNegative{0.0, kLargest, true, "0 or greater"};
 constexpr Range kSize{0.0, 10.0, false, "in metres, greater than 0 and at most 10"};
 constexpr Range kSizeOrNone{0.0, 10.0, true, "in metres, 0 to 10"};
 constexpr Range kTilt{0.0, kPi, true, "between 0 (lying flat) and pi"};
+constexpr Range kSlope{-Support::kSteepest, Support::kSteepest, true,
+                       "between -0.2 and 0.2, the floor's rise per length"};
 constexpr Range kTolerance{1e-15, 0.1, true, "between 1e-15 (finer is below rounding) and 0.1"};
 constexpr Range kObjects{1.0, TrackingSettings::kMostObjects, true, "a whole number in 1..64"};
+static_assert(Support::kSteepest == 0.2, "as kSlope words it");
 static_assert(TrackingSettings::kMostObjects == 64, "as kObjects words it");
 
 /// A word out of a list; the index in the list is the value of an enum.
@@ -73,6 +76,8 @@ template <class Visit>
 void support_keys(Visit&& visit) {
   visit("kind", &Support::kind, kSupportKinds);
   visit("pivot_m", &Support::pivot_m, kAny);
+  visit("slope_x", &Support::slope_x, kSlope);
+  visit("slope_y", &Support::slope_y, kSlope);
 }
 
 template <class Visit>

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,13 @@ void check_request(const Predictor& predictor, const Eigen::Ref<const Eigen::Vec
 
 /// At most one of a rate's names may be given, as StartSettings has it. @throws InputError.
 void check_rates(const data::StartSettings& start);
+
+/// The floor's rise per length along x and y, where the scene gives it or speaks of it in [fit].
+/// @throws InputError if it is steeper than Support::kSteepest.
+[[nodiscard]] std::optional<Eigen::Vector2d> floor_slope(const data::Scene& scene);
+
+/// `slope_x` and `slope_y`. Stated alone they are known: the model's choice is not to fit them.
+[[nodiscard]] std::vector<ParameterInfo> slope_parameters(const Eigen::Vector2d& slope);
 
 /// The columns every run with Euler angles begins with: t_s, phi_rad, ... energy_J.
 [[nodiscard]] const std::vector<std::string>& euler_columns();

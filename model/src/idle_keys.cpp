@@ -22,11 +22,14 @@ const std::vector<Readers>& readers() {
   const std::vector<std::string_view> top{"top", "top-euler"};
   const std::vector<std::string_view> leaning{"rolling", "smooth",    "sliding",
                                               "top",     "top-euler", "free"};
+  const std::vector<std::string_view> floor{"rolling", "smooth", "sliding", "puck"};
   static const std::vector<Readers> list{
+      {"support.slope_x", floor},
+      {"support.slope_y", floor},
       {"model.gravity_m_s2", {"rolling", "smooth", "sliding", "top", "top-euler", "puck"}},
       {"model.air_linear_N_m_s", rim},
       {"model.air_quadratic_N_m_s2", rim},
-      {"model.air_force_N_s_m", {"rolling", "smooth", "sliding", "puck"}},
+      {"model.air_force_N_s_m", floor},
       {"model.gap_viscosity_Pa_s", rim},
       {"model.friction", {"sliding", "puck"}},
       {"model.slip_regularisation_m_s", rim},
@@ -52,8 +55,8 @@ const std::vector<Readers>& readers() {
       {"start.dtheta_rad_s", leaning},
       {"start.dphi_rad_s", leaning},
       {"start.omega_s_rad_s", {"top", "top-euler", "pivot", "free"}},
-      {"start.x_m", {"rolling", "smooth", "sliding", "puck"}},
-      {"start.y_m", {"rolling", "smooth", "sliding", "puck"}},
+      {"start.x_m", floor},
+      {"start.y_m", floor},
       {"start.vx_m_s", {"smooth", "sliding", "puck"}},
       {"start.vy_m_s", {"smooth", "sliding", "puck"}},
       {"start.w_body_rad_s", {"free"}},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 
@@ -64,6 +65,41 @@ Prediction unknown_prediction(const PredictRequest& request) {
   out.values.setConstant(rows, kNan);
   out.jacobian.setConstant(rows, static_cast<Eigen::Index>(request.derivatives.size()), kNan);
   return out;
+}
+
+namespace {
+
+constexpr const char* kSlopeNames[] = {"slope_x", "slope_y"};
+
+bool speaks_of_slope(const data::FitSettings& fit) {
+  return std::any_of(std::begin(kSlopeNames), std::end(kSlopeNames), [&](const char* name) {
+    return fit.prior.contains(name) || fit.fixed.contains(name) || fit.bounds.contains(name) ||
+           std::find(fit.free.begin(), fit.free.end(), name) != fit.free.end();
+  });
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> floor_slope(const data::Scene& scene) {
+  const data::Support& support = scene.support;
+  if (!support.slope_x && !support.slope_y && !speaks_of_slope(scene.fit)) return std::nullopt;
+  const Eigen::Vector2d slope(support.slope_x.value_or(0.0), support.slope_y.value_or(0.0));
+  for (int axis = 0; axis < 2; ++axis)
+    if (!(std::abs(slope[axis]) <= data::Support::kSteepest))
+      throw InputError(fmt::format(
+          "support.{} = {} must lie between -{} and {}: a rise per length, of a floor nearly level",
+          kSlopeNames[axis], slope[axis], data::Support::kSteepest, data::Support::kSteepest));
+  return slope;
+}
+
+std::vector<ParameterInfo> slope_parameters(const Eigen::Vector2d& slope) {
+  const auto along = [&](const char* name, double value, const char* meaning) {
+    constexpr double kMost = data::Support::kSteepest;
+    return ParameterInfo{name,  "1",    ParameterInfo::Role::dynamics, -kMost, kMost, false, value,
+                         false, meaning};
+  };
+  return {along(kSlopeNames[0], slope.x(), "the floor's rise per length along x"),
+          along(kSlopeNames[1], slope.y(), "the floor's rise per length along y")};
 }
 
 std::string law_of(const data::Scene& scene) {

@@ -28,13 +28,15 @@ enum Parameter : int {
   kFriction = kInitial,
   kDrag,
   kContact,
+  kSlopeX,
+  kSlopeY,
   kAll
 };
 
 struct PuckScene {
   double gravity = 9.81, radius_m = 0.0, bore = 0.0, gyration = 0.5;
   double mass_kg = 1.0, height_m = 0.0;
-  bool mass_known = false, drag = false;
+  bool mass_known = false, drag = false, sloped = false;
   double value[kAll] = {};  ///< by Parameter
 };
 
@@ -69,6 +71,8 @@ PuckScene puck_scene(const data::Scene& scene) {
   puck.mass_known = inertia.mass_known;
   puck.height_m = scene.body->half_thickness_m();
   puck.drag = scene.model.air_force_N_s_m.has_value();
+  const std::optional<Eigen::Vector2d> slope = floor_slope(scene);
+  puck.sloped = slope.has_value();
   const data::StartSettings& start = scene.start;
   const double initial[] = {start.x_m.value_or(0.0),
                             start.y_m.value_or(0.0),
@@ -78,7 +82,9 @@ PuckScene puck_scene(const data::Scene& scene) {
                             start.w3_rad_s.value_or(start.dpsi_rad_s.value_or(0.0)),
                             *scene.model.friction,
                             scene.model.air_force_N_s_m.value_or(0.0),
-                            scene.model.contact_radius_m.value_or(puck.radius_m)};
+                            scene.model.contact_radius_m.value_or(puck.radius_m),
+                            slope ? slope->x() : 0.0,
+                            slope ? slope->y() : 0.0};
   std::copy(std::begin(initial), std::end(initial), puck.value);
   return puck;
 }
@@ -108,6 +114,9 @@ std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
   list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kWidestContact * puck.radius_m,
                   true, puck.value[kContact], false,
                   "radius of the contact, as of an evenly pressed face"});
+  if (puck.sloped)
+    for (const ParameterInfo& info : slope_parameters({puck.value[kSlopeX], puck.value[kSlopeY]}))
+      list.push_back(info);
   return list;
 }
 
@@ -116,6 +125,8 @@ Puck<S> puck_system(const PuckScene& scene, const S (&p)[kAll]) {
   Puck<S> puck;
   puck.friction = p[kFriction];
   puck.drag_1_s = p[kDrag] * (1.0 / scene.mass_kg);
+  puck.rise_x = p[kSlopeX];
+  puck.rise_y = p[kSlopeY];
   puck.gravity = scene.gravity;
   puck.radius = p[kContact];
   puck.bore = scene.bore;
@@ -144,7 +155,7 @@ class PuckPredictor : public Predictor {
   explicit PuckPredictor(const data::Scene& scene)
       : scene_(puck_scene(scene)), infos_(puck_parameters(scene_)) {
     for (int kind = 0; kind < kAll; ++kind)
-      if (kind != kDrag || scene_.drag) kinds_.push_back(kind);
+      if (has(static_cast<Parameter>(kind))) kinds_.push_back(kind);
   }
   [[nodiscard]] const std::string& model_name() const override { return name_; }
   [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override { return infos_; }
@@ -155,6 +166,10 @@ class PuckPredictor : public Predictor {
   template <class S>
   void fill(const PuckPath<S>& path, const S& contact_radius_m, const PredictRequest& request,
             Prediction& out) const;
+  [[nodiscard]] bool has(Parameter kind) const {
+    if (kind == kDrag) return scene_.drag;
+    return scene_.sloped || (kind != kSlopeX && kind != kSlopeY);
+  }
   /// Place and angle at the start only add to those later; their derivatives need no lane.
   [[nodiscard]] bool cyclic(int parameter) const {
     const int kind = kinds_[static_cast<std::size_t>(parameter)];
@@ -240,7 +255,7 @@ Prediction PuckPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& value
          out);
     return out;
   }
-  Dual8 p[kAll];  // at most six parameters are not cyclic
+  Dual8 p[kAll];  // at most eight parameters are not cyclic
   given(p);
   int lane = 0;
   for (const int parameter : request.derivatives)
@@ -293,14 +308,17 @@ Trajectory simulate_puck(const data::Scene& scene) {
     const double kinetic =
         0.5 * m *
         (s[P::vx] * s[P::vx] + s[P::vy] * s[P::vy] + value_of(system.gyration) * s[P::q] * s[P::q]);
-    if (puck.mass_known) row.push_back(kinetic + m * puck.gravity * puck.height_m);
+    const double height_m =
+        puck.height_m + puck.value[kSlopeX] * s[P::x] + puck.value[kSlopeY] * s[P::y];
+    if (puck.mass_known) row.push_back(kinetic + m * puck.gravity * height_m);
     row.insert(row.end(), {w, s[P::vx], s[P::vy]});
     if (puck.mass_known) {
       const bool moves = t_s[n] < path.rest_s;
       const auto a = moves ? system.acceleration(s) : FaceForce<double>{0.0, 0.0, 0.0};
       const double drag = value_of(system.drag_1_s);
-      row.insert(row.end(),
-                 {m * puck.gravity, m * (a.x + drag * s[P::vx]), m * (a.y + drag * s[P::vy])});
+      row.insert(row.end(), {m * puck.gravity,
+                             m * (a.x + drag * s[P::vx] + puck.gravity * puck.value[kSlopeX]),
+                             m * (a.y + drag * s[P::vy] + puck.gravity * puck.value[kSlopeY])});
     }
     run.values.row(static_cast<Eigen::Index>(n)) =
         Eigen::Map<const Eigen::RowVectorXd>(row.data(), static_cast<Eigen::Index>(row.size()));

@@ -29,6 +29,7 @@ struct RimInput {
 struct RimModel {
   RimBody body;
   data::ModelSettings terms;
+  bool sloped = false;
 };
 
 /// Components of the state at the output times that were reached.
@@ -65,15 +66,17 @@ void place(const RimModel& model, const RimInput<From>& input, System& system) {
   system.body = model.body;
   system.body.side = touching_side(value_of(input.theta), value_of(input.w1));
   LossValues<S> losses{};
-  for (int i = 0; i < kLosses; ++i) {
+  const auto over = [](const From& value) {
     if constexpr (std::is_same_v<S, From>)
-      losses.value[i] = input.losses.value[i];
+      return value;
     else
-      losses.value[i] = S(value_of(input.losses.value[i]));
-  }
+      return S(value_of(value));
+  };
+  for (int i = 0; i < kLosses; ++i) losses.value[i] = over(input.losses.value[i]);
   losses.air_ratio = input.losses.air_ratio;
   losses.quadratic_ratio = input.losses.quadratic_ratio;
   losses.eps_w = input.losses.eps_w;
+  losses.rise = {over(input.losses.rise.x), over(input.losses.rise.y)};
   system.losses = make_losses<typename System::LossList>(losses);
 }
 

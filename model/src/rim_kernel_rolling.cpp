@@ -5,7 +5,7 @@ namespace trochoid::model {
 template <class S>
 RimPath<S> run_rolling(const RimModel& model, const RimInput<S>& input,
                        const RimRunOptions& options, std::span<const double> t_s) {
-  return with_terms(model.terms, [&](auto terms) {
+  return with_terms(model.terms, model.sloped, [&](auto terms) {
     return rim_path<S, NoSlip>(model, input, NoSlip<S>{}, S(0.0), Regime::rolling, options, t_s,
                                terms);
   });

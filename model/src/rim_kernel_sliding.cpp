@@ -4,7 +4,7 @@ namespace trochoid::model {
 template <class S>
 RimPath<S> run_smooth(const RimModel& model, const RimInput<S>& input, const RimRunOptions& options,
                       std::span<const double> t_s) {
-  return with_few_terms(model.terms, [&](auto terms) {
+  return with_few_terms(model.terms, model.sloped, [&](auto terms) {
     return rim_path<S, NoFriction>(model, input, NoFriction<S>{}, S(0.0), Regime::sliding, options,
                                    t_s, terms);
   });
@@ -46,7 +46,7 @@ RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input, const Ri
   if (!options.stiff)
     options.max_steps = std::max(options.max_steps, static_cast<int>(std::min(steps, kCountable)));
   const S limit = value_of(friction.eps_v) > 0.0 ? S(0.0) : friction.mu;
-  return with_few_terms(model.terms, [&](auto terms) {
+  return with_few_terms(model.terms, model.sloped, [&](auto terms) {
     return rim_path<S, Coulomb>(model, input, friction, limit, Regime::sliding, options, t_s,
                                 terms);
   });

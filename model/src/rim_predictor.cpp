@@ -9,7 +9,8 @@
 #include "trochoid/data/error.hpp"
 
 // Rolling, sliding and smooth-floor bodies as functions of their parameters. Position and spin
-// angle are cyclic, and so is the azimuth of a rolling body: their derivatives need no lane.
+// angle are cyclic, and so is the azimuth of a body that rolls on a level floor: their derivatives
+// need no lane.
 namespace trochoid::model {
 namespace {
 
@@ -18,8 +19,9 @@ using Role = ParameterInfo::Role;
 
 enum class Floor { rolling, smooth, sliding };
 
-/// Places of the parameters in RimInput: initial state, losses, friction.
-constexpr int kInitial = 10, kFriction = kInitial + kLosses, kSlipScale = kFriction + 1;
+/// Places of the parameters in RimInput: initial state, losses, friction, slope along x and y.
+constexpr int kInitial = 10, kFriction = kInitial + kLosses, kSlipScale = kFriction + 1,
+              kSlope = kSlipScale + 1;
 enum Slot : int { kTheta, kPhi, kPsi, kW1, kW2, kW3, kX, kY, kVx, kVy };
 
 template <class S>
@@ -28,7 +30,8 @@ S& slot(RimInput<S>& in, int index) {
                                 &in.w3,    &in.x,   &in.y,   &in.vx, &in.vy};
   if (index < kInitial) return *initial[index];
   if (index < kFriction) return in.losses.value[index - kInitial];
-  return index == kFriction ? in.friction : in.eps_v;
+  if (index < kSlope) return index == kFriction ? in.friction : in.eps_v;
+  return index == kSlope ? in.losses.rise.x : in.losses.rise.y;
 }
 
 ParameterInfo initial_parameter(const char* name, const char* unit, double value,
@@ -85,17 +88,24 @@ void add_dynamics(const data::ModelSettings& model, Floor floor, Entries& entrie
                 kSlipScale);
 }
 
+void add_slope(const std::optional<Eigen::Vector2d>& slope, Entries& entries) {
+  if (!slope) return;
+  int place = kSlope;
+  for (const ParameterInfo& info : slope_parameters(*slope)) entries.add(info, place++);
+}
+
 class RimPredictor : public Predictor {
  public:
   RimPredictor(const data::Scene& scene, Floor floor, const char* name)
       : name_(name),
         floor_(floor),
-        model_{rim_body(scene), scene.model},
+        model_{rim_body(scene), scene.model, floor_slope(scene).has_value()},
         fixed_(loss_values(scene.model)),
         impact_(scene.run.rim_switch == "impact") {
     const RimStart start = rim_start_or_typical(scene, model_.body);
     add_initial(start, floor, entries_);
     add_dynamics(scene.model, floor, entries_);
+    add_slope(floor_slope(scene), entries_);
   }
   [[nodiscard]] const std::string& model_name() const override { return name_; }
   [[nodiscard]] const std::vector<ParameterInfo>& parameters() const override {
@@ -119,7 +129,8 @@ class RimPredictor : public Predictor {
   void fill_cyclic(const Call& call, Prediction& out) const;
   [[nodiscard]] bool cyclic(int parameter) const {
     const int s = entries_.slots[static_cast<std::size_t>(parameter)];
-    return s == kX || s == kY || s == kPsi || (s == kPhi && floor_ == Floor::rolling);
+    const bool turns_alike = floor_ == Floor::rolling && !model_.sloped;
+    return s == kX || s == kY || s == kPsi || (s == kPhi && turns_alike);
   }
   [[nodiscard]] int initial_count() const { return floor_ == Floor::rolling ? 8 : kInitial; }
 

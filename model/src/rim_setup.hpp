@@ -29,7 +29,8 @@ struct RimStart {
 /// about its resting centre (w3 = 0, steady precession).
 [[nodiscard]] RimStart rim_start_or_typical(const data::Scene& scene, const RimBody& body);
 
-/// Coefficients of every loss term, in the order of `kLossNames`; scalars so that derivatives pass.
+/// Coefficients of every loss term, in the order of `kLossNames`, and the floor's slope; scalars so
+/// that derivatives pass.
 inline constexpr int kLosses = 9;
 extern const char* const kLossNames[kLosses];
 enum class Loss : int {
@@ -50,6 +51,7 @@ struct LossValues {
   double air_ratio = 1.0;        ///< c2/c1
   double quadratic_ratio = 1.0;  ///< q2/q1
   double eps_w = 0.01;
+  World<S> rise{S(0.0), S(0.0)};  ///< of the floor per length
   [[nodiscard]] const S& operator[](Loss loss) const { return value[static_cast<int>(loss)]; }
 };
 
@@ -88,6 +90,10 @@ template <class S>
 void assign(ContourFriction<S>& term, const LossValues<S>& v) {
   term = {v[Loss::contour], v.eps_w};
 }
+template <class S>
+void assign(FloorSlope<S>& term, const LossValues<S>& v) {
+  term.rise = v.rise;
+}
 template <class List, class S>
 [[nodiscard]] List make_losses(const LossValues<S>& values) {
   List losses;
@@ -102,32 +108,36 @@ struct TermList {
   using List = Losses<S, Terms...>;
 };
 
+using EveryLoss = TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                           PivotingFriction, ContourFriction>;
+using EveryLossOnSlope = TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
+                                  PivotingFriction, ContourFriction, FloorSlope>;
+
 /// Calls visit(TermList<...>) with the leanest compiled list that has every term of the scene.
 template <class Visit>
-auto with_terms(const data::ModelSettings& model, Visit&& visit) {
+auto with_terms(const data::ModelSettings& model, bool sloped, Visit&& visit) {
+  if (sloped) return visit(EveryLossOnSlope{});
   const bool linear = model.air_linear_N_m_s.has_value();
   const bool other_air =
       model.air_quadratic_N_m_s2 || model.air_force_N_s_m || model.gap_viscosity_Pa_s;
   const bool couples =
       model.rolling_friction_m || model.pivoting_friction_m || model.contour_friction_m;
-  if (couples && (linear || other_air))
-    return visit(TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
-                          PivotingFriction, ContourFriction>{});
+  if (couples && (linear || other_air)) return visit(EveryLoss{});
   if (couples) return visit(TermList<RollingFriction, PivotingFriction, ContourFriction>{});
   if (other_air) return visit(TermList<LinearAir, QuadraticAir, AirForce, GapLayer>{});
   if (linear) return visit(TermList<LinearAir>{});
   return visit(TermList<>{});
 }
 
-/// Sliding bodies have two compiled lists: no loss but friction, and every loss.
+/// Sliding bodies have three compiled lists: no loss but friction, every loss, and on a slope.
 template <class Visit>
-auto with_few_terms(const data::ModelSettings& model, Visit&& visit) {
+auto with_few_terms(const data::ModelSettings& model, bool sloped, Visit&& visit) {
+  if (sloped) return visit(EveryLossOnSlope{});
   const LossValues<double> losses = loss_values(model);
   bool any = false;
   for (const double value : losses.value) any = any || value > 0.0;
   if (!any) return visit(TermList<>{});
-  return visit(TermList<LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
-                        PivotingFriction, ContourFriction>{});
+  return visit(EveryLoss{});
 }
 
 }  // namespace trochoid::model

@@ -52,7 +52,11 @@ std::vector<double> row_of(const Columns& columns, const System& system, double 
   const double dphi = q.w2 / q.at.s;
   std::vector<double> row{t_s,  y[Rim::phi],           y[Rim::theta], y[Rim::psi], dphi,
                           q.w1, q.w3 - q.precession_k, y[Rim::x],     y[Rim::y],   q.at.z};
-  if (columns.mass_known) row.push_back(energy_J(system.body, q));
+  if (columns.mass_known) {
+    row.push_back(energy_J(system.body, q));
+    if constexpr (requires { system.losses.rise; })
+      row.back() += system.losses.energy_J(system.body, y[Rim::x], y[Rim::y]);
+  }
   const World<double> v = world_from_node(horizontal_velocity(q), y[Rim::phi]);
   row.insert(row.end(), {q.w1, q.w2, q.w3, v.x, v.y});
   if (columns.mass_known) {
@@ -183,10 +187,10 @@ template <template <class> class Friction>
 RimRecord run_sliding_by(const RimJob& job, double tolerance) {
   using Jacobian = Dual<16>;
   Sliding<double, Friction, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
-          PivotingFriction, ContourFriction>
+          PivotingFriction, ContourFriction, FloorSlope>
       system;
   Sliding<Jacobian, Friction, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction,
-          PivotingFriction, ContourFriction>
+          PivotingFriction, ContourFriction, FloorSlope>
       duals;
   place(job.model, job.input, system);
   place(job.model, job.input, duals);
@@ -199,10 +203,10 @@ RimRecord run_sliding_by(const RimJob& job, double tolerance) {
 
 RimRecord run_rolling_by(const RimJob& job, double tolerance) {
   Rolling<double, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
-          ContourFriction>
+          ContourFriction, FloorSlope>
       system;
   Rolling<Dual<8>, LinearAir, QuadraticAir, AirForce, GapLayer, RollingFriction, PivotingFriction,
-          ContourFriction>
+          ContourFriction, FloorSlope>
       duals;
   place(job.model, job.input, system);
   place(job.model, job.input, duals);
@@ -215,19 +219,19 @@ RimRecord run_job(const RimJob& job, double tolerance, double stick) {
   const bool own = job.method == Method::dop853 || job.method == Method::radau;
   if (job.law == "rolling") {
     if (!own) return run_rolling_by(job, tolerance);
-    return with_terms(terms, [&](auto list) {
+    return with_terms(terms, job.model.sloped, [&](auto list) {
       return run_phases(job, NoSlip<double>{}, 0.0, Regime::rolling, options, list);
     });
   }
   if (job.law == "smooth") {
     if (!own) return run_sliding_by<NoFriction>(job, tolerance);
-    return with_few_terms(terms, [&](auto list) {
+    return with_few_terms(terms, job.model.sloped, [&](auto list) {
       return run_phases(job, NoFriction<double>{}, 0.0, Regime::sliding, options, list);
     });
   }
   if (!own) return run_sliding_by<Coulomb>(job, tolerance);
   const double limit = job.input.eps_v > 0.0 ? 0.0 : job.input.friction;
-  return with_few_terms(terms, [&](auto list) {
+  return with_few_terms(terms, job.model.sloped, [&](auto list) {
     return run_phases(job, job.friction(), limit, Regime::sliding, options, list);
   });
 }
@@ -271,7 +275,8 @@ Choice choose(const RimJob& job, const std::string& asked, double tolerance) {
 RimJob rim_job(const data::Scene& scene, const std::string& law) {
   RimJob job;
   job.law = law;
-  job.model = {rim_body(scene), scene.model};
+  const std::optional<Eigen::Vector2d> slope = floor_slope(scene);
+  job.model = {rim_body(scene), scene.model, slope.has_value()};
   const RimStart start = rim_start(scene, job.model.body);
   job.input = {start.theta_rad,
                start.phi_rad,
@@ -286,6 +291,7 @@ RimJob rim_job(const data::Scene& scene, const std::string& law) {
                loss_values(scene.model),
                0.0,
                0.0};
+  if (slope) job.input.losses.rise = {slope->x(), slope->y()};
   if (law == "sliding") {
     if (!scene.model.friction)
       throw InputError(

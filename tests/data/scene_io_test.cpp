@@ -123,6 +123,8 @@ faces = "lower"
 [support]
 kind = "pivot"
 pivot_m = [0.5, -0.25, 1.0]
+slope_x = 0.0625
+slope_y = -0.125
 
 [camera]
 scale_px_per_m = 100.0
@@ -317,6 +319,7 @@ INSTANTIATE_TEST_SUITE_P(
                      ":3:", "pivot"},
         RefusedScene{"ShortPivot", "[support]\npivot_m = [0,0]", ":2:", "three numbers"},
         RefusedScene{"WordsInPivot", "[support]\npivot_m = [0,0,'a']", ":2:", "must be a number"},
+        RefusedScene{"SteepFloor", "[support]\nslope_x = 0.3", ":2:", "between -0.2 and 0.2"},
         RefusedScene{"FileAndScale", "[camera]\nfile = 'c.json'\nscale_px_per_m = 100",
                      ":3:", "keep one"},
         RefusedScene{"EmptyFile", "[camera]\nfile = ''", ":2:", "leave the key out"},

@@ -42,6 +42,11 @@ class Laws:
     air_force_N_s_m: float = 0.0
     couple_regularisation_rad_s: float = 0.01
     gravity_m_s2: float = 9.81
+    slope: tuple[float, float] = (0.0, 0.0)  # rise of the floor per length along x and y, the axes of which lie in it
+
+    def weight_m_s2(self):
+        down = -np.array([*self.slope, 1.0])
+        return self.gravity_m_s2 * down / np.sqrt(down @ down)
 
 
 def rotation(q):
@@ -120,7 +125,7 @@ class Rig:
         air, contact = self.couples(y)
         M, b = np.zeros((9, 9)), np.zeros(9)
         M[0:3, 0:3], M[0:3, 6:9] = m * np.eye(3), -np.eye(3)
-        b[0:3] = -m * self.laws.gravity_m_s2 * Z - self.laws.air_force_N_s_m * v
+        b[0:3] = m * self.laws.weight_m_s2() - self.laws.air_force_N_s_m * v
         M[3:6, 3:6], M[3:6, 6:9] = inertia, -skew(r)
         M[3:6, 8] -= contact
         b[3:6] = air - cross(w, inertia @ w)
@@ -152,7 +157,7 @@ class Rig:
         w, k = y[10:13], self.axes(y)[2]
         spin = w @ k
         return (0.5 * self.body.mass_kg * y[3:6] @ y[3:6] + 0.5 * A * (w @ w - spin * spin) + 0.5 * C * spin * spin
-                + self.body.mass_kg * self.laws.gravity_m_s2 * y[2])
+                - self.body.mass_kg * self.laws.weight_m_s2() @ y[0:3])
 
     def power(self, y, rolling):
         """Rate at which the energy must change [W]."""

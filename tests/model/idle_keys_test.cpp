@@ -97,6 +97,7 @@ TEST_P(IdleKeys, AreThoseThatChangeNothing) {
         "spin_down_viscous_1_s", "spin_down_quadratic_1_rad", "spin_down_imbalance_sin_rad_s2",
         "spin_down_imbalance_cos_rad_s2"})
     changes[std::string("model.") + term] = "2e-4";
+  for (const char* slope : {"support.slope_x", "support.slope_y"}) changes[slope] = "0.01";
   if (model != std::string("top-euler")) {  // which refuses them
     changes["model.drag_transverse_N_m_s"] = "0.1";
     changes["model.drag_spin_N_m_s"] = "0.1";

@@ -212,6 +212,8 @@ TEST(Puck, DifferentiatesByEveryParameterMovingAndAtRest) {
   data::Scene scene = puck_scene();
   scene.body->mass_kg = 0.05;
   scene.model.air_force_N_s_m = 2e-3;
+  scene.support.slope_x = 0.01;
+  scene.support.slope_y = -0.02;
   for (const double w3 : {0.0, 4.0, -40.0, 200.0}) {
     scene.start.w3_rad_s = w3;
     expect_derivatives(*make_predictor(scene), std::vector{0.1, 0.3, 0.42, 3.0},

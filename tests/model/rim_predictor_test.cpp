@@ -157,6 +157,19 @@ TEST(RimPredictor, DifferentiatesAcrossStickAndSlip) {
                            1e-4);
 }
 
+TEST(RimPredictor, DifferentiatesOnASlopeByEveryParameter) {
+  std::mt19937 draw(8);
+  for (const auto& [name, tolerance] :
+       {std::pair{"s06_roll_disc", 1e-6}, {"s05_smooth_disc", 1e-5}, {"s08_slide_disc", 1e-5}}) {
+    data::Scene scene = random_scene(draw, name);
+    scene.support.slope_x = 0.01;
+    scene.support.slope_y = -0.02;
+    const auto predictor = make_predictor(scene);
+    ASSERT_GE(predictor->index_of("slope_y"), 0);
+    expect_derivatives_match(*predictor, defaults(*predictor), std::vector{0.05, 0.3}, tolerance);
+  }
+}
+
 /// A disc on a soft floor falls flat within 0.6 s.
 data::Scene soon_flat(const std::string& name) {
   data::Scene scene = reference_scene(name);

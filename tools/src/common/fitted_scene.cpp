@@ -136,6 +136,8 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
     if (const auto value = value_of(fit, name, arc)) scene.start.*field = value;
   for (const auto& [name, field] : kCoefficients)
     if (const auto value = value_of(fit, name, arc)) scene.model.*field = value;
+  if (const auto slope = value_of(fit, "slope_x", arc)) scene.support.slope_x = slope;
+  if (const auto slope = value_of(fit, "slope_y", arc)) scene.support.slope_y = slope;
   set_air(fit, "air_linear_N_m_s", arc, scene.model.air_linear_N_m_s);
   set_air(fit, "air_quadratic_N_m_s2", arc, scene.model.air_quadratic_N_m_s2);
   if (fit.model == "top" || fit.model == "top-euler") set_top(fit, arc, scene);

@@ -14,8 +14,11 @@ namespace trochoid::data {
 /// point of its axis; none: free.
 enum class SupportKind { floor, flat, pivot, none };
 struct Support {
+  static constexpr double kSteepest = 0.2;
   SupportKind kind = SupportKind::floor;
   std::optional<Eigen::Vector3d> pivot_m;
+  /// The floor's rise per length along x and y, at most kSteepest; absent: level.
+  std::optional<double> slope_x = {}, slope_y = {};
 };
 
 /// How pixels become metres. At most one of file / scale; with neither, the known radius gives the

@@ -1,9 +1,9 @@
 #pragma once
 #include "trochoid/model/rim_body.hpp"
 
-/// Loss mechanisms, one named struct each, and Losses<...>, the list of those a scene has. A list
-/// is fixed at compile time: what is not in it costs nothing. Equation numbers of
-/// model/theory/air.md ("A") and model/theory/sliding.md ("S").
+/// Loss mechanisms and the floor's slope, one named struct each, and Losses<...>, the list of those
+/// a scene has. A list is fixed at compile time: what is not in it costs nothing. Equation numbers
+/// of model/theory/air.md ("A"), model/theory/sliding.md ("S") and model/theory/rolling.md.
 ///
 /// A term has kLoad (adds a couple or force), kContact (adds a couple per unit normal force) and
 /// the function that goes with it.
@@ -66,6 +66,26 @@ struct GapLayer {
     constexpr double kQuarterPi = 0.78539816339744830962;
     const double scale = kQuarterPi * body.R * body.R * body.R;
     load.t2 -= scale * eta * q.w2 / (q.at.s * q.at.s * q.at.s);
+  }
+};
+
+/// A floor that rises by (x, y) per length: the weight's part along it, a uniform field at the
+/// centre of mass, (13) of rolling.md.
+template <class S>
+struct FloorSlope {
+  static constexpr bool kLoad = true, kContact = false;
+  World<S> rise{S(0.0), S(0.0)};
+  [[nodiscard]] FloorSlope<double> values() const { return {{value_of(rise.x), value_of(rise.y)}}; }
+  TROCHOID_INLINE void add(const RimBody& body, const NodeMotion<S>& q, Load<S>& load) const {
+    const double weight = body.m * body.g;
+    const Horizontal<S> uphill = node_from_world(rise, q.phi);
+    load.d1 -= weight * uphill.along_n;
+    load.d2 -= weight * uphill.along_mh * q.at.c;
+    load.d3 += weight * uphill.along_mh * q.at.s;
+  }
+  /// Of a centre of mass at (x, y), beside what its height above the floor has.
+  [[nodiscard]] S energy_J(const RimBody& body, const S& x, const S& y) const {
+    return body.m * body.g * (rise.x * x + rise.y * y);
   }
 };
 

@@ -92,11 +92,12 @@ struct Puck {
   enum Component : int { vx, vy, q, x, y, psi, t };  ///< q = R w
 
   S friction{0.1};
-  S drag_1_s{0.0};        ///< air force over mass
-  double gravity = 9.81;  ///< [m/s^2]
-  S radius{0.0};          ///< R [m] of the face in contact; less than the body's if it is crowned
-  double bore = 0.0;      ///< inner radius of the face over R, 0 <= bore < 1
-  S gyration{0.5};        ///< C/(m R^2)
+  S drag_1_s{0.0};             ///< air force over mass
+  S rise_x{0.0}, rise_y{0.0};  ///< of the floor per length
+  double gravity = 9.81;       ///< [m/s^2]
+  S radius{0.0};      ///< R [m] of the face in contact; less than the body's if it is crowned
+  double bore = 0.0;  ///< inner radius of the face over R, 0 <= bore < 1
+  S gyration{0.5};    ///< C/(m R^2)
 
   /// dv/dt and R dw/dt [m/s^2] while moving, (1), (2).
   [[nodiscard]] FaceForce<S> acceleration(const State<S, kStates>& s) const {
@@ -109,8 +110,8 @@ struct Puck {
       f.couple = (f.couple - b2 * bore * inner.couple) * area;
     }
     const S scale = friction * -gravity;
-    return {scale * f.x - drag_1_s * s[vx], scale * f.y - drag_1_s * s[vy],
-            scale * f.couple * (1.0 / gyration)};
+    return {scale * f.x - drag_1_s * s[vx] - gravity * rise_x,
+            scale * f.y - drag_1_s * s[vy] - gravity * rise_y, scale * f.couple * (1.0 / gyration)};
   }
   /// dt/dtau [s].
   [[nodiscard]] S stretch(const State<S, kStates>& s) const {

@@ -64,6 +64,7 @@ struct NodeMotion {
   S w1, w2, w3;
   S precession_k;  ///< dphi cos(theta) = w2 cot(theta): the node frame's own rate about k
   S v1, v2, v3;
+  S phi;  ///< for what has a direction in the world
 };
 
 /// Couple about the centre of mass, and body force at it, in node components [N m], [N].

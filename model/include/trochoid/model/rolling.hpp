@@ -30,6 +30,7 @@ struct Rolling {
   }
   [[nodiscard]] TROCHOID_INLINE NodeMotion<S> motion(const State<S, kStates>& y) const {
     NodeMotion<S> q;
+    q.phi = y[Rim::phi];
     q.at = tilt(body, y[Rim::theta]);
     q.w1 = y[Rim::w1];
     q.w2 = y[Rim::w2];

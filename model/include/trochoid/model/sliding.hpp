@@ -47,6 +47,7 @@ struct Sliding {
 
   [[nodiscard]] TROCHOID_INLINE NodeMotion<S> motion(const State<S, kStates>& y) const {
     NodeMotion<S> q;
+    q.phi = y[Rim::phi];
     q.at = tilt(body, y[Rim::theta]);
     q.w1 = y[Rim::w1];
     q.w2 = y[Rim::w2];
