@@ -387,6 +387,48 @@ TEST(Independent, AGapLayerThickerThanAirIsTold) {
   EXPECT_THAT(fit(std::span(&track, 1), scene).warnings, testing::Not(told));
 }
 
+constexpr double kSlopeX_offLevel = 8.095074665277404e-06,
+                 kSlopeY_offLevel = -0.00020600882662613179;
+
+// No level model had explained it: the rise is that of a pencil under one end of a long table.
+TEST(Independent, AFloorOffLevelByHundredthsOfADegreeIsFoundWithTheLossOnIt) {
+  const Comparison found = comparison_of("off_level");
+  EXPECT_EQ(found.fit.verdict, data::FitVerdict::good) << found.fit.recommendation;
+  expect_found(found.fit,
+               {{"air_force_N_s_m", 0.000614115279269354}, {"slope_y", kSlopeY_offLevel}});
+  const data::FitParameter* x = found.fit.find("slope_x");
+  EXPECT_NEAR(x->value, kSlopeX_offLevel, kSigmas * x->sigma);
+  EXPECT_THAT(found.fit.warnings, testing::Contains(testing::HasSubstr("the floor rises by 0.01")));
+}
+
+TEST(Independent, ASlopeIsFittedWhereItIsFreedOrHasAPriorAndKnownWhereItIsStated) {
+  const data::Track track = track_of("off_level");
+  data::Scene scene = scene_of("off_level");
+  scene.model.name = "rolling";
+  scene.model.air_force_N_s_m = 6e-4;
+  data::Scene freed = scene, doubted = scene, stated = scene;
+  freed.fit.free = {"slope_x", "slope_y"};
+  doubted.fit.prior["slope_x"] = doubted.fit.prior["slope_y"] = {0.0, 1e-3};
+  stated.support.slope_x = kSlopeX_offLevel;
+  stated.support.slope_y = kSlopeY_offLevel;
+  for (const data::Scene& one : {freed, doubted, stated}) {
+    const data::Fit found = fit(std::span(&track, 1), one);
+    EXPECT_EQ(found.verdict, data::FitVerdict::good) << found.reason;
+    expect_found(found, {{"air_force_N_s_m", 0.000614115279269354}});
+    const bool fitted = one.support.slope_y == std::nullopt;
+    const data::FitParameter* y = found.find("slope_y");
+    ASSERT_NE(y, nullptr);
+    EXPECT_EQ(y->status == data::ParameterStatus::free, fitted);
+    EXPECT_NEAR(y->value, kSlopeY_offLevel, kSigmas * y->sigma);
+  }
+}
+
+// It is tried where something is left to explain, and then has to be needed.
+TEST(Independent, ALevelFloorIsNotTakenForASlope) {
+  for (const char* level : {"air_force", "unneeded_loss", "like_an_air_couple"})
+    EXPECT_EQ(comparison_of(level).fit.find("slope_x"), nullptr) << level;
+}
+
 // Who knows that the floor is smooth has its losses compared all the same.
 TEST(Independent, LossesAreComparedOnAFloorThatIsNamedSmooth) {
   const data::Track track = track_of("smooth_floor");

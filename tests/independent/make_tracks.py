@@ -9,6 +9,7 @@ truth.json (state at the first sample and coefficients, by the names a fit print
     A  rolls, one to three random losses          D  smooth floor (angles always: the path is a straight line)
     B  spins in place while it slides fast        E  slides, friction sets in softly (1e-3 .. 1e-2 m/s)
     C  rolls first, slips later                   F  rolls and turns fast (60 .. 150 rad/s)
+    G  as A, on a floor off level by 0.01 .. 0.5 degrees
 """
 import argparse
 import json
@@ -101,6 +102,9 @@ def draw_scene(kind, random):
             laws.slip_regularisation_m_s = log_uniform(random, 1e-3, 1e-2)
         if kind == "D":
             laws.friction = 0.0
+        if kind == "G":
+            towards, rise = random.uniform(-np.pi, np.pi), np.radians(log_uniform(random, 0.01, 0.5))
+            laws.slope = (float(rise * np.cos(towards)), float(rise * np.sin(towards)))
         rig = Rig(body, laws)
         sliding = {"B": random.uniform(0.2, 0.8), "D": random.uniform(0.0, 0.4), "E": random.uniform(0.1, 0.6)}.get(kind)
         start = draw_start(random, rig, kind == "F", sliding)
@@ -139,6 +143,7 @@ def truth_of(rig, run):
               "air_quadratic_N_m_s2[3]": laws.air_quadratic_N_m_s2[2], "gap_viscosity_Pa_s": 0.0}
     for name in ("rolling_friction_m", "pivoting_friction_m", "contour_friction_m", "air_force_N_s_m"):
         values[name] = getattr(laws, name)
+    values["slope_x"], values["slope_y"] = laws.slope
     if laws.friction is not None:
         values["friction"] = laws.friction
         values["slip_regularisation_m_s"] = laws.slip_regularisation_m_s
@@ -175,7 +180,7 @@ def write_case(folder, rig, run, angles, random):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("kind", choices=list("ABCDEF"))
+    parser.add_argument("kind", choices=list("ABCDEFG"))
     parser.add_argument("count", type=int)
     parser.add_argument("seed", type=int)
     parser.add_argument("--angles", choices=["yes", "no", "mixed"], default="mixed")

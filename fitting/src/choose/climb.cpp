@@ -7,6 +7,7 @@
 #include "choose/leave_out.hpp"
 #include "choose/slide.hpp"
 #include "choose/terms.hpp"
+#include "choose/uneven.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -20,8 +21,8 @@ const Rung& step_up(const Contest& contest, bool last_resort, Reach reach, const
   for (int index = 0; index < static_cast<int>(ladder.terms.size()); ++index) {
     const Term& term = ladder.terms[static_cast<std::size_t>(index)];
     Terms terms = current.terms;
-    if (term.last_resort != last_resort || term.smooth || !means_something(ladder, terms, index) ||
-        !terms.insert(index).second)
+    if (term.last_resort != last_resort || term.smooth || term.slope ||
+        !means_something(ladder, terms, index) || !terms.insert(index).second)
       continue;
     larger.push_back(&rungs.emplace_back(rung_with(ladder, terms)));
     added.push_back(&term);
@@ -107,6 +108,8 @@ bool climb_down(const Contest& contest, Rungs& rungs) {
     step_down(contest, all, rungs);
     return true;
   }
+  // Nothing else leads a rolling body astray like a slope; one that slides air slows much alike.
+  if (contest.ladder.law == "rolling" && try_slope(contest, all, rungs)) return true;
   std::optional<Rung> other = by_another_law(contest, all);
   if (!other) {
     if (all.first_part.empty()) return false;
@@ -197,8 +200,10 @@ Rungs climb(const Contest& contest) {
   if (explains(best)) {
     // What stood in for another loss while that was missing may not be needed beside it.
     step_down(contest, best, rungs);
-  } else if (!try_smooth_floor(contest, best, rungs) && !by_last_resort(contest, best, rungs)) {
+  } else if (!try_slope(contest, best, rungs) && !try_smooth_floor(contest, best, rungs) &&
+             !by_last_resort(contest, best, rungs)) {
     by_all_that_usually_acts(contest, best, rungs);
+    search_on_slope(contest, rungs);
   }
   return rungs;
 }

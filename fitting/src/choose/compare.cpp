@@ -15,6 +15,7 @@
 #include "choose/slide.hpp"
 #include "choose/softness.hpp"
 #include "choose/terms.hpp"
+#include "choose/uneven.hpp"
 #include "judge/first_guess.hpp"
 #include "judge/straying.hpp"
 #include "problem/problem.hpp"
@@ -144,6 +145,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   Rungs rungs = climb(contest);
   let_go_of_friction(contest, rungs);
   const Rung* chosen = exchange_while_worth(contest, rungs);
+  if (chosen != nullptr && slope_instead(contest, *chosen, rungs))
+    chosen = exchange_while_worth(contest, rungs);
   if (chosen != nullptr && creep_instead(contest, *chosen, rungs))
     chosen = exchange_while_worth(contest, rungs);
   if (chosen == nullptr) {

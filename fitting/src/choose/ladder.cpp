@@ -85,6 +85,19 @@ void add_floors(const Scene& scene, Ladder& ladder) {
   ladder.terms.push_back(std::move(smooth));
 }
 
+// A scene that speaks of the slope itself has it in every model, or in none.
+void add_slope(Ladder& ladder) {
+  if (parameters_of(ladder.plain).contains(kSlopeX)) return;
+  Term slope{"slope",
+             [](Scene& s) {
+               s.support.slope_x = s.support.slope_y = 0.0;
+               for (const char* name : {kSlopeX, kSlopeY}) s.fit.free.emplace_back(name);
+             },
+             {}};
+  slope.slope = true;
+  ladder.terms.push_back(std::move(slope));
+}
+
 void add_spin_down_terms(const Scene& scene, Ladder& ladder) {
   ladder.terms = {
       single("dry couple", &ModelSettings::spin_down_dry_rad_s2, scene, 0.1),
@@ -165,6 +178,7 @@ Ladder ladder_of(const Scene& scene, bool spin_seen) {
   } else if (ladder.law == "top") {
     add_top_drags(ladder);
   }
+  if (ladder.law == "rolling" || ladder.law == "smooth" || ladder.law == "puck") add_slope(ladder);
   return ladder;
 }
 

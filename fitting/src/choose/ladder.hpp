@@ -20,6 +20,9 @@ struct Term {
   bool usual = false;
   /// A floor without any friction instead of the law: no rolling at all. A last resort of its own.
   bool smooth = false;
+  /// A floor that is not level is not tried among others: only where the floor explains nothing
+  /// level, or leaves what is not noise.
+  bool slope = false;
   std::optional<int> of = {};  ///< index of the term it is a property of: only beside that one
   /// Index of the usual term that is the same loss by another law.
   std::optional<int> other_law_of = {};

@@ -17,6 +17,11 @@ int count_of(const Ladder& ladder) {
   return static_cast<int>(ladder.terms.size());
 }
 
+// Tried among others.
+bool is_ordinary(const Term& term) {
+  return !term.last_resort && !term.slope;
+}
+
 std::string name_of(const Ladder& ladder, const Terms& terms) {
   std::string name = ladder.law, added;
   for (const int index : terms) {
@@ -83,13 +88,21 @@ std::set<std::string> parameters_without(const Ladder& ladder, const Terms& term
 
 std::set<std::string> parameters_of_losses(const Ladder& ladder, const Terms& terms) {
   Terms law = terms;
-  std::erase_if(law, [&](int index) { return !term_of(ladder, index).last_resort; });
+  std::erase_if(law, [&](int index) {
+    return !term_of(ladder, index).last_resort && !term_of(ladder, index).slope;
+  });
   return parameters_without(ladder, terms, law);
 }
 
 std::optional<int> smooth_term(const Ladder& ladder) {
   for (int index = 0; index < count_of(ladder); ++index)
     if (term_of(ladder, index).smooth) return index;
+  return std::nullopt;
+}
+
+std::optional<int> slope_term(const Ladder& ladder) {
+  for (int index = 0; index < count_of(ladder); ++index)
+    if (term_of(ladder, index).slope) return index;
   return std::nullopt;
 }
 
@@ -138,7 +151,7 @@ std::vector<Terms> with_one_more(const Ladder& ladder, const Terms& terms) {
   std::vector<Terms> sets;
   for (int index = 0; index < count_of(ladder); ++index) {
     if (terms.contains(index) || !means_something(ladder, terms, index) ||
-        term_of(ladder, index).last_resort)
+        !is_ordinary(term_of(ladder, index)))
       continue;
     sets.push_back(terms);
     sets.back().insert(index);
@@ -167,7 +180,9 @@ std::map<int, Terms> sets_of(const Terms& terms, const std::vector<int>& open) {
 std::map<int, Terms> all_sets(const Ladder& ladder, const Terms& known) {
   std::vector<int> open;
   for (int index = 0; index < count_of(ladder); ++index)
-    if (!term_of(ladder, index).last_resort) open.push_back(index);
+    if (is_ordinary(term_of(ladder, index)) ||
+        (term_of(ladder, index).slope && known.contains(index)))
+      open.push_back(index);
   std::map<int, Terms> sets = sets_of(known, open);
   std::erase_if(sets, [&](const auto& item) {
     return !std::all_of(item.second.begin(), item.second.end(),

@@ -34,6 +34,9 @@ namespace trochoid::fitting {
 /// Index of the term that is a floor without friction, if the ladder has it.
 [[nodiscard]] std::optional<int> smooth_term(const Ladder& ladder);
 
+/// Index of the term that is a floor off level, if the ladder has it.
+[[nodiscard]] std::optional<int> slope_term(const Ladder& ladder);
+
 /// Whether a term stands for something beside these.
 [[nodiscard]] bool means_something(const Ladder& ladder, const Terms& terms, int index);
 
@@ -62,8 +65,9 @@ namespace trochoid::fitting {
 /// The terms with one more; the last resort is not added.
 [[nodiscard]] std::vector<Terms> with_one_more(const Ladder& ladder, const Terms& terms);
 
-/// All sets of terms, beside the last resort among `known`, that mean something. A key has a bit
-/// for each term: what is part of another set has a part of its bits.
+/// All sets of terms, beside the last resort among `known`, that mean something; with a slope and
+/// without where that is known. A key has a bit for each term: what is part of another set has a
+/// part of its bits.
 [[nodiscard]] std::map<int, Terms> all_sets(const Ladder& ladder, const Terms& known);
 
 /// How a set of terms differs from a known one.

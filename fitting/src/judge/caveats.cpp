@@ -216,6 +216,20 @@ void tell_unlikely_friction(data::Fit& fit) {
                   friction->value, kMost));
 }
 
+void tell_slope(data::Fit& fit) {
+  const data::FitParameter *x = fit.find(kSlopeX), *y = fit.find(kSlopeY);
+  const auto fitted = [](const data::FitParameter* slope) {
+    return slope != nullptr && slope->status != data::ParameterStatus::fixed;
+  };
+  if (!fitted(x) && !fitted(y)) return;
+  const double rise = std::hypot(x->value, y->value);
+  const double sigma = std::hypot(x->value * x->sigma, y->value * y->sigma) / rise;
+  fit.warnings.push_back(fmt::format(
+      "the floor rises by {:.3g} ± {:.1g} degrees, towards {:.0f} degrees as counted from x to y",
+      data::degrees(std::atan(rise)), data::degrees(sigma),
+      data::degrees(std::atan2(y->value, x->value))));
+}
+
 void tell_given_up(const Problem& problem, data::Fit& fit) {
   constexpr double kLittle = 0.1;
   int given_up = 0, all = 0;

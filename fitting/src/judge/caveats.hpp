@@ -49,6 +49,9 @@ void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);
 /// A fitted friction no pair of surfaces has: the track's positions or times are in other units.
 void tell_unlikely_friction(data::Fit& fit);
 
+/// A fitted slope of the floor, as an angle.
+void tell_slope(data::Fit& fit);
+
 /// Positions and angles that were all but given up (reweight): their number is no longer what the
 /// fit stands on.
 void tell_given_up(const Problem& problem, data::Fit& fit);

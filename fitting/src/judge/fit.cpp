@@ -367,6 +367,7 @@ data::Fit OneFit::described(Bars bars) {
   tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
   tell_unlikely_friction(fit);
+  tell_slope(fit);
   judge(problem_, solution_, error, cut_short_, fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);

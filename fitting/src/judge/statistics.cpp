@@ -27,6 +27,7 @@ double natural_size(const Problem& problem, int index, const Eigen::VectorXd& u)
   const ArcData& arc = problem.arcs[std::max(0, parameter.arc)];
   const double duration = std::max(arc.duration_s(), 1e-9);
   if (info.unit == "rad") return 1.0;
+  if (is_slope(info.name)) return std::max(value, data::radians(0.5));  // what an eye sees
   if (info.unit == kDeviations) return 3.0;  // deviations are hardly ever larger
   // A loss that came out as nothing is known if its error is small against the given value's.
   if (info.logarithmic) return std::max({value, 0.1 * std::abs(parameter.given), 1e-300});

@@ -339,6 +339,7 @@ Transform transform_of(const ParameterInfo& info, const std::string& model,
   constexpr double kMostFriction = 1.1;
   if (info.name == "friction" && model == "sliding")
     return {Transform::Kind::limited, 0.0, std::max(kMostFriction, 1.5 * info.value)};
+  if (is_slope(info.name)) return {Transform::Kind::between, info.lower, info.upper};
   if (info.name == "contact_radius_m") return {Transform::Kind::limited, 0.0, info.upper};
   if (info.name == kSlipScale) {
     const double sharpest_m_s = std::min(kSharpest_m_s, 0.5 * info.value);
@@ -356,7 +357,8 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
     if (info.name == asked_for) return true;
   if (is_pivot(info.name)) return settings.free_pivot || listed(settings.free, info.name);
-  if (info.name == kSlipScale && settings.prior.contains(info.name)) return true;
+  if ((info.name == kSlipScale || is_slope(info.name)) && settings.prior.contains(info.name))
+    return true;
   const bool chosen = !std::all_of(settings.free.begin(), settings.free.end(), leaves_choice);
   if (!chosen || info.role == ParameterInfo::Role::initial)
     return info.worth_fitting || listed(settings.free, info.name);
@@ -375,8 +377,13 @@ bool means(const std::string& entry, const std::string& parameter) {
   return parameter == entry || (parameter.starts_with(entry) && parameter[entry.size()] == '[');
 }
 
+bool is_slope(const std::string& name) {
+  return name == kSlopeX || name == kSlopeY;
+}
+
 bool leaves_choice(const std::string& name) {
-  return is_pivot(name) || name == kReadout || name == kAngleDelay || name == kSlipScale;
+  return is_pivot(name) || is_slope(name) || name == kReadout || name == kAngleDelay ||
+         name == kSlipScale;
 }
 
 FreeParameter free_parameter(const model::Predictor& predictor, const data::FitSettings& settings,

@@ -18,6 +18,9 @@ namespace trochoid::fitting {
 
 /// How friction sets in: the slip speed of the regularised law, absent in Coulomb's.
 inline constexpr const char* kSlipScale = "slip_regularisation_m_s";
+/// How much the floor rises per length.
+inline constexpr const char* kSlopeX = "slope_x";
+inline constexpr const char* kSlopeY = "slope_y";
 /// A law sharper than that makes stiff equations, and no camera tells it from Coulomb's.
 inline constexpr double kSharpest_m_s = 5e-5;
 
@@ -161,8 +164,10 @@ const Value* said_of(const std::string& parameter, const std::map<std::string, V
   return entry == entries.end() ? nullptr : &entry->second;
 }
 
+[[nodiscard]] bool is_slope(const std::string& name);
+
 /// Whether naming a parameter in [fit] free leaves the model its own choice of the others: where
-/// its pivot is, when it was seen, how friction sets in.
+/// its pivot is, when it was seen, how friction sets in, whether the floor is level.
 [[nodiscard]] bool leaves_choice(const std::string& name);
 
 /// A parameter to be fitted, as [fit] bounds it and knows it beforehand.

@@ -13,13 +13,18 @@ namespace {
 constexpr int kThinned = 300;  // samples an exploratory fit looks at
 
 // Losses over decades hardly show on a short window; unheld they wander off to where the equations
-// are stiff, or take each other's place. Their logarithm stays within a few of the given value's.
+// are stiff, or take each other's place. Their logarithm stays within a few of the given value's,
+// and a floor within a degree of the given slope.
 void add_soft_priors(Problem& problem) {
   for (FreeParameter& parameter : problem.free) {
     const std::string& name = problem.predictor->parameters()[parameter.index].name;
     if ((parameter.transform.is_over_decades() && is_loss(problem, parameter)) ||
         name == kSlipScale)
       parameter.soft_prior = data::Prior{parameter.transform.inverse(parameter.given), 1.0};
+    if (!is_slope(name)) continue;
+    const double given = parameter.transform.inverse(parameter.given);
+    parameter.soft_prior =
+        data::Prior{given, data::radians(1.0) / parameter.transform.slope(given)};
   }
 }
 
