@@ -48,7 +48,9 @@ bool try_slope(const Contest& contest, const Rung& known, Rungs& rungs) {
 
 void search_on_slope(const Contest& contest, Rungs& rungs) {
   const std::optional<int> slope = slope_term(contest.ladder);
-  if (!slope || std::any_of(rungs.begin(), rungs.end(), explains)) return;
+  if (!slope ||
+      std::any_of(rungs.begin(), rungs.end(), [](const Rung& rung) { return explains(rung); }))
+    return;
   Terms terms = usual_losses(contest.ladder);
   terms.insert(*slope);
   if (is_known(rungs, terms)) return;
