@@ -5,13 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "judge/one_parameter.hpp"
 #include "problem/linearise.hpp"
 #include "trochoid/data/parallel.hpp"
 
 namespace trochoid::fitting {
 namespace {
 
-constexpr double kQuantile95 = 3.841458820694124;  // chi-square, one degree of freedom
 constexpr int kMostPoints = 40;
 
 // One side of a profile: offsets of u from the solution, away from it, and the rise there.
@@ -21,54 +21,10 @@ struct Side {
   double bound = 0.0;  // offset where the rise is the quantile
 };
 
-class OneParameter {
- public:
-  OneParameter(const Problem& problem, const Solution& solution, int index)
-      : problem_(problem), solution_(solution), index_(index), held_(problem) {
-    held_.free.erase(held_.free.begin() + index);
-    others_.resize(solution.u.size() - 1);
-    for (Eigen::Index i = 0, j = 0; i < solution.u.size(); ++i)
-      if (i != index) others_[j++] = solution.u[i];
-  }
-
-  // Rise of chi-square with the parameter at u + offset; starts where the last call ended.
-  // Infinite where the model has no prediction.
-  double rise(double offset, const SolveOptions& options = {}) {
-    const FreeParameter& parameter = problem_.free[index_];
-    const double u = solution_.u[index_] + offset;
-    for (std::size_t arc = 0; arc < held_.base.size(); ++arc)
-      if (parameter.arc < 0 || parameter.arc == static_cast<int>(arc))
-        held_.base[arc][parameter.index] = parameter.transform.value(u);
-    const Solution best = minimise(held_, others_, options);
-    if (!best.usable) return std::numeric_limits<double>::infinity();
-    others_ = best.u;
-    return best.chi2 + outside(u) - solution_.chi2;
-  }
-  /// Of the other free parameters, where the last call ended.
-  [[nodiscard]] const Eigen::VectorXd& others() const { return others_; }
-  void start_from(const Eigen::VectorXd& others) { others_ = others; }
-
- private:
-  // What the held parameter's own prior adds.
-  [[nodiscard]] double outside(double u) const {
-    const FreeParameter& parameter = problem_.free[index_];
-    if (!parameter.prior) return 0.0;
-    const double off = off_prior(*parameter.prior, parameter.transform.value(u), parameter.turns);
-    return off * off;
-  }
-
-  const Problem& problem_;
-  const Solution& solution_;
-  int index_;
-  Problem held_;
-  Eigen::VectorXd others_;
-};
-
 // Between an offset below the threshold and one above: the root of the rise is nearly a straight
 // line where the model is, and halves help where it is not. Each trial starts where the last one
 // inside ended; from beyond, the others may lead elsewhere.
-void close_in(OneParameter& parameter, const Eigen::VectorXd& others_inside, double threshold,
-              Side& side) {
+void close_in(OneParameter& parameter, OneParameter::Place inside, double threshold, Side& side) {
   constexpr int kMost = 16;
   constexpr double kClose = 0.02;
   const std::size_t n = side.offsets.size();
@@ -76,7 +32,6 @@ void close_in(OneParameter& parameter, const Eigen::VectorXd& others_inside, dou
   double inner = n > 1 ? side.offsets[n - 2] : 0.0, outer = side.offsets[n - 1];
   double inner_root = n > 1 ? std::sqrt(std::max(side.rises[n - 2], 0.0)) : 0.0;
   double outer_root = std::sqrt(side.rises[n - 1]);
-  Eigen::VectorXd inside = others_inside;
   for (int i = 0; i < kMost; ++i) {
     const double straight = (wanted - inner_root) / std::max(outer_root - inner_root, 1e-300);
     const double share = i % 3 < 2 ? std::clamp(straight, 0.05, 0.95) : 0.5;
@@ -91,7 +46,7 @@ void close_in(OneParameter& parameter, const Eigen::VectorXd& others_inside, dou
     }
     if (root < wanted) {
       inner = side.bound, inner_root = root;
-      inside = parameter.others();
+      inside = parameter.place();
     } else {
       outer = side.bound, outer_root = std::min(root, 1e3 * wanted);
     }
@@ -105,7 +60,7 @@ Side walk(const Problem& problem, const Solution& solution, int index, double fi
   Side side;
   double offset = 0.0, step = first_step;
   for (int point = 0; point < kMostPoints && std::abs(offset) < farthest; ++point) {
-    const Eigen::VectorXd inside = parameter.others();
+    const OneParameter::Place inside = parameter.place();
     const double rise = parameter.rise(offset + step);
     if (!std::isfinite(rise)) {  // perhaps only too long a step
       step *= 0.25;
