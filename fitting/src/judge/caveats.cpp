@@ -15,6 +15,7 @@
 #include "judge/adequacy.hpp"
 #include "judge/body_doubt.hpp"
 #include "judge/influence.hpp"
+#include "judge/one_parameter.hpp"
 #include "judge/profile.hpp"
 #include "problem/linearise.hpp"
 #include "trochoid/data/angle.hpp"
@@ -23,23 +24,82 @@
 
 namespace trochoid::fitting {
 
-void heed_far_side(const Problem& problem, const Solution& solution, int threads,
-                   Uncertainty& error, data::Fit& fit) {
+namespace {
+
+// As far as chi-square goes on its flatter side; what goes with the parameter goes farther with it.
+void reach(const Problem& problem, const Solution& solution, const FarSide& far, Uncertainty& error,
+           data::Fit& fit) {
   constexpr double kWorthWords = 1.3;
-  if (problem.predictor->index_of("friction") < 0) return;
-  if (!explains(problem, solution)) return;  // a bar about another path means nothing
-  const auto far = far_side_of_friction(problem, solution, error, threads);
-  if (!far) return;
-  const double variance = error.covariance(far->index, far->index);
-  const double times = far->sigma / std::sqrt(variance);
-  const Eigen::VectorXd along = error.covariance.col(far->index) / variance;
-  error.covariance += (far->sigma * far->sigma - variance) * along * along.transpose();
-  error.identifiable[far->index] = far->sigma < natural_size(problem, far->index, solution.u);
+  const double variance = error.covariance(far.index, far.index);
+  const double times = far.sigma / std::sqrt(variance);
+  if (!(times > 1.0)) return;
+  const Eigen::VectorXd along = error.covariance.col(far.index) / variance;
+  error.covariance += (far.sigma * far.sigma - variance) * along * along.transpose();
+  error.identifiable[far.index] = far.sigma < natural_size(problem, far.index, solution.u);
   if (times > kWorthWords)
     fit.warnings.push_back(fmt::format(
         "chi-square is lopsided in {}: its error bar is that of the flatter side, {:.2g} "
         "times what the curvature says (the profile shows both sides)",
-        problem.name(far->index), times));
+        problem.name(far.index), times));
+}
+
+// What l sin(theta) and its rate leave open, per relative change of l.
+Eigen::VectorXd along_upright_tops(const Problem& problem, const Eigen::VectorXd& u) {
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(u.size());
+  for (int i = 0; i < static_cast<int>(u.size()); ++i) {
+    const std::string& name = problem.predictor->parameters()[problem.free[i].index].name;
+    const Eigen::VectorXd values = problem.values(std::max(0, problem.free[i].arc), u);
+    const double theta = values[problem.predictor->index_of("theta_rad")];
+    if (name == "l_m") along[i] = problem.value(i, u);
+    if (name == "theta_rad") along[i] = -std::tan(theta);
+    if (name == "dtheta_rad_s") along[i] = -problem.value(i, u) / std::pow(std::cos(theta), 2);
+  }
+  return along;
+}
+
+}  // namespace
+
+void heed_far_side(const Problem& problem, const Solution& solution, int threads,
+                   Uncertainty& error, data::Fit& fit) {
+  if (problem.predictor->index_of("friction") < 0) return;
+  if (!explains(problem, solution)) return;  // a bar about another path means nothing
+  if (const auto far = far_side_of_friction(problem, solution, error, threads))
+    reach(problem, solution, *far, error, fit);
+}
+
+void heed_upright_top(const Problem& problem, const Solution& solution, const UprightTop& top,
+                      Uncertainty& error, data::Fit& fit) {
+  constexpr double kUnseen = 1e3;  // relative, as of a direction the data do not see at all
+  if (!explains(problem, solution)) return;
+  const double l_m = problem.value(top.length, solution.u);
+  if (top.most_m)
+    return reach(problem, solution, {top.length, (*top.most_m - l_m) / std::sqrt(kQuantile95)},
+                 error, fit);
+  const Eigen::VectorXd along = along_upright_tops(problem, solution.u);
+  // What stays determined is so to as far as it goes with l.
+  Eigen::VectorXd shift = Eigen::VectorXd::Zero(along.size());
+  for (int i = 0; i < static_cast<int>(along.size()); ++i)
+    if (along[i] == 0.0) shift[i] = problem.value(i, top.far) - problem.value(i, solution.u);
+  error.covariance += kUnseen * kUnseen * along * along.transpose() + shift * shift.transpose();
+  for (int i = 0; i < static_cast<int>(along.size()); ++i)
+    error.identifiable[i] =
+        error.identifiable[i] && along[i] == 0.0 &&
+        std::sqrt(error.covariance(i, i)) < natural_size(problem, i, solution.u);
+}
+
+void tell_open_length(const Problem& problem, const Solution& solution, const UprightTop& top,
+                      data::Fit& fit) {
+  if (top.most_m || !explains(problem, solution)) return;
+  const Eigen::VectorXd along = along_upright_tops(problem, solution.u);
+  for (int i = 0; i < static_cast<int>(along.size()); ++i)
+    for (data::FitParameter& parameter : fit.parameters)
+      if (along[i] != 0.0 && parameter.name == problem.name(i))
+        parameter.sigma = std::numeric_limits<double>::infinity();
+  const double theta = problem.values(0, solution.u)[problem.predictor->index_of("theta_rad")];
+  fit.warnings.push_back(fmt::format(
+      "the path determines only l sin(theta) = {:.4g} m at the start: l is at least {:.2g} m (95 "
+      "%), and no larger one, the axis more upright, is ruled out (99 %)",
+      problem.value(top.length, solution.u) * std::sin(theta), top.least_m));
 }
 
 void heed_single_samples(const Problem& problem, const Solution& solution, Uncertainty& error,

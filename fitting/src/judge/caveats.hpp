@@ -2,6 +2,7 @@
 #include <span>
 
 #include "judge/statistics.hpp"
+#include "judge/upright_top.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/fit.hpp"
 #include "trochoid/data/scene.hpp"
@@ -15,6 +16,14 @@ namespace trochoid::fitting {
 /// friction goes farther with it.
 void heed_far_side(const Problem& problem, const Solution& solution, int threads,
                    Uncertainty& error, data::Fit& fit);
+
+/// The error bar of l reaches as far up as chi-square lets it; tilt and tilting rate go with it.
+void heed_upright_top(const Problem& problem, const Solution& solution, const UprightTop& top,
+                      Uncertainty& error, data::Fit& fit);
+
+/// What is left to say where nothing limits it; to be told when the parameters are described.
+void tell_open_length(const Problem& problem, const Solution& solution, const UprightTop& top,
+                      data::Fit& fit);
 
 /// What one sample alone tells, which may be wrong by more than its error says, is known no better
 /// than as far as it goes without that sample.

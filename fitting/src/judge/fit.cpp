@@ -282,6 +282,8 @@ class OneFit {
   [[nodiscard]] data::Fit described(Bars bars);
 
  private:
+  void look_at_longer_tops();
+
   std::span<const data::Track> tracks_;
   data::Scene scene_;
   FitOptions options_;
@@ -291,6 +293,7 @@ class OneFit {
   Problem problem_;
   Solution solution_;
   Uncertainty by_curvature_;
+  std::optional<UprightTop> upright_;
   data::Fit fit_;
   bool refused_ = false, cut_short_ = false;
 };
@@ -344,10 +347,24 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
   stages_.enter("error bars");
   try {
     by_curvature_ = uncertainty(problem_, solution_.u);
+    look_at_longer_tops();
   } catch (const NumericalError& failure) {
     // A finer tolerance can run into the step limit where a coarse one did not.
     refuse_with(failure.what());
   }
+}
+
+// A search may end at a small l that is no better than any larger one, or not as good.
+void OneFit::look_at_longer_tops() {
+  constexpr int kMostRounds = 3;
+  if (!solution_.converged) return;
+  for (int round = 0; round < kMostRounds; ++round) {
+    upright_ = upright_top(problem_, solution_, by_curvature_);
+    if (!upright_ || !upright_->better) return;
+    solution_ = polish(problem_, *upright_->better, options_, fit_);
+    by_curvature_ = uncertainty(problem_, solution_.u);
+  }
+  upright_.reset();
 }
 
 data::Fit OneFit::described(Bars bars) {
@@ -355,6 +372,7 @@ data::Fit OneFit::described(Bars bars) {
   if (refused_) return fit;
   Uncertainty error = by_curvature_;
   if (bars == Bars::full) heed_far_side(problem_, solution_, options_.threads, error, fit);
+  if (bars == Bars::full && upright_) heed_upright_top(problem_, solution_, *upright_, error, fit);
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
   tell_idle_priors(problem_, scene_, fit);
@@ -366,6 +384,7 @@ data::Fit OneFit::described(Bars bars) {
   tell_given_up(problem_, fit);
   tell_bounds(problem_, solution_, error, scene_, fit);
   describe(problem_, solution_, error, scene_, fit);
+  if (bars == Bars::full && upright_) tell_open_length(problem_, solution_, *upright_, fit);
   tell_unlikely_friction(fit);
   tell_slope(fit);
   judge(problem_, solution_, error, cut_short_, fit);
