@@ -7,6 +7,7 @@
 #include <string>
 
 #include "choose/exchange.hpp"
+#include "choose/leave_out.hpp"
 #include "choose/terms.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -69,6 +70,30 @@ TEST_F(Contested, ALargerRungThatExplainsLessThanOneItContainsIsFittedAnewFromTh
   const double paid = std::log(chosen->fit.dof + chosen->parameters);
   constexpr double kAtItsMinimum = 0.1;  // of chi-square
   EXPECT_LT(larger.bic, chosen->bic + paid + kAtItsMinimum);
+}
+
+// The search for it had ended elsewhere, and a loss that does nothing had been recommended for
+// that.
+TEST_F(Contested, ASmallerRungThatEndedFarAboveOneThatContainsItIsFittedAnewFromThere) {
+  const int air = term("air force"), pivoting = term("pivoting friction");
+  const Rung needless = fitted({air, pivoting, term("rolling friction")});
+  const auto astray = [&](Rungs& rungs) -> Rung& {
+    Rung& smaller = rungs.emplace_back(rung_with(ladder_, {air, pivoting}));
+    smaller.fit = needless.fit;
+    smaller.fitted = true;
+    smaller.parameters = needless.parameters - 1;
+    smaller.bic = smaller.fit.bic = needless.bic + 1e3;
+    return smaller;
+  };
+  Rungs left_out{needless}, exchanged{needless};
+  const Rung &before = astray(left_out), &beside = astray(exchanged);
+  step_down(contest_, left_out[0], left_out);
+  EXPECT_LT(before.bic, needless.bic);
+  EXPECT_EQ(exchange_while_worth(contest_, exchanged), &beside);
+  EXPECT_LT(beside.bic, needless.bic);
+  const double bic = beside.bic;
+  step_down(contest_, exchanged[0], exchanged);  // where it is as expected it stays
+  EXPECT_EQ(beside.bic, bic);
 }
 
 // Residuals that hang together are no ground to fit them, and yet which loss acts may be open.

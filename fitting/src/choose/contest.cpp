@@ -57,19 +57,37 @@ Rung& add_searched(const Contest& contest, const Terms& terms, Rungs& rungs,
   return rung;
 }
 
+void fit_or_better(const Contest& contest, const Rung& known, const FitOptions& options, Rung& rung,
+                   const Nearby& near) {
+  Rung again = rung_with(contest.ladder, rung.terms);
+  again.fitted_anew = rung.fitted_anew;
+  fit_neighbour(contest.tracks, known, options, again, near);
+  if (!rung.fitted || again.bic < rung.bic) rung = std::move(again);
+}
+
+bool is_open(const Neighbour& neighbour, const Rung& known, Rungs& rungs) {
+  const Rung* const before = known_rung(rungs, neighbour.terms);
+  return before == nullptr || ended_astray(*before, known, neighbour.near);
+}
+
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs) {
-  std::vector<Rung*> added;
+  std::vector<Rung*> open;
   std::vector<const Nearby*> near;
   for (const Neighbour& neighbour : wanted) {
-    if (is_known(rungs, neighbour.terms)) continue;
-    added.push_back(&blank_rung(contest.ladder, neighbour.terms, rungs));
+    if (!is_open(neighbour, known, rungs)) continue;
+    Rung* rung = known_rung(rungs, neighbour.terms);
+    if (rung != nullptr)
+      rung->fitted_anew = true;
+    else
+      rung = &blank_rung(contest.ladder, neighbour.terms, rungs);
+    open.push_back(rung);
     near.push_back(&neighbour.near);
   }
-  side_by_side(contest, added, [&](std::size_t i, Rung& rung, const FitOptions& options) {
-    fit_neighbour(contest.tracks, known, options, rung, *near[i]);
+  side_by_side(contest, open, [&](std::size_t i, Rung& rung, const FitOptions& options) {
+    fit_or_better(contest, known, options, rung, *near[i]);
   });
-  return {added.begin(), added.end()};
+  return {open.begin(), open.end()};
 }
 
 Rung* known_rung(Rungs& rungs, const Terms& terms) {

@@ -38,7 +38,14 @@ struct Neighbour {
   Nearby near = {};
 };
 
-/// Fits the rungs with these sets of terms that are not known yet, side by side, from the solution
+/// Fits a rung from the solution of a known one; of one that was fitted before keeps the better.
+void fit_or_better(const Contest& contest, const Rung& known, const FitOptions& options, Rung& rung,
+                   const Nearby& near = {});
+
+/// Whether the rung with these terms is still to be fitted: it is not known, or ended astray.
+[[nodiscard]] bool is_open(const Neighbour& neighbour, const Rung& known, Rungs& rungs);
+
+/// Fits the rungs with those of these sets of terms that are open, side by side, from the solution
 /// of a known one. @returns them.
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs);

@@ -108,7 +108,9 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
   for (const int key : order) {
     const Terms& terms = sets.at(key);
     const Difference by = difference(terms, known.terms);
-    if (is_known(rungs, terms) || !worth_a_fit(known, inflation, *test, change(key), by)) continue;
+    Neighbour neighbour{terms, nearby(*test, change(key))};
+    if (!is_open(neighbour, known, rungs) || !worth_a_fit(known, inflation, *test, change(key), by))
+      continue;
     const bool near = by.larger() || by.exchanged();
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
     const double gained = gain(*test, change(key)) / inflation;
@@ -117,7 +119,7 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
       continue;
     }
     far += near ? 0 : 1;
-    worth.push_back({terms, nearby(*test, change(key))});
+    worth.push_back(std::move(neighbour));
   }
   return worth;
 }
@@ -139,10 +141,8 @@ void fit_stuck_anew(const Contest& contest, const Rung& known, Rungs& rungs) {
   if (!explains(known) || known.fit.arcs.size() != 1) return;
   side_by_side(contest, stuck_above(known, rungs),
                [&](std::size_t, Rung& rung, const FitOptions& options) {
-                 Rung again = rung_with(contest.ladder, rung.terms);
-                 fit_neighbour(contest.tracks, known, options, again);
-                 if (again.fitted && again.bic < rung.bic) rung = std::move(again);
                  rung.fitted_anew = true;
+                 fit_or_better(contest, known, options, rung);
                });
 }
 

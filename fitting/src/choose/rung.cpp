@@ -432,6 +432,12 @@ bool as_expected(const Rung& rung, const Rung& known, const Nearby& near) {
 
 }  // namespace
 
+bool ended_astray(const Rung& smaller, const Rung& known, const Nearby& near) {
+  return !near.values.empty() && !smaller.fitted_anew && explains(known) &&
+         known.fit.arcs.size() == 1 && has_all_terms_of(known, smaller) &&
+         !as_expected(smaller, known, near);
+}
+
 void fit_neighbour(std::span<const data::Track> tracks, const Rung& known,
                    const FitOptions& options, Rung& rung, const Nearby& near) {
   FitOptions own = options;

@@ -36,7 +36,7 @@ struct Rung {
   Settled settled;
   bool rolls_at_first = false;  ///< FitOptions::rolls_at_first
   bool fitted = false;
-  bool fitted_anew = false;    ///< from a smaller rung that explained more
+  bool fitted_anew = false;    ///< from another rung that explained more
   bool by_score_test = false;  ///< not fitted itself, take_from_score_test()
   std::string reason;          ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
@@ -157,6 +157,10 @@ struct Nearby {
   std::map<std::string, double> values;  ///< by name; empty: nothing is expected
   double cost = 0.0;                     ///< what chi-square is to rise by; a gain is not relied on
 };
+
+/// Whether a rung that lacks terms of a known one, which explains the track, ended far above what
+/// is expected of it there: its search ended in another valley. Not of one fitted anew already.
+[[nodiscard]] bool ended_astray(const Rung& smaller, const Rung& known, const Nearby& near);
 
 /// Makes a rung with further losses that gain too little by the score test what that says, without
 /// a fit, which would creep along beside the known rung's: it is told of, and error bars allow for
