@@ -8,6 +8,7 @@
 
 #include "choose/exchange.hpp"
 #include "choose/leave_out.hpp"
+#include "choose/slide.hpp"
 #include "choose/terms.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -94,6 +95,25 @@ TEST_F(Contested, ASmallerRungThatEndedFarAboveOneThatContainsItIsFittedAnewFrom
   const double bic = beside.bic;
   step_down(contest_, exchanged[0], exchanged);  // where it is as expected it stays
   EXPECT_EQ(beside.bic, bic);
+}
+
+// With a wrong radius in the scene the third such search had taken another minute.
+TEST_F(Contested, ACreepIsNotSearchedForAfterASearchInVainWithAllThatUsuallyActs) {
+  const Rung rolling = fitted({term("air force"), term("pivoting friction")});
+  const auto lines_logged = [&](bool in_vain) {
+    Rungs rungs{rolling};
+    rungs[0].fit.whiteness_p = 1e-6;
+    rungs[0].fit.bic = -1e6;  // nothing that is fitted from there does as well
+    rungs[0].in_vain = in_vain;
+    int lines = 0;
+    Contest contest = contest_;
+    contest.options.log = [&](const std::string&) { ++lines; };
+    EXPECT_FALSE(creep_instead(contest, rungs[0], rungs));
+    EXPECT_EQ(rungs.size(), 2u);
+    return lines;
+  };
+  constexpr int kTimesAsMany = 2;  // and mostly far more
+  EXPECT_GT(lines_logged(false), kTimesAsMany * lines_logged(true));
 }
 
 // Residuals that hang together are no ground to fit them, and yet which loss acts may be open.

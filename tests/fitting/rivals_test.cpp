@@ -76,6 +76,22 @@ TEST(Sentence, NamesTheLikeliestFewAndNothingThatEndedElsewhere) {
   EXPECT_THAT(words, testing::Not(testing::HasSubstr("11507")));
 }
 
+TEST(Sentence, AsksForTheFactsOfTheSceneWhereAllThatUsuallyActsWasSearchedForInVain) {
+  Rungs rungs{rung_of({1}, {loss("air_N_m_s", 1.0, 0.1)}, 100.0, 100.0),
+              rung_of({1, 2}, {loss("air_N_m_s", 1.0, 0.1)}, 100.0, 100.0)};
+  for (Rung& rung : rungs) rung.fit.model = "puck";  // of a rim's mean path more is said
+  const auto asks = testing::HasSubstr("the scale and the frame rate right?");
+  const auto words = [&](data::FitVerdict verdict) {
+    return sentence(rungs, rungs[0], {}, verdict);
+  };
+  EXPECT_THAT(words(data::FitVerdict::doubtful), testing::Not(asks));
+  rungs[1].in_vain = true;
+  EXPECT_THAT(words(data::FitVerdict::doubtful), asks);
+  EXPECT_THAT(words(data::FitVerdict::good), testing::Not(asks));
+  rungs[0].fit.converged = false;
+  EXPECT_THAT(words(data::FitVerdict::unexplained), asks);
+}
+
 TEST(Rivals, ThatAreAsLikelyWidenTheErrorBars) {
   const Rungs rungs{rung_of({1}, {loss("rolling_friction_m", 1.0, 0.1)}, 100.0, 100.0),
                     rung_of({2}, {loss("rolling_friction_m", 0.4, 0.1)}, 100.0, 108.0)};

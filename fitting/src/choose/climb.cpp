@@ -157,17 +157,21 @@ void by_all_that_usually_acts(const Contest& contest, const Rung& known, Rungs& 
   const Terms all =
       all_that_usually_acts(contest.ladder, known.fit.converged ? known.terms : Terms{});
   if (all.empty()) return;
-  const Rung& searched = add_searched(contest, all, rungs, longest_first_part(rungs));
+  Rung& searched = add_searched(contest, all, rungs, longest_first_part(rungs));
   if (explains(searched)) return step_down(contest, searched, rungs);
   if (!searched.fitted) return;  // nothing to go on from
-  // Where one loss more leads nearer, it may lead there from another start.
+  // Where one loss more leads nearer, it may lead there from another start; where it takes no good
+  // part away, as where the scene has a wrong radius, it had only taken another minute.
   Rungs nearer;
   const Rung& nearest = step_up(contest, false, Reach::from_below, searched, nearer);
+  if (explains(nearest)) return step_down(contest, rungs.emplace_back(nearest), rungs);
+  searched.in_vain =
+      leaves_much(searched) && nearest.fit.chi2 > (1.0 - kGoodPart) * searched.fit.chi2;
   if (&nearest == &searched) return;
-  step_down(
-      contest,
-      explains(nearest) ? rungs.emplace_back(nearest) : add_searched(contest, nearest.terms, rungs),
-      rungs);
+  if (searched.in_vain)
+    rungs.push_back(nearest);
+  else
+    step_down(contest, add_searched(contest, nearest.terms, rungs), rungs);
 }
 
 // The plainest model. Where losses usually act it hardly ever explains a track, and a search of all

@@ -136,6 +136,10 @@ const Rung* simplest_sufficient(const Ladder& ladder, const Rungs& rungs) {
   return best;
 }
 
+bool searched_in_vain(const Rungs& rungs) {
+  return std::any_of(rungs.begin(), rungs.end(), [](const Rung& rung) { return rung.in_vain; });
+}
+
 double most_evidence_against(const Rung& known) {
   return known.fit.model == "sliding" ? kStrong : kVeryStrong;
 }

@@ -68,6 +68,9 @@ void add_score_tested(Rung tested, Rungs& rungs);
 /// then the least BIC. Null where none could be fitted.
 [[nodiscard]] const Rung* simplest_sufficient(const Ladder& ladder, const Rungs& rungs);
 
+/// Whether all that usually acts was searched for in vain: another search like that is idle.
+[[nodiscard]] bool searched_in_vain(const Rungs& rungs);
+
 /// Up to which evidence against it a rung is worth telling of beside another. Those of a sliding
 /// body are dear: only what counts in the error bars.
 [[nodiscard]] double most_evidence_against(const Rung& known);

@@ -30,17 +30,14 @@ bool counts_in_error_bars(const ScoreTest::Change& change, double gained) {
 }
 
 // Whether a score-tested change of a known rung may come to something. One that hardly follows the
-// track has to be mended for a good part: all else would only follow the tracker's errors. Where
-// what is left hangs together, a further term may be what is missing, and all that it takes away
-// counts; what takes the place of another, or stands beside a rung that leaves noise, may do as
-// well as that. So may what differs by more terms, but of that only what is expected to do as well.
+// track has to be mended for a good part. Where what is left hangs together, a further term may be
+// what is missing, and all that it takes away counts; what takes the place of another, or stands
+// beside a rung that leaves noise, may do as well as that. So may what differs by more terms, but
+// of that only what is expected to do as well.
 bool worth_a_fit(const Rung& known, double inflation, const ScoreTest& test,
                  const ScoreTest::Change& change, const Difference& by) {
-  constexpr double kGoodPart = 0.25;
   const double gained = gain(test, change), paid = price(test, change);
-  if (known.fit.verdict == data::FitVerdict::doubtful ||
-      known.fit.verdict == data::FitVerdict::unexplained)
-    return gained > kGoodPart * test.before;
+  if (leaves_much(known)) return gained > kGoodPart * test.before;
   if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
   if (by.larger() && counts_in_error_bars(change, gained / inflation)) return true;
   const double against = paid - gained / inflation;

@@ -32,11 +32,14 @@ bool usable(const data::Fit& fit) {
   return !fit.parameters.empty() && std::isfinite(fit.chi2);
 }
 
+bool leaves_much(const Rung& rung) {
+  return rung.fit.verdict == data::FitVerdict::doubtful ||
+         rung.fit.verdict == data::FitVerdict::unexplained;
+}
+
 bool explains(const Rung& rung) {
   constexpr double kTrackersOwn = 1.3;
-  const data::FitVerdict verdict = rung.fit.verdict;
-  return rung.fitted && verdict != data::FitVerdict::doubtful &&
-         verdict != data::FitVerdict::unexplained &&
+  return rung.fitted && !leaves_much(rung) &&
          (rung.fit.whiteness_p >= kWhite || rung.fit.noise_scale <= kTrackersOwn);
 }
 

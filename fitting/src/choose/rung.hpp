@@ -25,6 +25,9 @@ inline constexpr double kWhite = 0.01;
 /// Variance inflation below which residuals that are not white hang together so little that further
 /// terms have no tracker's errors to follow.
 inline constexpr double kNearlyIndependent = 2.25;
+/// What mends a rung that hardly follows the track takes away so much of its chi-square: all else
+/// would only follow the tracker's errors.
+inline constexpr double kGoodPart = 0.25;
 
 /// A model of the ladder and what became of it.
 struct Rung {
@@ -38,7 +41,8 @@ struct Rung {
   bool fitted = false;
   bool fitted_anew = false;    ///< from another rung that explained more
   bool by_score_test = false;  ///< not fitted itself, take_from_score_test()
-  std::string reason;          ///< why there is no fit, or why it is not accepted; else empty
+  bool in_vain = false;  ///< searched with all that usually acts; no loss more leads nearer either
+  std::string reason;    ///< why there is no fit, or why it is not accepted; else empty
   double held_back_rms_sigma = std::numeric_limits<double>::quiet_NaN();
   int parameters = 0;
   /// What explains the longest first part of the track that a search for it, or for the model that
@@ -101,6 +105,9 @@ void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
 /// Whether a rung's verdict is good, good_correlated or weak, and its residuals are white or within
 /// 1.3 of the stated noise (a tracker's errors may hang together).
 [[nodiscard]] bool explains(const Rung& rung);
+
+/// Whether a rung's verdict is doubtful or unexplained: it hardly follows the track.
+[[nodiscard]] bool leaves_much(const Rung& rung);
 
 /// How a rung is looked for: searched for where the solution below does not lead to it, or not.
 enum class Reach { search, from_below };

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 
+#include "choose/contest.hpp"
 #include "choose/retrograde.hpp"
 
 namespace trochoid::fitting {
@@ -73,10 +74,16 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
                      data::FitVerdict verdict) {
   std::string not_tried;
   for (const std::string& term : ladder.left_out) not_tried += "; not tried: " + term;
+  const bool explained = chosen.fit.converged && verdict != data::FitVerdict::doubtful;
+  const std::string in_vain = !explained && searched_in_vain(rungs)
+                                  ? " Not even all that usually acts together explains it, and no "
+                                    "more was searched for: are "
+                                    "the body's dimensions, the scale and the frame rate right?"
+                                  : "";
   const std::vector<const Rung*> all = told(rungs, &chosen);
   if (!chosen.fit.converged)
-    return fmt::format("none of the {} models tried explains the track; {} comes nearest{}.",
-                       all.size(), chosen.name, not_tried);
+    return fmt::format("none of the {} models tried explains the track; {} comes nearest{}.{}",
+                       all.size(), chosen.name, not_tried, in_vain);
   std::string words = fmt::format(
       "{} {} ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)", chosen.name,
       verdict == data::FitVerdict::doubtful ? "comes nearest, and does not explain the track"
@@ -99,7 +106,7 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
     words +=
         fmt::format("; the next best, {}, is ruled out",
                     listed({*std::min_element(worse.begin(), worse.end(), likelier)}, chosen.bic));
-  return words + not_tried + "." + retrograde_sentence(rungs, chosen, ladder);
+  return words + not_tried + "." + in_vain + retrograde_sentence(rungs, chosen, ladder);
 }
 
 }  // namespace trochoid::fitting

@@ -136,7 +136,8 @@ bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
   if (terms.empty() || (before != nullptr && !softness_is_open(*before))) return false;
   Rung creeps = rung_with(contest.ladder, terms);
   fit_creeping(contest.tracks, *rolling, options_for(creeps, contest.options), creeps);
-  if (!creeps.fitted || misfit(creeps) > misfit(*rolling)) {  // what it starts from cannot creep
+  const bool astray = !creeps.fitted || misfit(creeps) > misfit(*rolling);
+  if (astray && !searched_in_vain(rungs)) {  // what it starts from cannot creep
     Rungs searched;
     const Rung& found = add_searched(contest, terms, searched);
     if (found.fitted && !(creeps.fitted && misfit(creeps) < misfit(found))) creeps = found;
