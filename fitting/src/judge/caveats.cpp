@@ -98,7 +98,7 @@ void tell_open_length(const Problem& problem, const Solution& solution, const Up
   const double theta = problem.values(0, solution.u)[problem.predictor->index_of("theta_rad")];
   fit.warnings.push_back(fmt::format(
       "the path determines only l sin(theta) = {:.4g} m at the start: l is at least {:.2g} m (95 "
-      "%), and no larger one, the axis more upright, is ruled out (99 %)",
+      "%), and no larger one, the axis more upright, is ruled out",
       problem.value(top.length, solution.u) * std::sin(theta), top.least_m));
 }
 

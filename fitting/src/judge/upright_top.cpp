@@ -88,8 +88,6 @@ std::optional<UprightTop> upright_top(const Problem& problem, const Solution& so
   if (length < 0) return std::nullopt;
   const double l_m = problem.value(length, solution.u);
   if (std::sqrt(error.covariance(length, length)) < kSharply * l_m) return std::nullopt;
-  // A limit that may well be chance is none, and without one no bar about l means anything: 99 %.
-  constexpr double kSurely = 6.634896601021213;
   const double inflation = error.chi2_inflation[length], threshold = kQuantile95 * inflation;
   UprightTop top{length, {}, 0.0, {}, {}};
   WalkOfLength longer(problem, solution, length);
@@ -102,10 +100,7 @@ std::optional<UprightTop> upright_top(const Problem& problem, const Solution& so
     }
   }
   top.far = longer.end();
-  if (longer.bound(kSurely * inflation)) {
-    top.most_m = longer.bound(threshold);
-    return top;
-  }
+  if ((top.most_m = longer.bound(threshold))) return top;
   if (longer.end_m() < kFar * l_m) return std::nullopt;  // the model ends before it tells
   WalkOfLength shorter(problem, solution, length);
   shorter.go(kShorter, threshold);
