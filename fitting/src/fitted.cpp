@@ -30,7 +30,10 @@ Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit
   Eigen::VectorXd values(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const data::FitParameter* fitted = found_for(fit, parameters[i], arc);
-    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : parameters[i].value;
+    // A puck whose spin nothing showed was taken not to turn, whatever its scene has.
+    const bool unseen_spin = fit.model == "puck" && parameters[i].name == "w3_rad_s";
+    const double otherwise = unseen_spin ? 0.0 : parameters[i].value;
+    values[static_cast<Eigen::Index>(i)] = fitted != nullptr ? fitted->value : otherwise;
   }
   return values;
 }

@@ -286,6 +286,12 @@ Trajectory simulate_puck(const data::Scene& scene) {
   if (!(puck.value[kFriction] >= kLeastFriction))
     throw InputError(fmt::format("model.friction = {} must be at least {}", puck.value[kFriction],
                                  kLeastFriction));
+  const double rise = std::hypot(puck.value[kSlopeX], puck.value[kSlopeY]);
+  if (!(rise < puck.value[kFriction]))  // it turns back, or never stops
+    throw InputError(
+        fmt::format("support: a floor that rises by {:.3g} per length holds no puck of "
+                    "model.friction = {:.3g}, which must be greater",
+                    rise, puck.value[kFriction]));
   const std::vector<double> t_s = output_times_s(scene.run);
   const double tolerance = scene.run.tolerance;
   const auto path = puck_path(puck, puck.value, t_s, tolerance);

@@ -125,8 +125,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
                    const FitOptions& options) {
   data::Scene named = scene;
   if (!options.model.empty()) named.model.name = options.model;
-  // A body held at a pivot that leans there is a top, one that lies on it only turns: to which a
-  // body has to be known.
+  // A body held at a pivot that leans there is a top, one that lies on it only turns; to tell them
+  // apart takes its radius.
   const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
   if (open && (!named.body || leaves_pivot(tracks, named, options))) named.model.name = "top";
   if (!named.body && named.model.name == "auto")

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <span>
 
@@ -76,20 +77,23 @@ std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladde
   for (const std::string& term : ladder.left_out) not_tried += "; not tried: " + term;
   const bool explained = chosen.fit.converged && verdict != data::FitVerdict::doubtful;
   const std::string in_vain = !explained && searched_in_vain(rungs)
-                                  ? " Not even all that usually acts together explains it, and no "
-                                    "more was searched for: are "
+                                  ? " Not even all that usually acts together explains it: are "
                                     "the body's dimensions, the scale and the frame rate right?"
                                   : "";
   const std::vector<const Rung*> all = told(rungs, &chosen);
   if (!chosen.fit.converged)
     return fmt::format("none of the {} models tried explains the track; {} comes nearest{}.{}",
                        all.size(), chosen.name, not_tried, in_vain);
+  const double held_back = chosen.held_back_rms_sigma;
+  const std::string predicted =
+      std::isfinite(held_back)
+          ? fmt::format(", held-back third predicted to {:.2g} sigma", held_back)
+          : "";
   std::string words = fmt::format(
-      "{} {} ({} parameters, residuals {}, held-back third predicted to {:.2g} sigma)", chosen.name,
+      "{} {} ({} parameters, residuals {}{})", chosen.name,
       verdict == data::FitVerdict::doubtful ? "comes nearest, and does not explain the track"
                                             : "suffices",
-      chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white",
-      chosen.held_back_rms_sigma);
+      chosen.parameters, chosen.fit.whiteness_p >= kWhite ? "white" : "not white", predicted);
   std::vector<const Rung*> alike, worse, more;  // more: with terms beyond the chosen ones
   for (const Rung* rung : all) {
     if (!rung->fitted || rung->terms == chosen.terms) continue;

@@ -283,7 +283,19 @@ void tell_slope(data::Fit& fit) {
   };
   if (!fitted(x) && !fitted(y)) return;
   const double rise = std::hypot(x->value, y->value);
-  const double sigma = std::hypot(x->value * x->sigma, y->value * y->sigma) / rise;
+  // Along the rise, of which both components have a share; told where it is more than nothing.
+  constexpr double kTold = 2.0;
+  double variance = 0.0;
+  for (std::size_t i = 0; i < fit.covariance_names.size(); ++i)
+    for (std::size_t k = 0; k < fit.covariance_names.size(); ++k) {
+      const auto along = [&](const std::string& name) {
+        return name == kSlopeX ? x->value / rise : name == kSlopeY ? y->value / rise : 0.0;
+      };
+      variance += along(fit.covariance_names[i]) * along(fit.covariance_names[k]) *
+                  fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+    }
+  const double sigma = std::sqrt(variance);
+  if (!x->identifiable || !y->identifiable || !(rise > kTold * sigma)) return;
   fit.warnings.push_back(fmt::format(
       "the floor rises by {:.3g} ± {:.1g} degrees, towards {:.0f} degrees as counted from x to y",
       data::degrees(std::atan(rise)), data::degrees(sigma),

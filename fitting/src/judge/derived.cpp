@@ -226,9 +226,11 @@ class DerivedTop {
     unit.Is_kg_m2.reset();
     const auto of_shape = [=, this](const Values& v, const Givens& g) {
       data::Body body = unit;
-      body.radius_m = g[kRadius];
-      body.inner_radius_m = g[kInner];
-      body.thickness_m = g[kThickness];
+      // A prior may reach beyond what a body can be.
+      constexpr double kLeast_m = 1e-9;
+      body.radius_m = std::max(g[kRadius], kLeast_m);
+      body.inner_radius_m = std::clamp(g[kInner], 0.0, body.radius_m);
+      body.thickness_m = std::max(g[kThickness], 0.0);
       const model::CentralInertia inertia = model::central_inertia(body);
       return (inertia.transverse_kg_m2 + v[l_] * v[l_]) / inertia.axial_kg_m2;
     };

@@ -29,15 +29,15 @@ struct MetresByRadius {
   double usual_scale = 1.0;  // that of the model's own body
 };
 
-// A prediction's positions as measured.
-void scale_positions(const PredictRequest& request, double scale, Prediction& out) {
+// One for each row that is a position, else nothing.
+Eigen::VectorXd are_positions(const PredictRequest& request, Eigen::Index rows) {
+  Eigen::VectorXd are = Eigen::VectorXd::Zero(rows);
   const std::size_t observables = request.observables.size();
-  for (Eigen::Index row = 0; row < out.values.size(); ++row) {
+  for (Eigen::Index row = 0; row < rows; ++row) {
     const Observable what = request.observables[static_cast<std::size_t>(row) % observables];
-    if (what != Observable::x_m && what != Observable::y_m) continue;
-    out.values[row] *= scale;
-    out.jacobian.row(row) *= scale;
+    if (what == Observable::x_m || what == Observable::y_m) are[row] = 1.0;
   }
+  return are;
 }
 
 // By central differences; from one side where the other has no prediction any more.
@@ -95,6 +95,7 @@ std::unique_ptr<model::Predictor> ObservedPredictor::resized(double scale) const
   if (!by_radius_ || scale == by_radius_->usual_scale) return nullptr;
   data::Scene scene = by_radius_->scene;
   scene.body->radius_m = by_radius_->measured_m / scale;
+  scene.body->inner_radius_m = std::min(scene.body->inner_radius_m, scene.body->radius_m);
   return model::make_predictor(scene);
 }
 
@@ -103,12 +104,23 @@ void ObservedPredictor::fill(const Eigen::Ref<const Eigen::VectorXd>& values,
                              Prediction& out) const {
   constexpr double kStep = 1e-4;
   const int index = request.derivatives[static_cast<std::size_t>(column)];
+  // Far finer than the difference of two runs is small.
+  constexpr double kFine = 1e-10;
   PredictRequest without = request;
   without.derivatives.clear();
+  without.tolerance = std::min(request.tolerance, kFine);
   Eigen::VectorXd moved = values;
   const auto at = [&](double share) {
     moved[index] = values[index] * (1.0 + share);
-    return predict(moved, without);
+    try {
+      return predict(moved, without);
+    } catch (const InputError&) {  // no such body
+      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+      Prediction none;
+      none.values.setConstant(out.values.size(), kNone);
+      none.end_state.setConstant(out.end_state.size(), kNone);
+      return none;
+    }
   };
   const Prediction later = at(kStep), earlier = at(-kStep);
   const double step = kStep * values[index];
@@ -142,11 +154,17 @@ Prediction ObservedPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& v
     if (request.want_end_state) out.end_state_jacobian.col(c) = plain.end_state_jacobian.col(from);
     ++from;
   }
-  scale_positions(request, scale, out);
-  for (Eigen::Index c = 0; c < width; ++c)
-    if (const int index = request.derivatives[static_cast<std::size_t>(c)];
-        index == factor_ || index == scale_)
+  const Eigen::VectorXd positions = are_positions(request, out.values.size());
+  const Eigen::VectorXd by = (1.0 + (scale - 1.0) * positions.array()).matrix();
+  out.values.array() *= by.array();
+  out.jacobian.array().colwise() *= by.array();
+  for (Eigen::Index c = 0; c < width; ++c) {
+    const int index = request.derivatives[static_cast<std::size_t>(c)];
+    if (index == factor_ || (index == scale_ && by_radius_))
       fill(values, request, c, out);
+    else if (index == scale_)
+      out.jacobian.col(c) = positions.array() * plain.values.array();
+  }
   return out;
 }
 

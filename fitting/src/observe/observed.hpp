@@ -20,7 +20,8 @@ void scale_by_radius(data::Scene& scene);
 /// What the way of measuring adds to a model, as further parameters (role observation):
 ///   scale               x_measured = scale * x; with [fit] free_scale, a prior on "scale", or a
 ///                       prior on radius_m when the known radius gave the metres, with which
-///                       the body that the model has is smaller by this scale;
+///                       the body that the model has is smaller by this scale (its radius: other
+///                       dimensions were measured in true metres);
 ///   frame_rate_factor   t_true - t_start = factor * (t_measured - t_start); with a prior on
 ///                       frame_rate_hz (a clip whose container lies);
 ///   readout_s, angle_delay_s  see timing.hpp; with a prior on them or in [fit] free. Without a

@@ -259,7 +259,7 @@ bool is_loss(const Problem& problem, const FreeParameter& parameter) {
   const model::ParameterInfo& info = problem.predictor->parameters()[parameter.index];
   return info.role == model::ParameterInfo::Role::dynamics && info.name != "a_1_s2" &&
          info.name != "b_1_s" && info.name != "l_m" && info.name != "friction" &&
-         info.name != kSlipScale;
+         info.name != kSlipScale && !is_slope(info.name);
 }
 
 namespace {

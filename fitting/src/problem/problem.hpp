@@ -164,6 +164,7 @@ const Value* said_of(const std::string& parameter, const std::map<std::string, V
   return entry == entries.end() ? nullptr : &entry->second;
 }
 
+/// Whether a parameter is how much the floor rises.
 [[nodiscard]] bool is_slope(const std::string& name);
 
 /// Whether naming a parameter in [fit] free leaves the model its own choice of the others: where

@@ -19,7 +19,8 @@ enum class FitOutcome { none, converged, no_convergence, unexplained, not_identi
 
 /// What a fit is worth. good_correlated: residuals hang together and error bars are widened for
 /// that; weak: explained but parameters are not determined; doubtful: followed but residuals beyond
-/// twice their noise; no_feature: nothing in the track asks for the model; none: not said.
+/// twice their noise, or what was given or shared contradicts the tracks; no_feature: nothing in
+/// the track asks for the model; none: not said.
 enum class FitVerdict { none, good, good_correlated, weak, doubtful, no_feature, unexplained };
 
 /// Whether chi-square bounds a parameter on both sides, on one, or on none (flat).
@@ -99,7 +100,7 @@ struct ModelScore {
   /// beforehand, such as a wet floor.
   double aicc = 0.0, bic = 0.0;
   double whiteness_p = 0.0;          ///< p-value of the residuals being white, 0..1
-  double held_back_rms_sigma = 0.0;  ///< error in predicting the last third [sigma], >= 0
+  double held_back_rms_sigma = 0.0;  ///< of the last third; NaN: none seen
   int parameters = 0;                ///< number of free ones
   bool recommended = false;          ///< the simplest that suffices; true for one at the most
   std::string reason;                ///< why there is no fit, or why it is not accepted; else empty
