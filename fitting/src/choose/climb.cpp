@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "choose/leave_out.hpp"
+#include "choose/off_level.hpp"
 #include "choose/slide.hpp"
 #include "choose/terms.hpp"
-#include "choose/uneven.hpp"
 
 namespace trochoid::fitting {
 namespace {

@@ -1,4 +1,4 @@
-#include "choose/uneven.hpp"
+#include "choose/off_level.hpp"
 
 #include <algorithm>
 #include <cmath>
