@@ -88,9 +88,7 @@ std::set<std::string> parameters_without(const Ladder& ladder, const Terms& term
 
 std::set<std::string> parameters_of_losses(const Ladder& ladder, const Terms& terms) {
   Terms law = terms;
-  std::erase_if(law, [&](int index) {
-    return !term_of(ladder, index).last_resort && !term_of(ladder, index).slope;
-  });
+  std::erase_if(law, [&](int index) { return is_ordinary(term_of(ladder, index)); });
   return parameters_without(ladder, terms, law);
 }
 

@@ -104,7 +104,7 @@ void ObservedPredictor::fill(const Eigen::Ref<const Eigen::VectorXd>& values,
                              Prediction& out) const {
   constexpr double kStep = 1e-4;
   const int index = request.derivatives[static_cast<std::size_t>(column)];
-  // Far finer than the difference of two runs is small.
+  // So fine that the two runs do not differ by their integration errors.
   constexpr double kFine = 1e-10;
   PredictRequest without = request;
   without.derivatives.clear();
