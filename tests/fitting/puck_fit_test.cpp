@@ -215,6 +215,33 @@ TEST(PuckFit, CarriesScaleAndFrameRateIntoTheFriction) {
   EXPECT_NE(fit.find("friction")->note.find("between clips"), std::string::npos);
 }
 
+// Up a slope a straight path is that of a puck with more friction; who says how well the floor is
+// levelled gets that into the error bar, and slides to and fro see the slope themselves.
+TEST(PuckFit, SaysWhatASlopeAlongThePathWouldBeOfTheFriction) {
+  constexpr double kRise = 0.0017;  // 0.1 degrees
+  const auto says = testing::Contains(testing::HasSubstr("taken for level"));
+  const auto friction_of = [](const data::Track& track, const data::Scene& scene) {
+    const data::Fit fit = fitting::fit(std::span(&track, 1), scene);
+    return std::pair(*fit.find("friction"), fit.warnings);
+  };
+  Throw up(14), to_and_fro(15);
+  up.with_friction(kFriction + kRise).slide({1.0, 0.0}, 0.4);
+  to_and_fro.with_friction(kFriction + kRise).slide({1.0, 0.0}, 0.4);
+  to_and_fro.with_friction(kFriction - kRise).slide({-1.0, 0.0}, 0.4);
+  data::Scene scene = puck_scene();
+  scene.fit.fixed["w3_rad_s"] = 0.0;
+  const auto [level, warnings] = friction_of(up.track(), scene);
+  EXPECT_GT(level.value - kFriction, 4.0 * level.sigma) << "else it tests nothing";
+  EXPECT_THAT(warnings, testing::Contains(testing::HasSubstr("acts as 0.0017 of friction")));
+  scene.fit.prior["slope_x"] = scene.fit.prior["slope_y"] = {0.0, kRise};
+  const auto [allowed, less] = friction_of(up.track(), scene);
+  EXPECT_NEAR(allowed.sigma, std::hypot(level.sigma, kRise), 0.1 * kRise);
+  EXPECT_THAT(less, testing::Not(says));
+  const auto [both, none] = friction_of(to_and_fro.track(), scene);
+  EXPECT_LT(both.sigma, 0.5 * kRise);
+  EXPECT_NEAR(both.value, kFriction, 4.0 * both.sigma);
+}
+
 // Sixteen residuals less five parameters: the noise is known to a fifth, and two sigmas by the
 // normal distribution's quantile would hold 92.4 %.
 TEST(PuckFit, KeepsItsPromiseWithFewSamples) {

@@ -175,6 +175,36 @@ std::vector<Doubt> unseen_spins(const Problem& problem, const Eigen::VectorXd& u
   return doubts;
 }
 
+double friction_of_rise(const Problem& problem, const Eigen::VectorXd& u, const data::Scene& scene,
+                        double rise, double frame_time_s) {
+  const model::Predictor& predictor = *problem.predictor;
+  const auto friction =
+      std::find_if(problem.free.begin(), problem.free.end(), [&](const FreeParameter& free) {
+        return predictor.parameters()[free.index].name == "friction";
+      });
+  if (predictor.model_name() != "puck" || predictor.index_of(kSlopeX) >= 0 ||
+      friction == problem.free.end())
+    return 0.0;
+  static const std::array<BodyQuantity, 2> kAxes{
+      {{kSlopeX, [](data::Scene& s, double v) { s.support.slope_x = v; }},
+       {kSlopeY, [](data::Scene& s, double v) { s.support.slope_y = v; }}}};
+  const Linearised all = linearise(problem, u);
+  const auto rows = problem.rows();
+  Eigen::Vector2d shifts = Eigen::Vector2d::Zero();
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(rows, 2);  // what no other value could have made
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::VectorXd change =
+        MovedResiduals(problem, u, scene, kAxes.at(axis), {0.0, rise}, frame_time_s)
+            .derivative(all.residuals.head(rows));
+    if (change.size() == 0) return 0.0;
+    const Eigen::VectorXd shift = follow(all, change);
+    shifts[axis] = shift[std::distance(problem.free.begin(), friction)];
+    own.col(axis) = change + all.jacobian.topRows(rows) * shift;
+  }
+  const Eigen::Matrix2d known = Eigen::Matrix2d::Identity() + own.transpose() * own;
+  return std::sqrt(shifts.dot(SymmetricEquations(known).solve(shifts)));
+}
+
 std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {
   std::vector<std::string> idle;
   const auto& infos = problem.predictor->parameters();

@@ -31,6 +31,14 @@ struct Doubt {
 [[nodiscard]] std::vector<Doubt> unseen_spins(const Problem& problem, const Eigen::VectorXd& u,
                                               const data::Scene& scene);
 
+/// What a floor that rises by `rise` (per length, one standard deviation in any direction) would be
+/// of a puck's friction, as far as the path does not rule it out: along a straight path a slope
+/// acts as friction does. 0 for other models, where the slope is fitted or given and where the
+/// friction is not fitted.
+/// @param frame_time_s as of observed().
+[[nodiscard]] double friction_of_rise(const Problem& problem, const Eigen::VectorXd& u,
+                                      const data::Scene& scene, double rise, double frame_time_s);
+
 /// Names under [fit] prior that mean nothing to this model or its body.
 [[nodiscard]] std::vector<std::string> idle_priors(const Problem& problem,
                                                    const data::Scene& scene);

@@ -238,6 +238,21 @@ void tell_camera(const Problem& problem, const Uncertainty& error, const data::S
         names.size() == 1 ? "" : "s", fmt::join(names, ", ")));
 }
 
+void tell_rise(const Problem& problem, const Solution& solution, const Uncertainty& error,
+               const data::Scene& scene, double frame_s, data::Fit& fit) {
+  constexpr double kRise_deg = 0.1;  // as good as a table without care may be
+  if (!explains(problem, solution)) return;
+  const double rise = std::tan(data::radians(kRise_deg));
+  const double of_rise = friction_of_rise(problem, solution.u, scene, rise, frame_s);
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (problem.name(i) == "friction" && of_rise > std::sqrt(error.covariance(i, i)))
+      fit.warnings.push_back(fmt::format(
+          "the floor is taken for level: a rise of {:g} degrees along the path acts as {:.2g} of "
+          "friction, which its error bar does not hold; [fit] prior = {{ slope_x = [0, {:.2g}], "
+          "slope_y = [0, {:.2g}] }} allows for it, slides to and fro tell them apart",
+          kRise_deg, of_rise, rise, rise));
+}
+
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit) {
   constexpr double kWeakest_m_s2 = 1.0, kStrongest_m_s2 = 30.0;
   if (const double g = scene.model.gravity_m_s2;

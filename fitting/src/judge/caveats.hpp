@@ -52,6 +52,12 @@ void tell_other_rate(const data::Scene& scene, std::span<const data::Track> trac
 void tell_camera(const Problem& problem, const Uncertainty& error, const data::Scene& scene,
                  data::Fit& fit);
 
+/// A puck's friction whose error bar is little beside what a floor that is hardly off level would
+/// do.
+/// @param frame_s  as of observed().
+void tell_rise(const Problem& problem, const Solution& solution, const Uncertainty& error,
+               const data::Scene& scene, double frame_s, data::Fit& fit);
+
 /// Slips of units that a fit would follow without a word.
 void tell_unlikely_body(const data::Scene& scene, data::Fit& fit);
 

@@ -375,6 +375,7 @@ data::Fit OneFit::described(Bars bars) {
   if (bars == Bars::full && upright_) heed_upright_top(problem_, solution_, *upright_, error, fit);
   if (bars == Bars::full) heed_single_samples(problem_, solution_, error, fit);
   heed_doubts(problem_, solution_, scene_, frame_time_s(tracks_), error, fit);
+  if (bars == Bars::full) tell_rise(problem_, solution_, error, scene_, frame_time_s(tracks_), fit);
   tell_idle_priors(problem_, scene_, fit);
   tell_camera(problem_, error, scene_, fit);
   tell_idle_pivot(problem_, scene_, fit);
