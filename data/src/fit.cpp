@@ -16,4 +16,11 @@ const FitParameter* Fit::find(const std::string& name, std::size_t arc) const {
   return own != nullptr ? own : find(name);
 }
 
+const FitParameter* Fit::find_state(const std::string& name, std::size_t arc) const {
+  const FitParameter* found = find(name, arc);
+  const bool of_first =
+      found != nullptr && arc > 0 && found->name == name && found->status != ParameterStatus::fixed;
+  return of_first ? nullptr : found;
+}
+
 }  // namespace trochoid::data

@@ -12,14 +12,10 @@ data::Scene scene_as_fitted(const data::Scene& given) {
 
 namespace {
 
-// What a fit found of a parameter for an arc. A state that it tells of the first arc alone is none
-// of the others', in which it stayed as the scene has it.
 const data::FitParameter* found_for(const data::Fit& fit, const model::ParameterInfo& info,
                                     std::size_t arc) {
-  const data::FitParameter* found = fit.find(info.name, arc);
-  const bool of_first = found != nullptr && arc > 0 && found->name == info.name &&
-                        found->status != data::ParameterStatus::fixed;
-  return of_first && info.role == model::ParameterInfo::Role::initial ? nullptr : found;
+  return info.role == model::ParameterInfo::Role::initial ? fit.find_state(info.name, arc)
+                                                          : fit.find(info.name, arc);
 }
 
 }  // namespace

@@ -170,16 +170,20 @@ TEST(Independent, ABodyThatSlipsForItsFirstSamplesIsNotTakenForOneThatOnlyRolls)
   EXPECT_THAT(fit.verdict_words, testing::HasSubstr("the body may slip before it rolls"));
 }
 
-// The first three of a tracker that had not found its feet: given up they change nothing, and are
-// told of.
+// The first ones of a tracker that had not found its feet: given up they change nothing, and are
+// told of. One alone may as well be of a body that slipped for less than a frame, whose state then
+// was another.
 TEST(Independent, ABodyWhoseFirstPositionsAreClumsyIsFoundAllTheSame) {
-  data::Track track = track_of("unneeded_loss");
-  for (std::size_t i = 0; i < 3; ++i)
-    track.samples[i].centre_m +=
-        12.0 * Eigen::Vector2d(std::sqrt(track.samples[i].covariance_m2(0, 0)), 0.0);
-  const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
-  EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
-  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")));
+  for (const std::size_t clumsy : {1, 3}) {
+    data::Track track = track_of("unneeded_loss");
+    for (std::size_t i = 0; i < clumsy; ++i)
+      track.samples[i].centre_m +=
+          12.0 * Eigen::Vector2d(std::sqrt(track.samples[i].covariance_m2(0, 0)), 0.0);
+    const data::Fit fit = compare(std::span(&track, 1), scene_of("unneeded_loss")).fit;
+    EXPECT_EQ(fit.verdict, data::FitVerdict::good) << fit.verdict_words;
+    EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("as if the tracker had erred")))
+        << clumsy;
+  }
 }
 
 // A quadratic couple of the air, for which no evidence is strong, was not even tried, and the

@@ -167,6 +167,16 @@ TEST(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
   EXPECT_LT(fit.find("air_linear_N_m_s[1]")->sigma, 0.02 * 2.5e-6);
 }
 
+// A group's name fixes those of its coefficients that have none of their own.
+TEST(RimFit, WhatAGroupIsFixedAtIsHeldAgainstTheTrack) {
+  Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  c.scene.fit.fixed = {{"air_linear_N_m_s", 3e-6}, {"air_linear_N_m_s[3]", 1.5e-5}};
+  const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
+  EXPECT_THAT(fit.warnings,
+              testing::Contains(testing::HasSubstr("air_linear_N_m_s[1] = 3e-06 is fixed")));
+}
+
 // How far a value follows what the model takes for given, a fit with another given tells.
 TEST(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   constexpr double kDoubt = 0.005;

@@ -160,6 +160,17 @@ TEST(FittedScene, HasOfALaterArcNoStateThatWasFoundOfTheFirstAlone) {
   EXPECT_EQ(later.model.friction, 0.2);
 }
 
+// Metres that went by the body's radius are as much off as that is.
+TEST(FittedScene, HasABodyAsLargeAsTheFittedScaleMakesIt) {
+  data::Fit fit = fit_of(
+      "[body]\nkind = \"disc\"\nradius_m = 0.03\nmass_kg = 0.05\n[model]\nname = \"rolling\"\n"
+      "[start]\ntheta_rad = 1.2\n[fit]\nprior = { radius_m = [0.03, 0.0003] }\n",
+      {});
+  EXPECT_DOUBLE_EQ(fitted_scene(fit, 0).body->radius_m, 0.03);
+  fit.parameters.push_back({.name = "scale", .value = 1.01, .unit = "1", .note = {}});
+  EXPECT_DOUBLE_EQ(fitted_scene(fit, 0).body->radius_m, 0.03 / 1.01);
+}
+
 TEST(FittedScene, SaysHowManyArcsThereAre) {
   try {
     (void)fitted_scene(data::Fit{}, 0);

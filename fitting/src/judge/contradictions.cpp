@@ -160,10 +160,7 @@ struct Freed {
   int at = 0;  // among the free ones
 };
 
-std::optional<Freed> freed(const Problem& problem, const Eigen::VectorXd& u,
-                           const std::string& name) {
-  const int index = problem.predictor->index_of(name);
-  if (index < 0) return std::nullopt;
+std::optional<Freed> freed(const Problem& problem, const Eigen::VectorXd& u, int index) {
   const bool own = problem.predictor->parameters()[static_cast<std::size_t>(index)].role ==
                    model::ParameterInfo::Role::initial;
   if (own && problem.arcs.size() > 1) return std::nullopt;
@@ -197,9 +194,14 @@ std::optional<Contrast> contrast_of(Freed one, double fixed) {
 void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
                                const data::FitSettings& settings, data::Fit& fit) {
   constexpr double kWorthWords = 3.0, kTooFar = 5.0;
-  for (const auto& [name, value] : settings.fixed) {
-    if (value == 0.0) continue;  // a loss that is left out, a direction that is chosen
-    const auto one = freed(problem, u, name);
+  const auto& parameters = problem.predictor->parameters();
+  for (int index = 0; index < std::ssize(parameters); ++index) {
+    const std::string& name = parameters[static_cast<std::size_t>(index)].name;
+    const double* fixed = said_of(name, settings.fixed);
+    // Zero is a loss that is left out, or a direction that is chosen.
+    if (fixed == nullptr || *fixed == 0.0) continue;
+    const double value = *fixed;
+    const auto one = freed(problem, u, index);
     const auto says = one ? contrast_of(*one, value) : std::nullopt;
     if (!says || !(says->apart > kWorthWords)) continue;
     tell(fmt::format("{} = {:.6g} is fixed, and the track alone says {:.6g} ± {:.2g}, {:.2g} "

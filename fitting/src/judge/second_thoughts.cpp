@@ -110,6 +110,37 @@ std::string which_of_several(const Problem& problem, const ArcData& arc) {
   return words;
 }
 
+// Given up at the beginning of an arc, and nowhere else in it: no chance, even of one. A slip may
+// end within a frame.
+MissedEnd first_alone(const Problem& problem, const Eigen::VectorXd& u) {
+  constexpr double kGivenUp = 0.1;
+  constexpr std::ptrdiff_t kOthers = 50;
+  const auto counts = [](const Counting& position) { return position.weight > kGivenUp; };
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+    const std::vector<Counting> positions = counting(problem, arc, u);
+    const auto kept = std::find_if(positions.begin(), positions.end(), counts);
+    const auto out = static_cast<int>(std::distance(positions.begin(), kept));
+    if (out == 0 || std::distance(kept, positions.end()) < kOthers ||
+        !std::all_of(kept, positions.end(), counts))
+      continue;
+    return {.arc = arc, .standing_out = out, .of = out, .until_s = (kept - 1)->t_s};
+  }
+  return {};
+}
+
+std::string where_it_is(const Problem& problem, const MissedEnd& end) {
+  const std::string of_which = which_of_several(problem, problem.arcs[end.arc]);
+  if (end.of == 1)
+    return fmt::format(
+        "the first position{}, at {:.4g} s, lies farther from its path than noise "
+        "explains",
+        of_which, end.until_s);
+  return fmt::format(
+      "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
+      end.standing_out, end.of, end.beginning ? "first" : "last", of_which,
+      end.beginning ? "up to" : "from", end.until_s);
+}
+
 // Motion that the model lacks where a record begins or ends costs it little: what stands out is
 // given up, and the rest may be explained. A tracker that errs for a few frames does the same, so
 // of few it is told only.
@@ -128,16 +159,14 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
   MissedEnd end = worst_missed_end(problem, u, Glitches::left_out);
   const bool doubtful = too_many(end);
   if (!doubtful) end = worst_missed_end(problem, u, Glitches::counted);
-  if (end.standing_out < kWorthWords) return;
-  const ArcData& arc = problem.arcs[end.arc];
-  const std::string where = fmt::format(
-      "{} of the {} {} positions{}, {} {:.4g} s, lie farther from its path than noise explains",
-      end.standing_out, end.of, end.beginning ? "first" : "last", which_of_several(problem, arc),
-      end.beginning ? "up to" : "from", end.until_s);
+  if (end.standing_out < kWorthWords) end = first_alone(problem, u);
+  if (end.standing_out == 0) return;
+  const std::string where = where_it_is(problem, end);
   const std::string what = what_an_end_may_be(problem, end);
   if (!doubtful) {
-    fit.warnings.push_back(fmt::format(
-        "{}, and count for less, as if the tracker had erred; if it had not, {}", where, what));
+    fit.warnings.push_back(
+        fmt::format("{}, and {} for less, as if the tracker had erred; if it had not, {}", where,
+                    end.standing_out == 1 ? "counts" : "count", what));
     return;
   }
   fit.verdict = FitVerdict::doubtful;

@@ -12,6 +12,7 @@
 #include "observe/timing.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -28,6 +29,15 @@ struct MetresByRadius {
   double measured_m = 0.0;   // the radius times the scale
   double usual_scale = 1.0;  // that of the model's own body
 };
+
+// The body as large as it is by this scale.
+data::Scene resized(const MetresByRadius& metres, double scale) {
+  data::Scene scene = metres.scene;
+  data::Body& body = *scene.body;
+  body.radius_m = metres.measured_m / scale;
+  body.inner_radius_m = std::min(body.inner_radius_m, body.radius_m);
+  return scene;
+}
 
 // One for each row that is a position, else nothing.
 Eigen::VectorXd are_positions(const PredictRequest& request, Eigen::Index rows) {
@@ -93,10 +103,7 @@ class ObservedPredictor : public model::Predictor {
 
 std::unique_ptr<model::Predictor> ObservedPredictor::resized(double scale) const {
   if (!by_radius_ || scale == by_radius_->usual_scale) return nullptr;
-  data::Scene scene = by_radius_->scene;
-  scene.body->radius_m = by_radius_->measured_m / scale;
-  scene.body->inner_radius_m = std::min(scene.body->inner_radius_m, scene.body->radius_m);
-  return model::make_predictor(scene);
+  return model::make_predictor(trochoid::fitting::resized(*by_radius_, scale));
 }
 
 void ObservedPredictor::fill(const Eigen::Ref<const Eigen::VectorXd>& values,
@@ -179,14 +186,12 @@ const data::Prior& positive(const std::string& name, const data::Prior& prior) {
   return prior;
 }
 
-std::optional<MetresByRadius> metres_of(const data::Scene& scene, const std::string& model) {
+std::optional<MetresByRadius> metres_of(const data::Scene& scene) {
   const auto radius = scene.fit.prior.find("radius_m"), scale = scene.fit.prior.find(kScale);
   if (radius == scene.fit.prior.end() || scale == scene.fit.prior.end() || !scene.body ||
       !metres_by_radius(scene))
     return std::nullopt;
-  MetresByRadius metres{scene, radius->second.value * scale->second.value, scale->second.value};
-  metres.scene.model.name = model;
-  return metres;
+  return MetresByRadius{scene, radius->second.value * scale->second.value, scale->second.value};
 }
 
 }  // namespace
@@ -210,6 +215,10 @@ void scale_by_radius(data::Scene& scene) {
                    scene.body->radius_m * sigma_m / (value_m * value_m)};
 }
 
+void resize(data::Scene& scene, double scale) {
+  if (const auto metres = metres_of(scene)) scene = resized(*metres, scale);
+}
+
 std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, data::Scene& scene,
                                            double frame_s) {
   scale_by_radius(scene);
@@ -229,8 +238,10 @@ std::unique_ptr<model::Predictor> observed(const model::Predictor& predictor, da
       scene.fit.free_scale || prior.contains(kScale), prior.contains(kTimeFactor),
       asked_for(kReadout, scene.camera.readout_s), asked_for(kAngleDelay, 0.0)};
   if (!asked.any()) return nullptr;
+  std::optional<MetresByRadius> metres = metres_of(scene);
+  if (metres) metres->scene.model.name = predictor.model_name();
   return std::make_unique<ObservedPredictor>(predictor, asked, scene.camera.readout_s,
-                                             metres_of(scene, predictor.model_name()));
+                                             std::move(metres));
 }
 
 }  // namespace trochoid::fitting

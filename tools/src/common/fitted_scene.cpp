@@ -47,14 +47,11 @@ const std::map<std::string, std::optional<double> ModelSettings::*> kCoefficient
     {"spin_down_imbalance_sin_rad_s2", &ModelSettings::spin_down_imbalance_sin_rad_s2},
     {"spin_down_imbalance_cos_rad_s2", &ModelSettings::spin_down_imbalance_cos_rad_s2}};
 
-/// The fit's value of a parameter in one arc; initial states of later arcs are marked "@arc", and
-/// one that the fit tells of the first arc alone is none of theirs.
+/// The fit's value of a parameter in one arc.
 std::optional<double> value_of(const data::Fit& fit, const std::string& name, std::size_t arc) {
-  const data::FitParameter* found = fit.find(name, arc);
-  if (found == nullptr) return std::nullopt;
-  const bool of_first = arc > 0 && kStart.contains(name) && found->name == name &&
-                        found->status != data::ParameterStatus::fixed;
-  return of_first ? std::nullopt : std::optional(found->value);
+  const data::FitParameter* found =
+      kStart.contains(name) ? fit.find_state(name, arc) : fit.find(name, arc);
+  return found != nullptr ? std::optional(found->value) : std::nullopt;
 }
 
 /// An air couple has one coefficient for both transverse axes and one for the symmetry axis.
@@ -140,6 +137,7 @@ data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   if (const auto slope = value_of(fit, "slope_y", arc)) scene.support.slope_y = slope;
   set_air(fit, "air_linear_N_m_s", arc, scene.model.air_linear_N_m_s);
   set_air(fit, "air_quadratic_N_m_s2", arc, scene.model.air_quadratic_N_m_s2);
+  if (const auto scale = value_of(fit, "scale", arc)) fitting::resize(scene, *scale);
   if (fit.model == "top" || fit.model == "top-euler") set_top(fit, arc, scene);
   scene.run.until_s = time_factor(fit) * (fit.arcs[arc].to_s - arc_start_s(fit, arc));
   return scene;

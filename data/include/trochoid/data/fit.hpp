@@ -177,6 +177,9 @@ struct Fit {
   [[nodiscard]] const FitParameter* find(const std::string& name) const;
   /// The same of an arc: its own ("x_m@1") if it has one, else the one all arcs share.
   [[nodiscard]] const FitParameter* find(const std::string& name, std::size_t arc) const;
+  /// The same of an initial state: one that is told of the first arc alone is no other's, unless it
+  /// is fixed, which it is for all.
+  [[nodiscard]] const FitParameter* find_state(const std::string& name, std::size_t arc) const;
 };
 
 }  // namespace trochoid::data

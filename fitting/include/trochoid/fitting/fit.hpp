@@ -74,6 +74,10 @@ struct FitOptions {
 /// surroundings are given to be (mass_kg, gravity_m_s2, ...).
 [[nodiscard]] data::Scene scene_as_fitted(const data::Scene& scene);
 
+/// Makes the body of a scene_as_fitted() as large as it is by a fitted scale (measured over true
+/// length) where its known radius gave the metres; else it is as large as it was.
+void resize(data::Scene& scene, double scale);
+
 /// What a fit predicts for one of its arcs as the recording shows it: with the scale, the frame
 /// rate and the clocks that were fitted (`scale`, `frame_rate_factor`, `readout_s`,
 /// `angle_delay_s`).
