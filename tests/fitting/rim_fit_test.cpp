@@ -11,6 +11,7 @@
 #include "choose/softness.hpp"
 #include "common.hpp"
 #include "judge/draft.hpp"
+#include "reference_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/reference_case.hpp"
 #include "trochoid/fitting/compare.hpp"
@@ -22,54 +23,6 @@
 namespace trochoid::fitting {
 namespace {
 
-// An independent integrator's motion: the first seconds at the full rate.
-std::string motion_file(const std::string& name) {
-  return std::string(TROCHOID_SOURCE_DIR) + "/tests/fitting/motions/" + name + ".csv";
-}
-
-struct Case {
-  data::Scene scene;
-  data::Track track;
-};
-
-// Columns by name of a reference CSV.
-std::map<std::string, std::vector<double>> columns_of(const std::string& path) {
-  std::ifstream file(path);
-  std::string line, cell;
-  std::getline(file, line);
-  std::vector<std::string> names;
-  for (std::istringstream header(line); std::getline(header, cell, ',');) names.push_back(cell);
-  std::map<std::string, std::vector<double>> columns;
-  while (std::getline(file, line)) {
-    std::istringstream row(line);
-    for (const std::string& name : names) {
-      std::getline(row, cell, ',');
-      columns[name].push_back(std::stod(cell));
-    }
-  }
-  return columns;
-}
-
-// `until_s` keeps the test short; the start and the losses the scene knows are not the truth.
-Case noisy(const std::string& name, double until_s, double sigma_m, std::size_t step = 1,
-           unsigned seed = 7) {
-  const std::string given = std::string(TROCHOID_SOURCE_DIR) + "/data/reference/" + name + ".json";
-  Case made{data::read_reference_case(given).scene, {}};
-  made.scene.start = {};
-  const auto columns = columns_of(motion_file(name));
-  std::mt19937_64 generator(seed);
-  std::normal_distribution<double> normal(0.0, sigma_m);
-  for (std::size_t i = 0; i < columns.at("t").size() && columns.at("t")[i] <= until_s; i += step) {
-    data::TrackSample sample;
-    sample.t_s = columns.at("t")[i];
-    sample.centre_m = {columns.at("x")[i] + normal(generator),
-                       columns.at("y")[i] + normal(generator)};
-    sample.covariance_m2 = Eigen::Matrix2d::Identity() * sigma_m * sigma_m;
-    made.track.samples.push_back(sample);
-  }
-  return made;
-}
-
 // Planted in s08 and s10 alike.
 std::map<std::string, double> losses_of_the_sliding_disc() {
   return {{"air_linear_N_m_s[1]", 1e-6},
@@ -79,7 +32,7 @@ std::map<std::string, double> losses_of_the_sliding_disc() {
 }
 
 TEST(RimFit, FindsARollingDiscFromItsPathAlone) {
-  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const NoisyMotion c = noisy("s06_roll_disc", 2.0, 2e-4);
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
   EXPECT_LT(pull(fit, "theta_rad", 1.2217304763960306), kFar);
@@ -89,8 +42,8 @@ TEST(RimFit, FindsARollingDiscFromItsPathAlone) {
 
 // A tracker's bad day: every fifth sample is wrong (another outline's place, the azimuth a quarter
 // or half a turn off, any tilt), and stretches are missing.
-Case with_faults(const std::string& name, double until_s, std::size_t step) {
-  Case made = noisy(name, until_s, 2e-4, step);
+NoisyMotion with_faults(const std::string& name, double until_s, std::size_t step) {
+  NoisyMotion made = noisy(name, until_s, 2e-4, step);
   const auto columns = columns_of(motion_file(name));
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal;
@@ -119,14 +72,14 @@ Case with_faults(const std::string& name, double until_s, std::size_t step) {
 }
 
 TEST(RimFit, IsNotMisledByEveryFifthSample) {
-  const Case disc = with_faults("s06_roll_disc", 2.0, 4);
+  const NoisyMotion disc = with_faults("s06_roll_disc", 2.0, 4);
   const data::Fit rolling = fitting::fit(std::span(&disc.track, 1), disc.scene);
   ASSERT_TRUE(rolling.converged) << rolling.reason;
   EXPECT_LT(pull(rolling, "theta_rad", 1.2217304763960306), kFar);
   EXPECT_LT(pull(rolling, "w2_rad_s", 22.5526228988618), kFar);
   EXPECT_LT(pull(rolling, "w3_rad_s", 3.0), kFar);
   EXPECT_NEAR(rolling.noise_scale, 1.0, 0.15);
-  const Case ring = with_faults("s09_ring_retrograde_drag", 4.0, 2);
+  const NoisyMotion ring = with_faults("s09_ring_retrograde_drag", 4.0, 2);
   const data::Fit retrograde = fitting::fit(std::span(&ring.track, 1), ring.scene);
   ASSERT_TRUE(retrograde.converged) << retrograde.reason;
   EXPECT_LT(pull(retrograde, "air_linear_N_m_s[1]", 2.5e-6), kFar);
@@ -137,7 +90,7 @@ TEST(RimFit, IsNotMisledByEveryFifthSample) {
 // something else for a while. Nothing else in the track says which they are.
 TEST(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
   for (const int run : {1, 8}) {
-    Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+    NoisyMotion c = noisy("s06_roll_disc", 2.0, 2e-4);
     std::mt19937_64 generator(5);
     std::uniform_real_distribution<double> far_m(5e-3, 50e-3), uniform;
     const double begins = 0.15 / run;
@@ -158,7 +111,7 @@ TEST(RimFit, IsNotMisledByWrongPlacesFromThePathAlone) {
 }
 
 TEST(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
-  Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  NoisyMotion c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(1e-5, 1e-5, 4e-6);  // off by factors of four
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
@@ -169,7 +122,7 @@ TEST(RimFit, FindsTheAirCouplesOfTheRetrogradeRing) {
 
 // A group's name fixes those of its coefficients that have none of their own.
 TEST(RimFit, WhatAGroupIsFixedAtIsHeldAgainstTheTrack) {
-  Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  NoisyMotion c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   c.scene.fit.fixed = {{"air_linear_N_m_s", 3e-6}, {"air_linear_N_m_s[3]", 1.5e-5}};
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful) << fit.verdict_words;
@@ -180,7 +133,7 @@ TEST(RimFit, WhatAGroupIsFixedAtIsHeldAgainstTheTrack) {
 // How far a value follows what the model takes for given, a fit with another given tells.
 TEST(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
   constexpr double kDoubt = 0.005;
-  const Case c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
+  const NoisyMotion c = noisy("s09_ring_retrograde_drag", 3.0, 2e-4);
   const double mass_kg = *c.scene.body->mass_kg;
   data::Scene doubtful = c.scene, heavier = c.scene;
   doubtful.fit.prior["mass_kg"] = {mass_kg, kDoubt * mass_kg};
@@ -204,7 +157,7 @@ TEST(RimFit, WhatIsKnownOfTheBodyByAPriorIsInTheErrorBars) {
 // tell the scale, which is kept at its prior: the error bars must hold what that bends.
 TEST(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
   constexpr double kDoubt = 0.01;
-  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const NoisyMotion c = noisy("s06_roll_disc", 2.0, 2e-4);
   for (const double off : {-kDoubt, kDoubt}) {
     data::Scene doubtful = c.scene;
     const double radius_m = (1.0 + off) * c.scene.body->radius_m;
@@ -225,7 +178,7 @@ TEST(RimFit, WhatIsKnownOfTheScaleByAPriorIsInTheErrorBarsAndNotOverruled) {
 // Metres that went by a radius 2 % too small make a path 2 % too short, of a body that is larger.
 TEST(RimFit, ARadiusThatAPriorCorrectsIsThatOfTheBodyAndOfThePath) {
   constexpr double kTooSmall = 0.98;
-  Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 2.0, 2e-4);
   const double radius_m = c.scene.body->radius_m;
   c.scene.fit.prior["radius_m"] = {radius_m, 0.001 * radius_m};
   c.scene.body->radius_m *= kTooSmall;
@@ -240,7 +193,7 @@ TEST(RimFit, ARadiusThatAPriorCorrectsIsThatOfTheBodyAndOfThePath) {
 // What is not known of the scale and of gravity are two things: their variances add up, and the
 // scale, which is kept, is known as well as before.
 TEST(RimFit, TheErrorsOfTwoPriorsAddUp) {
-  const Case c = noisy("s06_roll_disc", 2.0, 2e-4);
+  const NoisyMotion c = noisy("s06_roll_disc", 2.0, 2e-4);
   const double radius_m = c.scene.body->radius_m;
   const auto fitted = [&](bool scale, bool gravity) {
     data::Scene scene = c.scene;
@@ -261,7 +214,7 @@ TEST(RimFit, TheErrorsOfTwoPriorsAddUp) {
 }
 
 TEST(RimFit, NothingButAKeptScaleCanBeFree) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
   for (const data::FitParameter& p : free.parameters)
     if (p.status == data::ParameterStatus::free) c.scene.fit.fixed[p.name] = p.value;
@@ -273,7 +226,7 @@ TEST(RimFit, NothingButAKeptScaleCanBeFree) {
 
 // A disc cannot have more of one moment than twice the other, which no prior knows.
 TEST(RimFit, WhatNoBodyCanBeIsNoDoubt) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   const double mass_kg = *c.scene.body->mass_kg, R = c.scene.body->radius_m;
   const double most = 0.5 * mass_kg * R * R;  // of a disc without thickness
   c.scene.fit.prior["Is_kg_m2"] = {most, 0.01 * most};
@@ -285,7 +238,7 @@ TEST(RimFit, WhatNoBodyCanBeIsNoDoubt) {
 
 // Whoever predicts from the fit alone has to know of it.
 TEST(RimFit, KeepsWhatIsFixedOfTheStart) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   const data::Fit free = fitting::fit(std::span(&c.track, 1), c.scene);
   c.scene.fit.fixed["w3_rad_s"] = free.find("w3_rad_s")->value;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -299,7 +252,7 @@ TEST(RimFit, KeepsWhatIsFixedOfTheStart) {
 TEST(RimFit, WhatMeansNothingToTheModelIsSaidToMeanNothing) {
   using testing::Contains;
   using testing::HasSubstr;
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   const auto idle = HasSubstr("counts for nothing");
   EXPECT_THAT(fitting::fit(std::span(&c.track, 1), c.scene).warnings, Not(Contains(idle)));
   c.scene.fit.prior["mass_gk"] = {0.05, 0.001};
@@ -319,7 +272,7 @@ std::string all_warnings(const data::Fit& fit) {
 }
 
 TEST(RimFit, APriorOnATermIsOneOnEachOfItsCoefficients) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(2e-6, 2e-6, 2e-6);
   c.scene.fit.prior["air_linear_N_m_s"] = {2e-6, 1e-8};
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -331,14 +284,14 @@ TEST(RimFit, APriorOnATermIsOneOnEachOfItsCoefficients) {
 }
 
 TEST(RimFit, WhatStandsAtItsBoundIsSaidTo) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   c.scene.fit.bounds["theta_rad"] = {1.26, 1.5};  // it is 1.222
   EXPECT_THAT(all_warnings(fitting::fit(std::span(&c.track, 1), c.scene)),
               testing::HasSubstr("theta_rad stands at the lower bound, 1.26"));
 }
 
 TEST(RimFit, WhatIsHeldIsToldWhereNothingFits) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   c.scene.fit.bounds["theta_rad"] = {0.1, 0.3};
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   EXPECT_NE(fit.verdict, data::FitVerdict::good);
@@ -346,7 +299,7 @@ TEST(RimFit, WhatIsHeldIsToldWhereNothingFits) {
 }
 
 TEST(RimFit, APriorOnWhatCannotBeIsRefused) {
-  Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   c.scene.model.rolling_friction_m = 1e-5;
   c.scene.fit.prior["rolling_friction_m"] = {-1e-4, 1e-6};
   EXPECT_THROW((void)fitting::fit(std::span(&c.track, 1), c.scene), InputError);
@@ -356,7 +309,7 @@ TEST(RimFit, APriorOnWhatCannotBeIsRefused) {
 }
 
 TEST(RimFit, FindsTheFrictionOfASlidingDisc) {
-  Case c = noisy("s08_slide_disc", 0.6, 1e-4);
+  NoisyMotion c = noisy("s08_slide_disc", 0.6, 1e-4);
   c.scene.model.name = "sliding";
   c.scene.model.friction.reset();  // 0.3 in truth; no first value is needed
   c.scene.fit.fixed = losses_of_the_sliding_disc();
@@ -369,7 +322,7 @@ TEST(RimFit, FindsTheFrictionOfASlidingDisc) {
 // Two turns of the node line in a dozen samples: starts have to be found on windows shorter than
 // what the quick search looks at.
 TEST(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
-  Case c = noisy("s09_ring_retrograde_drag", 9.0, 1e-4, 2);
+  NoisyMotion c = noisy("s09_ring_retrograde_drag", 9.0, 1e-4, 2);
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(7.5e-6, 7.5e-6, 4.5e-5);
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   ASSERT_TRUE(fit.converged) << fit.reason;
@@ -380,7 +333,7 @@ TEST(RimFit, FindsTheWholeRetrogradeTurnFromSixtyFramesASecond) {
 // No plain model predicts such a track to its end, and none with a single loss.
 TEST(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
   constexpr double kAngle_rad = 0.005;
-  Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
+  NoisyMotion c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
   const auto columns = columns_of(motion_file("s08_slide_disc"));
   std::mt19937_64 generator(8);
   std::normal_distribution<double> normal(0.0, kAngle_rad);
@@ -405,7 +358,7 @@ TEST(RimFit, FindsThatADiscSlidesAndLosesWithoutBeingTold) {
 
 // Over 1e-3 m/s in truth, given as a third of that.
 TEST(RimFit, FindsHowFrictionSetsIn) {
-  Case c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
+  NoisyMotion c = noisy("s08_slide_disc", 1.0, 1e-4, 2);
   c.scene.model.slip_regularisation_m_s = 3e-4;
   c.scene.fit.free = {"slip_regularisation_m_s"};
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -417,7 +370,7 @@ TEST(RimFit, FindsHowFrictionSetsIn) {
 
 // With friction that sets in and stops, neighbouring valleys leave several times the noise.
 TEST(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
-  Case c = noisy("s08_slide_disc", 2.0, 1e-4, 4);
+  NoisyMotion c = noisy("s08_slide_disc", 2.0, 1e-4, 4);
   c.scene.model.friction = 0.2;  // 0.3 in truth; the losses are three times theirs
   c.scene.model.air_linear_N_m_s = Eigen::Vector3d(3e-6, 3e-6, 6e-7);
   c.scene.model.rolling_friction_m = 1.5e-4;
@@ -431,7 +384,7 @@ TEST(RimFit, FindsStickAndSlipFromSixtyFramesASecond) {
 
 // The exact law: spells of sticking come and go, and derivatives hold across them.
 TEST(RimFit, FindsStickAndSlipOfTheExactLaw) {
-  Case c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
+  NoisyMotion c = noisy("s10_stick_slip_event", 0.8, 1e-4, 2);
   c.scene.model.friction = 0.2;  // 0.3 in truth
   c.scene.fit.fixed = losses_of_the_sliding_disc();
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -444,7 +397,7 @@ TEST(RimFit, FindsStickAndSlipOfTheExactLaw) {
 }
 
 // The sliding disc of s10 under a law that nobody named, from a start near the truth.
-Rung softly_from_near(Case c) {
+Rung softly_from_near(NoisyMotion c) {
   c.scene.fit.fixed = losses_of_the_sliding_disc();
   Rung rung;
   rung.scene = c.scene;
@@ -649,7 +602,8 @@ TEST_F(SlidingRimFit, ThatErrorBarIsLookedForOnce) {
 }
 
 TEST(RimFit, WarnsOfATrackShorterThanANutation) {
-  const Case brief = noisy("s06_roll_disc", 0.12, 2e-4), whole = noisy("s06_roll_disc", 1.0, 2e-4);
+  const NoisyMotion brief = noisy("s06_roll_disc", 0.12, 2e-4),
+                    whole = noisy("s06_roll_disc", 1.0, 2e-4);
   const auto warned = testing::Contains(testing::HasSubstr("turns of the node line"));
   EXPECT_THAT(fitting::fit(std::span(&brief.track, 1), brief.scene).warnings, warned);
   EXPECT_THAT(fitting::fit(std::span(&whole.track, 1), whole.scene).warnings, testing::Not(warned));
@@ -657,14 +611,14 @@ TEST(RimFit, WarnsOfATrackShorterThanANutation) {
 
 // 1.08 turns; at the rate of its first frame it would be 0.91.
 TEST(RimFit, CountsTheTurnsOfABodyThatBeginsSlowly) {
-  const Case c = noisy("s06_roll_disc", 0.24, 2e-5);
+  const NoisyMotion c = noisy("s06_roll_disc", 0.24, 2e-5);
   EXPECT_THAT(fitting::fit(std::span(&c.track, 1), c.scene).warnings,
               testing::Not(testing::Contains(testing::HasSubstr("turns of the node line"))));
 }
 
 // (theta, phi) and (pi - theta, phi + pi) are one attitude of a plain disc.
 TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
-  const Case c = noisy("s06_roll_disc", 1.0, 2e-4);
+  const NoisyMotion c = noisy("s06_roll_disc", 1.0, 2e-4);
   FitOptions options;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
   options.strategy = Strategy::single;
@@ -680,11 +634,11 @@ TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
 
   // By what is known beforehand of the spin the body is called by its other face.
   const double w3 = -fit.find("w3_rad_s")->value, sigma = fit.find("w3_rad_s")->sigma;
-  Case known = c;
+  NoisyMotion known = c;
   known.scene.fit.prior["w3_rad_s"] = {w3, sigma};
-  Case given = c;
+  NoisyMotion given = c;
   given.scene.fit.fixed["w3_rad_s"] = w3;
-  for (const Case& spoken : {known, given}) {
+  for (const NoisyMotion& spoken : {known, given}) {
     const data::Fit kept = fitting::fit(std::span(&spoken.track, 1), spoken.scene, options);
     ASSERT_TRUE(kept.converged) << kept.reason;
     EXPECT_NEAR(kept.find("w3_rad_s")->value, w3, sigma);
@@ -693,7 +647,7 @@ TEST(RimFit, NamesAnAttitudeByItsLesserTilt) {
 }
 
 TEST(RimFit, BoundsALossThatIsNotThere) {
-  Case c = noisy("s06_roll_disc", 1.5, 2e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.5, 2e-4);
   c.scene.model.pivoting_friction_m = 1e-4;
   c.scene.model.couple_regularisation_rad_s = 0.01;
   const data::Fit fit = fitting::fit(std::span(&c.track, 1), c.scene);
@@ -705,7 +659,7 @@ TEST(RimFit, BoundsALossThatIsNotThere) {
 }
 
 TEST(RimFit, LeavesMirroredFramesAside) {
-  Case c = noisy("s06_roll_disc", 1.5, 1e-4);
+  NoisyMotion c = noisy("s06_roll_disc", 1.5, 1e-4);
   const auto columns = columns_of(motion_file("s06_roll_disc"));
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal(0.0, 0.01);

@@ -17,6 +17,7 @@
 #include "judge/describe.hpp"
 #include "judge/draft.hpp"
 #include "judge/first_guess.hpp"
+#include "judge/lost_pictures.hpp"
 #include "judge/profile.hpp"
 #include "judge/second_thoughts.hpp"
 #include "judge/statistics.hpp"
@@ -315,6 +316,7 @@ void OneFit::find(const std::vector<Relative>& relatives, FirstPart* first_part)
     tell_idle_priors(problem_, scene_, fit_);
     tell_unlikely_body(scene_, fit_);
     tell_held(scene_, fit_);
+    tell_steps_of_path(problem_, fit_);
   };
   stages_.enter("looking for the path");
   if (first_part != nullptr && problem_.arcs.size() == 1)
@@ -391,6 +393,7 @@ data::Fit OneFit::described(Bars bars) {
   judge(problem_, solution_, error, cut_short_, fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);
+  if (fit.verdict == data::FitVerdict::unexplained) tell_steps_of_path(problem_, fit);
   if (purpose_ == Purpose::answer) doubt_as_a_whole(problem_, solution_.u, error, scene_.fit, fit);
   if (fit.model == "pivot" && leaves_pivot(tracks_, scene_, options_)) {
     fit.converged = false;

@@ -13,21 +13,6 @@ struct Sample {
   double leverage = 0.0;
 };
 
-// An orthonormal basis of what the parameters can do to the residuals: rows of all arcs, then of
-// the priors.
-Eigen::MatrixXd reachable(const Problem& problem, const Eigen::VectorXd& u) {
-  constexpr double kSeen = 1e-9;  // below that the derivatives are rounding
-  const Eigen::MatrixXd jacobian = linearise(problem, u).jacobian;
-  const Eigen::VectorXd sizes = jacobian.colwise().norm().cwiseMax(1e-300);
-  const Eigen::Index rank = std::min(jacobian.rows(), jacobian.cols());
-  const Reflections reflections(jacobian * sizes.cwiseInverse().asDiagonal());
-  const Axes axes = left_singular(reflections.triangle());
-  const auto seen = (axes.values.array() > kSeen * axes.values[0]).count();
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(jacobian.rows(), seen);
-  basis.topRows(rank) = axes.directions.leftCols(seen);
-  return reflections.turned(basis);
-}
-
 // The share a sample with these readings has in the direction of the parameters it says most of: 1
 // where it alone does; 0 where all directions together leave it no more than `least`.
 double leverage_of(const std::vector<const Reading*>& readings, const Eigen::MatrixXd& rows,
@@ -49,7 +34,7 @@ double leverage_of(const std::vector<const Reading*>& readings, const Eigen::Mat
 std::vector<Sample> carrying_most(const Problem& problem, const Eigen::VectorXd& u) {
   constexpr double kMostOfIt = 0.8;
   constexpr std::size_t kFew = 3;
-  const Eigen::MatrixXd basis = reachable(problem, u);
+  const Eigen::MatrixXd basis = reachable(linearise(problem, u));
   std::vector<Sample> samples;
   int row = 0;
   for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {

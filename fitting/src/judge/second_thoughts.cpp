@@ -10,6 +10,7 @@
 #include "judge/adequacy.hpp"
 #include "judge/contradictions.hpp"
 #include "judge/counting.hpp"
+#include "judge/lost_pictures.hpp"
 #include "judge/one_friction.hpp"
 
 namespace trochoid::fitting {
@@ -180,6 +181,7 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
 
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       const data::FitSettings& settings, data::Fit& fit) {
+  doubt_if_pictures_are_lost(problem, u, error, fit);
   // A body that slips at first makes the halves differ, too: that it slips says more.
   doubt_if_an_end_is_missed(problem, u, error, fit);
   doubt_if_drifting(problem, error, fit);

@@ -96,4 +96,17 @@ bool all_residuals(const Problem& problem, const Eigen::VectorXd& u, Eigen::Vect
   return true;
 }
 
+Eigen::MatrixXd reachable(const Linearised& all) {
+  constexpr double kSeen = 1e-9;  // below that the derivatives are rounding
+  const Eigen::MatrixXd& jacobian = all.jacobian;
+  const Eigen::VectorXd sizes = jacobian.colwise().norm().cwiseMax(1e-300);
+  const Eigen::Index rank = std::min(jacobian.rows(), jacobian.cols());
+  const Reflections reflections(jacobian * sizes.cwiseInverse().asDiagonal());
+  const Axes axes = left_singular(reflections.triangle());
+  const auto seen = (axes.values.array() > kSeen * axes.values[0]).count();
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(jacobian.rows(), seen);
+  basis.topRows(rank) = axes.directions.leftCols(seen);
+  return reflections.turned(basis);
+}
+
 }  // namespace trochoid::fitting

@@ -20,6 +20,9 @@ struct Linearised {
 /// @throws NumericalError where the model has no prediction.
 [[nodiscard]] Linearised linearise(const Problem& problem, const Eigen::VectorXd& u);
 
+/// An orthonormal basis of what the parameters can do to the residuals: as many rows.
+[[nodiscard]] Eigen::MatrixXd reachable(const Linearised& all);
+
 /// Residuals of all arcs, without priors; false where the model has no prediction.
 [[nodiscard]] bool all_residuals(const Problem& problem, const Eigen::VectorXd& u,
                                  Eigen::VectorXd& residuals);
