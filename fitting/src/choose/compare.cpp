@@ -147,7 +147,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   const Rung* chosen = exchange_while_worth(contest, rungs);
   if (chosen != nullptr && slope_instead(contest, *chosen, rungs))
     chosen = exchange_while_worth(contest, rungs);
-  if (chosen != nullptr && creep_instead(contest, *chosen, rungs))
+  if (chosen != nullptr &&
+      (creep_instead(contest, *chosen, rungs) || soften_instead(contest, *chosen, rungs)))
     chosen = exchange_while_worth(contest, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};

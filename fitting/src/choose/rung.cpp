@@ -382,6 +382,18 @@ void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
   });
 }
 
+void fit_softly_beside(std::span<const data::Track> tracks, const Rung& known,
+                       const FitOptions& options, Rung& rung) {
+  FitOptions own = options;
+  start_from_other_model(values_of(known.fit), own);
+  own.strategy = Strategy::single;
+  own.rolls_at_first = rung.rolls_at_first = known.rolls_at_first;
+  try_rung(rung, [&] {
+    fit_softly(tracks, own, rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,
                      Rung& rung) {

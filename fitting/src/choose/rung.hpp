@@ -154,6 +154,11 @@ void fit_from_first_part(std::span<const data::Track> tracks, const FirstPart& f
 void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
                   const FitOptions& options, Rung& rung);
 
+/// Fits a rung with the losses of a known one that slides, whose friction may set in gently, from
+/// that one's motion.
+void fit_softly_beside(std::span<const data::Track> tracks, const Rung& known,
+                       const FitOptions& options, Rung& rung);
+
 /// Fits a rung from near its solution.
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,

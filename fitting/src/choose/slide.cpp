@@ -116,9 +116,9 @@ double misfit(const Rung& rung) {
   return rung.fit.bic - rung.parameters * std::log(rung.fit.dof + rung.parameters);
 }
 
-bool speaks_for_creep(const Contest& contest, const Rung& creeps, const Rung& chosen) {
-  return creeps.fitted && creeps.fit.converged && !softness_is_open(creeps) &&
-         misfit(chosen) - misfit(creeps) >
+bool speaks_for_softness(const Contest& contest, const Rung& soft, const Rung& chosen) {
+  return soft.fitted && soft.fit.converged && !softness_is_open(soft) &&
+         misfit(chosen) - misfit(soft) >
              kVeryStrong * variance_inflation(contest.tracks, chosen, contest.options);
 }
 
@@ -142,7 +142,7 @@ bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
     const Rung& found = add_searched(contest, terms, searched);
     if (found.fitted && !(creeps.fitted && misfit(creeps) < misfit(found))) creeps = found;
   }
-  const bool better = speaks_for_creep(contest, creeps, chosen);
+  const bool better = speaks_for_softness(contest, creeps, chosen);
   if (!better && creeps.reason.empty())
     creeps.reason = "it explains no more than what residuals that hang together may hide";
   if (before == nullptr)
@@ -151,6 +151,17 @@ bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
     *before = std::move(creeps);
   if (better) step_down(contest, *known_rung(rungs, terms), rungs);
   return better;
+}
+
+bool soften_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
+  if (!softness_is_open(chosen) || chosen.fit.whiteness_p >= kWhite) return false;
+  Rung soft = rung_with(contest.ladder, chosen.terms);
+  fit_softly_beside(contest.tracks, chosen, options_for(soft, contest.options), soft);
+  if (!speaks_for_softness(contest, soft, chosen)) return false;
+  Rung& own = *known_rung(rungs, chosen.terms);
+  own = std::move(soft);
+  step_down(contest, own, rungs);
+  return true;
 }
 
 }  // namespace trochoid::fitting

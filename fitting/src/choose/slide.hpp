@@ -18,4 +18,10 @@ bool slide_after_rolling(const Contest& contest, const Rung& known, Rungs& rungs
 /// @returns whether rungs were added against which the chosen one has to stand.
 bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
 
+/// Of a body that slides from the beginning the gentle law's own search may lead nowhere with the
+/// losses it begins with, and every later rung goes on by Coulomb's law: tried from a chosen one
+/// that does, and leaves residuals which hang together. It takes the evidence that creep does.
+/// @returns whether the chosen rung's friction sets in gently now.
+bool soften_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
+
 }  // namespace trochoid::fitting
