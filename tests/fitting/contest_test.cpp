@@ -10,6 +10,7 @@
 #include "choose/leave_out.hpp"
 #include "choose/slide.hpp"
 #include "choose/terms.hpp"
+#include "reference_motion.hpp"
 #include "trochoid/data/io.hpp"
 
 namespace trochoid::fitting {
@@ -178,6 +179,41 @@ TEST_F(Contested, AScoreTestTakesNoPlaceOfARungThatWasFitted) {
   add_score_tested(tested, rungs);
   ASSERT_EQ(rungs.size(), 1u);
   EXPECT_FALSE(rungs[0].by_score_test);
+}
+
+// A disc that slides as friction lets it which rises over 1 mm/s. Where all rungs had gone on by
+// Coulomb's law it stayed so, and losses stood for what that speed does.
+TEST(SlidingContest, AChosenRungWhoseResidualsHangTogetherIsAskedWhetherFrictionSetsInGently) {
+  constexpr double kSharp_m = 4e-5, kSlip_m_s = 1e-3;
+  NoisyMotion motion = noisy("s08_slide_disc", 1.0, kSharp_m, 2);
+  data::ModelSettings nothing;
+  nothing.couple_regularisation_rad_s = motion.scene.model.couple_regularisation_rad_s;
+  motion.scene.model = nothing;
+  const Ladder ladder = ladder_of(motion.scene, false);
+  const Contest contest{ladder, std::span(&motion.track, 1), {}};
+  Rungs rungs{rung_with(ladder, all_that_usually_acts(ladder, {}))};
+  fit_from_values(contest.tracks,
+                  {{"theta_rad", 0.96},
+                   {"phi_rad", 0.0},
+                   {"w1_rad_s", 0.0},
+                   {"w2_rad_s", 19.66},
+                   {"w3_rad_s", -0.34},
+                   {"x_m", 0.0},
+                   {"y_m", 0.0},
+                   {"vx_m_s", 0.2},
+                   {"vy_m_s", 0.05},
+                   {"rolling_friction_m", 5e-5},
+                   {"pivoting_friction_m", 3e-4},
+                   {"friction", 0.3}},
+                  {}, rungs[0]);
+  ASSERT_TRUE(rungs[0].fit.converged) << rungs[0].fit.reason;
+  ASSERT_EQ(rungs[0].fit.find("slip_regularisation_m_s"), nullptr);
+  EXPECT_TRUE(soften_instead(contest, rungs[0], rungs));
+  const data::FitParameter* gentle = rungs[0].fit.find("slip_regularisation_m_s");
+  ASSERT_NE(gentle, nullptr);
+  EXPECT_NEAR(gentle->value, kSlip_m_s, 4.0 * gentle->sigma);
+  EXPECT_LT(gentle->sigma, 0.2 * kSlip_m_s);
+  EXPECT_FALSE(soften_instead(contest, rungs[0], rungs)) << "it does already";
 }
 
 }  // namespace
