@@ -382,6 +382,23 @@ TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
               testing::HasSubstr("track 2 is the same as track 1; a recording counts once"));
 }
 
+// The second was let go at another angle, which a prior for all of them would have denied.
+TEST(SeveralRecordings, HavePriorsOfTheirOwn) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::Fit plain = fit(tracks, scene);
+  const data::FitParameter second = *plain.find("theta_rad@1");
+  scene.fit.prior["theta_rad@1"] = {second.value, 0.1 * second.sigma};
+  const data::Fit told = fit(tracks, scene);
+  EXPECT_LT(told.find("theta_rad@1")->sigma, 0.11 * second.sigma);
+  EXPECT_GT(told.find("theta_rad")->sigma, 0.3 * plain.find("theta_rad")->sigma);
+  EXPECT_THAT(told.warnings, testing::Not(testing::Contains(testing::HasSubstr("[fit] prior"))));
+  scene.fit.prior = {{"theta_rad@2", {second.value, 0.1}}};
+  EXPECT_THAT(fit(tracks, scene).warnings,
+              testing::Contains(testing::HasSubstr("'theta_rad@2', the prior counts for nothing")));
+}
+
 TEST(GivenUp, MeasurementsAreTold) {
   data::Track track = thesis_track(25.0, 1e-3, 11);
   for (const std::size_t i : {40U, 120U, 121U}) track.samples[i].centre_m.y() += 0.05;

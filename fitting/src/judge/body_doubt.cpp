@@ -1,5 +1,7 @@
 #include "judge/body_doubt.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -208,13 +210,21 @@ double friction_of_rise(const Problem& problem, const Eigen::VectorXd& u, const 
 std::vector<std::string> idle_priors(const Problem& problem, const data::Scene& scene) {
   std::vector<std::string> idle;
   const auto& infos = problem.predictor->parameters();
+  const auto arcs = static_cast<int>(problem.arcs.size());
+  const auto of_one_arc = [&](const std::string& name, const model::ParameterInfo& info) {
+    for (int arc = 0; arc < arcs; ++arc)
+      if (name == fmt::format("{}@{}", info.name, arc))
+        return info.role == model::ParameterInfo::Role::initial;
+    return false;
+  };
   for (const auto& [name, prior] : scene.fit.prior) {
     const bool of_body =
         std::any_of(body_quantities().begin(), body_quantities().end(),
                     [&name = name](const BodyQuantity& given) { return name == given.name; });
-    const bool of_model = std::any_of(infos.begin(), infos.end(), [&name = name](const auto& info) {
-      return means(name, info.name);
-    });
+    const bool of_model =
+        std::any_of(infos.begin(), infos.end(), [&, &name = name](const auto& info) {
+          return means(name, info.name) || of_one_arc(name, info);
+        });
     if (!of_body && !of_model && name != "frame_rate_hz") idle.push_back(name);
   }
   return idle;

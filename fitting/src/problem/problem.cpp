@@ -393,6 +393,9 @@ FreeParameter free_parameter(const model::Predictor& predictor, const data::FitS
   parameter.given = value;
   parameter.turns = info.name == "phi_rad" || info.name == "psi_rad";
   if (const auto* prior = said_of(info.name, settings.prior)) parameter.prior = *prior;
+  if (const auto own = settings.prior.find(fmt::format("{}@{}", info.name, arc));
+      own != settings.prior.end())
+    parameter.prior = own->second;
   return parameter;
 }
 
