@@ -17,7 +17,7 @@
 #include "judge/describe.hpp"
 #include "judge/draft.hpp"
 #include "judge/first_guess.hpp"
-#include "judge/lost_pictures.hpp"
+#include "judge/path_steps.hpp"
 #include "judge/profile.hpp"
 #include "judge/second_thoughts.hpp"
 #include "judge/statistics.hpp"

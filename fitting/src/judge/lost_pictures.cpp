@@ -7,15 +7,14 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 
 #include "judge/adequacy.hpp"
 #include "judge/counting.hpp"
+#include "judge/path_steps.hpp"
 #include "observe/decompositions.hpp"
 #include "problem/linearise.hpp"
-#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -34,12 +33,6 @@ struct ArcPlaces {
   double frame_s = 0.0;
   std::vector<Place> places;  // in the order of time
 };
-
-double usual_step_s(const ArcData& arc) {
-  std::vector<double> steps_s;
-  for (std::size_t i = 1; i < arc.t_s.size(); ++i) steps_s.push_back(arc.t_s[i] - arc.t_s[i - 1]);
-  return data::median(std::move(steps_s));
-}
 
 // By the differences of neighbouring predictions. Positions that lie on no path with the others
 // say nothing.
@@ -142,8 +135,8 @@ std::pair<Eigen::VectorXd, Eigen::MatrixXd> Remainder::frames() const {
 
 // The steps one after the other, and each once more beside the later ones, while any moves.
 std::vector<Step> steps_of(const Remainder& plain, const std::vector<ArcPlaces>& arcs) {
-  constexpr std::size_t kMost = 12;
-  constexpr int kMostRounds = 6;
+  constexpr std::size_t kMost = 8;
+  constexpr int kMostRounds = 3;
   std::vector<Step> steps;
   const auto with_all_but = [&](std::size_t left_out) {
     Remainder remainder = plain;
@@ -171,13 +164,7 @@ std::vector<Step> steps_of(const Remainder& plain, const std::vector<ArcPlaces>&
   return steps;
 }
 
-// A step as it comes out of the residuals.
-struct Jump {
-  int arc = 0, sample = 0;
-  double frames = 0.0, sigma = 0.0;  // by how many too early from there on
-};
-
-std::vector<Jump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
+std::vector<TimeJump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
   constexpr std::size_t kLeastPlaces = 40;
   const Problem plain = in_stated_sigmas(problem, Weights::dropped);
   const Linearised all = linearise(plain, u);
@@ -196,7 +183,7 @@ std::vector<Jump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
   if (steps.empty()) return {};
   for (const Step& step : steps) remainder.add(arcs, step);
   const auto [frames, covariance] = remainder.frames();
-  std::vector<Jump> jumps;
+  std::vector<TimeJump> jumps;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const ArcPlaces& arc = arcs[steps[i].arc];
     const auto k = static_cast<Eigen::Index>(i);
@@ -204,12 +191,6 @@ std::vector<Jump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
         {arc.arc, arc.places[steps[i].from].sample, frames[k], std::sqrt(covariance(k, k))});
   }
   return jumps;
-}
-
-bool is_whole(const Jump& jump) {
-  constexpr double kNear = 0.35, kTold = 0.15;
-  const double whole = std::round(jump.frames);
-  return whole != 0.0 && std::abs(jump.frames - whole) < kNear && jump.sigma < kTold;
 }
 
 // By arc and sample, how many frames are missing just before it.
@@ -240,10 +221,10 @@ LostPictures lost_pictures(const Problem& problem, const Eigen::VectorXd& u) {
   Missing missing;
   Problem right = problem;
   Eigen::VectorXd there = u;
-  std::vector<Jump> jumps = jumps_of(right, there);
+  std::vector<TimeJump> jumps = jumps_of(right, there);
   for (int round = 0; round < kMostRounds && !jumps.empty(); ++round) {
     const std::size_t before = missing.size();
-    for (const Jump& jump : jumps)
+    for (const TimeJump& jump : jumps)
       if (is_whole(jump))
         missing[{jump.arc, jump.sample}] += static_cast<int>(std::round(jump.frames));
     if (missing.size() == before) return {};
@@ -274,7 +255,7 @@ std::string words(const LostPictures& lost) {
                                std::abs(step.frames) == 1 ? "" : "s",
                                step.frames > 0 ? "early" : "late", step.t_s));
   return fmt::format(
-      "its times are {}: pictures were dropped, or written twice, and the times do not show it; "
+      "times are {}: pictures were dropped, or written twice, and the times do not show it; "
       "put right they leave residuals of {:.2g} times the stated noise",
       fmt::join(told, ", "), lost.noise_scale);
 }
@@ -290,106 +271,11 @@ void doubt_if_pictures_are_lost(const Problem& problem, const Eigen::VectorXd& u
     tell_steps_of_path(problem, fit);
   if (lost.steps.empty()) return;
   if (!says_explained(fit)) {
-    fit.warnings.push_back("the track would be explained if " + words(lost));
+    fit.warnings.push_back(words(lost));
     return;
   }
   fit.verdict = data::FitVerdict::doubtful;
   fit.verdict_words = "the model follows the track, but does not explain it: " + words(lost);
-}
-
-namespace {
-
-constexpr int kBeside = 10;  // samples before a step, and from it on
-constexpr int kOrder = 6;    // coefficients of a quintic
-
-// 1, t, t^2, ...
-Eigen::RowVectorXd powers(double t) {
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Ones(kOrder);
-  for (int k = 1; k < kOrder; ++k) row[k] = t * row[k - 1];
-  return row;
-}
-
-// Their derivatives.
-Eigen::RowVectorXd slopes(double t) {
-  const Eigen::RowVectorXd power = powers(t);
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(kOrder);
-  for (int k = 1; k < kOrder; ++k) row[k] = k * power[k - 1];
-  return row;
-}
-
-// A quintic in time through the positions about a sample, of which those from it on may be of other
-// times: Gauss-Newton for its coefficients and the frames between, from none.
-std::optional<Jump> step_of_path(const ArcData& arc, const Eigen::MatrixX2d& at_m, double frame_s,
-                                 int sample) {
-  constexpr int kRounds = 6, kUnknowns = 2 * kOrder + 1;
-  constexpr double kRank = 1e-12;
-  Jump jump{.sample = sample};
-  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(4 * kBeside, kUnknowns);
-  Eigen::VectorXd b(a.rows()), unknowns = Eigen::VectorXd::Zero(kUnknowns);
-  for (int round = 0; round < kRounds; ++round) {
-    for (int i = -kBeside; i < kBeside; ++i) {
-      const double tau = (arc.t_s[sample + i] - arc.t_s[sample]) / frame_s;
-      const double t = (tau + (i >= 0 ? jump.frames : 0.0)) / kBeside;
-      for (int axis = 0; axis < 2; ++axis) {
-        const int row = 2 * (i + kBeside) + axis;
-        a.row(row).segment<kOrder>(kOrder * axis) = powers(t);
-        a(row, kUnknowns - 1) =
-            i >= 0 ? slopes(t).dot(unknowns.segment<kOrder>(kOrder * axis)) / kBeside : 0.0;
-        b[row] = at_m(sample + i, axis);
-      }
-    }
-    const bool standing = round == 0;  // nothing is known of the velocity yet
-    const auto columns = standing ? kUnknowns - 1 : kUnknowns;
-    const LeastSquares least(a.leftCols(columns));
-    if (least.rank(kRank) < columns) return std::nullopt;
-    unknowns.head(columns) = least.solve(b);
-    if (!standing) jump.frames += unknowns[kUnknowns - 1];
-    if (!(std::abs(jump.frames) < kBeside)) return std::nullopt;
-  }
-  const double variance =
-      (b - a * unknowns).squaredNorm() / static_cast<double>(a.rows() - kUnknowns);
-  const Eigen::VectorXd last = Eigen::VectorXd::Unit(kUnknowns, kUnknowns - 1);
-  const Eigen::MatrixXd normal = a.transpose() * a;
-  jump.sigma = std::sqrt(variance * SymmetricEquations(normal).solve(last)[kUnknowns - 1]);
-  return jump;
-}
-
-// Those that stand out among the ones beside them.
-std::vector<Jump> steps_of_path(const ArcData& arc) {
-  constexpr double kStandsOut = 6.0;
-  const Eigen::MatrixX2d at_m = arc.positions_m();
-  const double frame_s = usual_step_s(arc);
-  const auto count = static_cast<int>(arc.t_s.size());
-  std::vector<Jump> found;
-  for (int sample = kBeside; sample + kBeside <= count; ++sample) {
-    const auto jump = step_of_path(arc, at_m, frame_s, sample);
-    const auto bars = [](const Jump& j) { return std::abs(j.frames) / j.sigma; };
-    if (!jump || !is_whole(*jump) || !(bars(*jump) > kStandsOut)) continue;
-    if (found.empty() || sample - found.back().sample > kBeside)
-      found.push_back(*jump);
-    else if (bars(*jump) > bars(found.back()))
-      found.back() = *jump;
-  }
-  return found;
-}
-
-}  // namespace
-
-void tell_steps_of_path(const Problem& problem, data::Fit& fit) {
-  constexpr std::size_t kFew = 6, kRarely = 40;  // else times jitter, or the path has corners
-  for (const ArcData& arc : problem.arcs) {
-    if (arc.observable_index(model::Observable::x_m) < 0) continue;
-    const std::vector<Jump> jumps = steps_of_path(arc);
-    if (jumps.empty() || jumps.size() > std::min(kFew, arc.t_s.size() / kRarely)) continue;
-    std::vector<std::string> told;
-    for (const Jump& jump : jumps)
-      told.push_back(fmt::format("{:.2f} ± {:.2f} at {:.4g} s", jump.frames, jump.sigma,
-                                 arc.t_s[jump.sample]));
-    fit.warnings.push_back(fmt::format(
-        "the body goes on by whole frames at once ({}): did the recorder drop pictures, or write "
-        "some twice, and the times not show it?",
-        fmt::join(told, ", ")));
-  }
 }
 
 }  // namespace trochoid::fitting

@@ -31,8 +31,4 @@ struct LostPictures {
 void doubt_if_pictures_are_lost(const Problem& problem, const Eigen::VectorXd& u,
                                 const Uncertainty& error, data::Fit& fit);
 
-/// Where a model does not explain a track: places where its path, a smooth curve before and after, goes on
-/// by whole frames too far or too little. Such are told, as something to look at.
-void tell_steps_of_path(const Problem& problem, data::Fit& fit);
-
 }  // namespace trochoid::fitting
