@@ -173,8 +173,13 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     }
   }
   if (result.fit.converged) {
+    // What rivals would make of it, at length, is told last.
+    auto& told = result.fit.warnings;
+    const auto of_itself = std::ssize(told);
     allow_for_rivals(rungs, *chosen, result.fit, rival_grounds(contest, *chosen));
+    const auto of_rivals = std::ssize(told);
     doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
+    std::rotate(told.begin() + of_itself, told.begin() + of_rivals, told.end());
   }
   result.fit.comparison = table_of(rungs, chosen);
   result.fit.recommendation = sentence(rungs, *chosen, ladder, result.fit.verdict);
