@@ -247,6 +247,9 @@ std::string toml_value(const std::vector<std::string>& values, AnyText) {
   for (const std::string& value : values) items.push_back(toml_text(value));
   return fmt::format("[{}]", join(items, ", "));
 }
+std::string toml_value(const std::vector<std::int64_t>& values, const Range&) {
+  return fmt::format("[{}]", fmt::join(values, ", "));
+}
 std::string toml_value(const Prior& prior, const Range&) {
   return fmt::format("[{}, {}]", toml_number(prior.value), toml_number(prior.sigma));
 }

@@ -32,6 +32,7 @@ constexpr Range kSlope{-Support::kSteepest, Support::kSteepest, true,
                        "between -0.2 and 0.2, the floor's rise per length"};
 constexpr Range kTolerance{1e-15, 0.1, true, "between 1e-15 (finer is below rounding) and 0.1"};
 constexpr Range kObjects{1.0, TrackingSettings::kMostObjects, true, "a whole number in 1..64"};
+constexpr Range kFrames{1.0, 1e15, true, "numbers of frames after the first, whole"};
 static_assert(Support::kSteepest == 0.2, "as kSlope words it");
 static_assert(TrackingSettings::kMostObjects == 64, "as kObjects words it");
 
@@ -88,6 +89,7 @@ void camera_keys(Visit&& visit) {
   visit("readout_s", &CameraSettings::readout_s, kNonNegative);
   visit("rows", &CameraSettings::rows, kPositive);
   visit("frame_rate_hz", &CameraSettings::frame_rate_hz, kPositive);
+  visit("missing_frames", &CameraSettings::missing_frames, kFrames);
   visit("exposure_s", &CameraSettings::exposure_s, kNonNegative);
   visit("transfer", &CameraSettings::transfer, kTransfers);
 }

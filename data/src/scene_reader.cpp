@@ -180,6 +180,20 @@ void TableReader::read(const char* key, std::vector<std::string>& values, AnyTex
   }
 }
 
+void TableReader::read(const char* key, std::vector<std::int64_t>& values, const Range& range) {
+  const toml::node* node = find(key);
+  if (!node) return;
+  const toml::array* list = node->as_array();
+  if (!list)
+    fail_at(*node, fmt::format("{} must be a list of {}, e.g. [80, 159]", key, range.words));
+  for (const toml::node& item : *list) {
+    const auto whole = item.value_exact<std::int64_t>();
+    if (!whole || !range.holds(static_cast<double>(*whole)))
+      fail_at(item, fmt::format("{} must hold {}", key, range.words));
+    values.push_back(*whole);
+  }
+}
+
 void TableReader::read(const char* key, std::string& value, TimeOrFrame) {
   const toml::node* node = find(key);
   if (!node) return;

@@ -43,6 +43,7 @@ class TableReader {
   void read(const char* key, std::string& value, AnyText);
   void read(const char* key, std::vector<std::string>& values, AnyText);
   void read(const char* key, std::string& value, TimeOrFrame);
+  void read(const char* key, std::vector<std::int64_t>& values, const Range& range);
 
   template <std::size_t N>
   void read(const char* key, std::string& value, const Words<N>& words) {

@@ -74,6 +74,7 @@ class Tracking {
     source.chroma = true;
     source.apart_in_time = true;
     source.frame_rate_hz = scene.camera.frame_rate_hz;
+    source.missing_frames = scene.camera.missing_frames;
     source.from = options.from.empty() ? scene.tracking.from : options.from;
     source.to = options.to.empty() ? scene.tracking.to : options.to;
     return source;
@@ -640,6 +641,8 @@ class Tracking {
       result.summary.lost += frames_ - found;
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
+      if (auto note = note_about_steps(result.file.tracks.back()))
+        result.file.notes.push_back(std::move(*note));
     }
     if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))
       result.file.notes.push_back(std::move(*note));

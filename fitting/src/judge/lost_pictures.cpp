@@ -15,6 +15,8 @@
 #include "judge/path_steps.hpp"
 #include "observe/decompositions.hpp"
 #include "problem/linearise.hpp"
+#include "trochoid/data/path_step.hpp"
+#include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -39,7 +41,7 @@ struct ArcPlaces {
 ArcPlaces places_of(const Problem& problem, int arc, Eigen::Index first_row,
                     const Eigen::VectorXd& residuals) {
   const ArcData& data = problem.arcs[arc];
-  ArcPlaces all{.arc = arc, .frame_s = usual_step_s(data), .places = {}};
+  ArcPlaces all{.arc = arc, .frame_s = data::usual_step_s(data.t_s), .places = {}};
   const Eigen::MatrixX2d at_m = predicted_m(data, residuals);
   const std::vector<int> consistent = consistent_samples(data);
   const auto last = static_cast<int>(data.t_s.size()) - 1;
@@ -164,6 +166,12 @@ std::vector<Step> steps_of(const Remainder& plain, const std::vector<ArcPlaces>&
   return steps;
 }
 
+// From a sample of an arc on its times are off.
+struct TimeJump {
+  int arc = 0, sample = 0;
+  double frames = 0.0, sigma = 0.0;  // by how many of its usual steps too early
+};
+
 std::vector<TimeJump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
   constexpr std::size_t kLeastPlaces = 40;
   const Problem plain = in_stated_sigmas(problem, Weights::dropped);
@@ -200,7 +208,7 @@ Problem with_times_put_right(Problem problem, const Missing& missing) {
   constexpr double kApart = 1e-6;  // of a frame: what is written twice is of one time
   for (const auto& [place, frames] : missing) {
     ArcData& arc = problem.arcs[place.first];
-    const double frame_s = usual_step_s(arc);
+    const double frame_s = data::usual_step_s(arc.t_s);
     for (auto t_s = arc.t_s.begin() + place.second; t_s != arc.t_s.end(); ++t_s)
       *t_s = std::max(*t_s + frames * frame_s, *std::prev(t_s) + kApart * frame_s);
   }
@@ -225,7 +233,7 @@ LostPictures lost_pictures(const Problem& problem, const Eigen::VectorXd& u) {
   for (int round = 0; round < kMostRounds && !jumps.empty(); ++round) {
     const std::size_t before = missing.size();
     for (const TimeJump& jump : jumps)
-      if (is_whole(jump))
+      if (data::is_whole(jump.frames, jump.sigma))
         missing[{jump.arc, jump.sample}] += static_cast<int>(std::round(jump.frames));
     if (missing.size() == before) return {};
     right = with_times_put_right(problem, missing);

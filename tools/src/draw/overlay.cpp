@@ -243,6 +243,7 @@ std::unique_ptr<tracking::FrameSource> open_recording(const OverlayInput& input,
     throw InputError(fmt::format("no frame lies between from = {} and to = {}; make that longer",
                                  options.from, options.to));
   if (input.scene) source.frame_rate_hz = input.scene->camera.frame_rate_hz;
+  if (input.scene) source.missing_frames = input.scene->camera.missing_frames;
   source.untimed_rate_hz = rate_of(input.tracks);
   return tracking::open_video(input.video, source);
 }

@@ -48,6 +48,7 @@ class Search {
     check_tells_a_camera(scene);
     SourceOptions source;
     source.frame_rate_hz = scene_.camera.frame_rate_hz;
+    source.missing_frames = scene_.camera.missing_frames;
     const VideoInfo info = open_video(video, source)->info();
     size_px_ = {info.width_px, info.height_px};
     prior_.log_focal = std::log(kUsualFocal * std::max(size_px_.width, size_px_.height));

@@ -103,7 +103,7 @@ class LibavSource final : public FrameSource {
       ++frames_read_;
       const std::int64_t place_before = std::exchange(place_, place(frame.index));
       frame.missing_before = place_ - place_before - 1;
-      last_s_ = frame.t_s = presentation_time_s();
+      last_s_ = frame.t_s = presentation_time_s() + lost_before_s(frame.index);
       last_index_ = frame.index;
       if (after(window_.to, frame)) {
         finished_ = true;
@@ -332,6 +332,19 @@ class LibavSource final : public FrameSource {
     if (!(rate_hz > 0.0))
       fail("carries no time stamps; give its rate, frame_rate_hz under [camera] or as an option");
     return static_cast<double>(place_) / rate_hz;
+  }
+
+  /// Time of the pictures up to this one that are known to be missing without showing in the times.
+  [[nodiscard]] double lost_before_s(std::int64_t index) const {
+    const auto& missing = options_.missing_frames;
+    const auto lost = std::count_if(missing.begin(), missing.end(),
+                                    [&](std::int64_t frame) { return frame <= index; });
+    if (lost == 0) return 0.0;
+    const double rate_hz = options_.frame_rate_hz.value_or(info_.frame_rate_hz);
+    if (!(rate_hz > 0.0))
+      fail(
+          "has no rate to tell the missing_frames' time by; give it, frame_rate_hz under [camera]");
+    return static_cast<double>(lost) / rate_hz;
   }
 
   /// No motion can be told from pictures of one time.

@@ -1,12 +1,14 @@
 #include "link/track_notes.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "trochoid/data/path_step.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::tracking {
@@ -126,6 +128,36 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
       "edges lie {:.2f} px towards the {} side; a rounded or raised rim, another radius or a "
       "camera with transfer = \"{}\" does that",
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
+}
+
+std::optional<std::string> note_about_steps(const data::Track& track) {
+  constexpr double kTold = 0.1;
+  constexpr std::size_t kFew = 6, kRarely = 40;
+  const auto& samples = track.samples;
+  std::vector<double> t_s;
+  Eigen::MatrixX2d at_px(std::ssize(samples), 2);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    t_s.push_back(samples[i].t_s);
+    at_px.row(static_cast<Eigen::Index>(i)) = samples[i].centre_px;
+  }
+  std::vector<data::PathStep> steps = data::path_steps(t_s, at_px);
+  std::erase_if(steps, [](const data::PathStep& step) { return step.sigma > kTold; });
+  if (steps.empty() || steps.size() > std::min(kFew, samples.size() / kRarely)) return std::nullopt;
+  std::vector<std::int64_t> missing;
+  bool all_missing = true;
+  for (const data::PathStep& step : steps) {
+    all_missing = all_missing && step.frames > 0.0;
+    missing.insert(missing.end(), static_cast<std::size_t>(std::round(std::abs(step.frames))),
+                   samples[static_cast<std::size_t>(step.sample)].frame);
+  }
+  std::string note = fmt::format(
+      "the body goes on by whole frames at once ({}), as where a recorder dropped pictures, or "
+      "wrote some twice, and its times do not show it",
+      data::words_of(steps, t_s));
+  if (all_missing)
+    note += fmt::format("; [camera] missing_frames = [{}] puts the times right",
+                        fmt::join(missing, ", "));
+  return note;
 }
 
 std::string note_about_seen_exposure(double fraction, double frame_rate_hz) {

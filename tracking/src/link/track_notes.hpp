@@ -35,6 +35,10 @@ struct WhatWasRead {
 [[nodiscard]] std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
                                                           const data::Camera& camera);
 
+/// Where a body goes on by whole frames at once, as it does where pictures are missing, or come
+/// twice, that the times do not show: rarely, and told well. Nothing of a path with corners.
+[[nodiscard]] std::optional<std::string> note_about_steps(const data::Track& track);
+
 /// How long the shutter was taken to be open, for want of better knowledge.
 [[nodiscard]] std::string note_about_seen_exposure(double fraction, double frame_rate_hz);
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ struct CameraSettings {
   double readout_s = 0.0;          ///< rolling shutter: first to last row
   std::optional<double> rows;      ///< image height [px], for fitting the readout without a file
   std::optional<double> frame_rate_hz;  ///< overrides the container's time stamps
+  /// Just before each of these a picture was dropped which the times do not show: all from there on
+  /// are a frame later than the recording says. Twice the same: two pictures.
+  std::vector<std::int64_t> missing_frames;
   std::optional<double> exposure_s;
   std::optional<Transfer> transfer;  ///< instead of what the camera's file says
 };

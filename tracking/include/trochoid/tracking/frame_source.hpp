@@ -50,6 +50,9 @@ struct SourceOptions {
   std::optional<double>
       frame_rate_hz{};  ///< overrides the time stamps and the capture rate: slow motion, image
                         ///< sequences; a picture that is lost inside keeps its time all the same
+  /// Just before each of these a picture is missing which the times do not show: those from there
+  /// on are later than they say by the usual time between two.
+  std::vector<std::int64_t> missing_frames{};
   std::optional<double>
       untimed_rate_hz{};     ///< of an image sequence where frame_rate_hz is not given
   std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
