@@ -143,6 +143,55 @@ TEST(Events, ADipThatStaysBetweenTwoSamplesIsSeen) {
   EXPECT_NEAR(run.t_s, 1.5 * M_PI - std::acos(0.999), kAllowed_s);
 }
 
+// One step from 0 to 1 along y = t: where it is looked at is known.
+struct Clock {
+  using Scalar = double;
+  static constexpr int kStates = 1;
+  void derivative(double, const State<double, 1>&, State<double, 1>& dy) const { dy[0] = 1.0; }
+};
+/// Below zero for 0.02 about `at`.
+struct Dipping : Clock {
+  static constexpr int kEvents = 1;
+  double at = 0.0;
+  void events(double, const State<double, 1>& y, State<double, 1>& g) const {
+    g[0] = (y[0] - at) * (y[0] - at) - 1e-4;
+  }
+};
+/// A dip from 0.19 on, and a crossing at 0.22.
+struct DippingAndFalling : Clock {
+  static constexpr int kEvents = 2;
+  void events(double, const State<double, 1>& y, State<double, 2>& g) const {
+    g[0] = (y[0] - 0.2) * (y[0] - 0.2) - 1e-4;
+    g[1] = 0.22 - y[0];
+  }
+};
+template <class System>
+RunResult<System> in_one_step(const System& system) {
+  StepControl<1> control = uniform_control<1>(1e-10);
+  control.first_step_s = 1.0;
+  DormandPrince<System> stepper(system, control);
+  stepper.start(0.0, {{0.0}});
+  return integrate(
+      stepper, 1.0, nullptr, 0, [](const auto&, int, int) {}, 0u);
+}
+
+TEST(Events, ADipNextToTheEndOfAStepIsSeen) {
+  for (const double at : {0.02, 0.06, 0.11, 0.3, 0.5, 0.7, 0.9, 0.96, 0.985}) {
+    Dipping dip;
+    dip.at = at;
+    const auto run = in_one_step(dip);
+    ASSERT_EQ(run.end, RunEnd::event) << at;
+    constexpr double kRounding_s = 1e-12;
+    EXPECT_NEAR(run.t_s, at - 0.01, kRounding_s);
+  }
+}
+
+TEST(Events, ADipBeforeTheCrossingOfAnotherEventComesFirst) {
+  const auto run = in_one_step(DippingAndFalling{});
+  ASSERT_EQ(run.end, RunEnd::event);
+  EXPECT_EQ(run.event, 0);
+}
+
 // Height h, restitution e: after the first bounce at t1 = sqrt(2h/g) the ball is at
 // e g t1 (t - t1) - g (t - t1)^2 / 2. The derivatives by h, g and e need the saltation terms.
 TEST(Events, DerivativesCrossABounce) {

@@ -65,7 +65,7 @@ class EventScan {
  public:
   static constexpr int kEvents = System::kEvents;
   static constexpr int kN = System::kStates;
-  /// Parts a step is looked at in; an extremum between them is checked with a parabola.
+  /// Parts a step is looked at in; an extremum among them is checked with parabolas.
   static constexpr int kParts = 4;
 
   struct Crossing {
@@ -98,13 +98,19 @@ class EventScan {
     double u_before = from;
     State<double, kEvents> older = before;
     double u_older = from;
-    for (int part = 1; part <= kParts && first.event < 0; ++part) {
+    // A crossing is the first once its neighbours, too, have been looked at for dips before it.
+    for (int part = 1; part <= kParts && first.u > u_older; ++part) {
       const double u = from + (1.0 - from) * part / kParts;
       const State<double, kEvents> after = at(stepper, u);
+      // Of the extrema seen by several parabolas each is looked at by the nearest.
+      const double lowest = part == 2 ? u_older : 0.5 * (u_older + u_before);
+      const double highest = part == kParts ? u : 0.5 * (u_before + u);
       for (int i = 0; i < kEvents; ++i) {
         if (before[i] == 0.0) continue;  // starts on the surface: not a crossing
         consider(stepper, i, u_before, before[i], u, after[i], first);
-        if (part > 1) graze(stepper, i, u_older, older[i], u_before, before[i], u, after[i], first);
+        if (part > 1)
+          graze(stepper, i, {u_older, older[i]}, {u_before, before[i]}, {u, after[i]}, lowest,
+                highest, first);
       }
       older = before;
       u_older = u_before;
@@ -146,23 +152,45 @@ class EventScan {
     const double u = root(stepper, i, u0, g0, u1, g1);
     if (u < first.u) first = {i, u, rate(stepper, i, u)};
   }
-  /// Three values of one sign whose parabola dips through zero: evaluate at its extremum.
-  template <class Stepper>
-  void graze(const Stepper& stepper, int i, double u0, double g0, double u1, double g1, double u2,
-             double g2, Crossing& first) const {
-    const double sign = g1 > 0.0 ? 1.0 : -1.0;
-    if (sign * g0 <= 0.0 || sign * g2 <= 0.0 || sign * g1 > sign * g0 || sign * g1 > sign * g2) {
-      return;
-    }
-    const double rise = g2 - g0, bend = g2 - 2.0 * g1 + g0;
-    if (bend == 0.0) return;
-    const double u = u1 - 0.5 * (u2 - u1) * rise / bend;
-    if (!(u > u0 && u < u2)) return;
-    const double g = at(stepper, u)[i];
-    if (sign * g > 0.0) return;
-    consider(stepper, i, u < u1 ? u0 : u1, u < u1 ? g0 : g1, u, g, first);
-    if (first.event != i) consider(stepper, i, u, g, u < u1 ? u1 : u2, u < u1 ? g1 : g2, first);
+  /// The event's function at a fraction of the step.
+  struct Look {
+    double u, g;
+  };
+  /// Fraction at which the parabola through three looks is level, if it bends away from zero there;
+  /// else beyond the step.
+  [[nodiscard]] static double dip(const Look& a, const Look& b, const Look& c) {
+    const double before = (b.g - a.g) / (b.u - a.u), after = (c.g - b.g) / (c.u - b.u);
+    const double bend = (after - before) / (c.u - a.u);
+    if (!(bend * b.g > 0.0)) return 2.0;
+    return 0.5 * (a.u + b.u - before / bend);
   }
+
+  /// Three values of one sign: looks where their parabola comes nearest to zero, between `lowest`
+  /// and `highest`, and once more where that was close.
+  template <class Stepper>
+  void graze(const Stepper& stepper, int i, Look a, Look b, Look c, double lowest, double highest,
+             Crossing& first) const {
+    const double sign = b.g > 0.0 ? 1.0 : -1.0;
+    if (sign * a.g <= 0.0 || sign * c.g <= 0.0) return;
+    constexpr double kClose = 0.1;  // of the event's function beside it
+    double u = dip(a, b, c);
+    for (int look = 0; look < 2 && u >= lowest && u <= highest && u != b.u; ++look) {
+      const Look at_dip{u, at(stepper, u)[i]};
+      const Look left = u < b.u ? a : b, right = u < b.u ? b : c;
+      if (sign * at_dip.g <= 0.0) {
+        consider(stepper, i, left.u, left.g, u, at_dip.g, first);
+        if (first.event != i) consider(stepper, i, u, at_dip.g, right.u, right.g, first);
+        return;
+      }
+      const double beside = sign * left.g > sign * right.g ? sign * left.g : sign * right.g;
+      if (sign * at_dip.g > kClose * beside) return;
+      a = left;
+      b = at_dip;
+      c = right;
+      u = dip(a, b, c);
+    }
+  }
+
   /// Bracketed root, to rounding of the fraction: the secant's point moved a little towards the
   /// middle, so that the bracket shrinks from both sides (the idea is the truncation of
   /// [OliveiraTakahashi2020]; their projection is left out), and in every fourth step the middle
