@@ -156,6 +156,10 @@ class RimRun {
         stick_or_slip();
     }
     while (end_.end_s < options_.end_s && going_on_) {
+      if (steps_left() <= 0) {
+        finish(Outcome::step_limit);
+        break;
+      }
       if constexpr (kRolls) {
         if (end_.regime == Regime::rolling) {
           rolling_phase(sink);
@@ -188,23 +192,27 @@ class RimRun {
   }
   void note(std::string_view name) { end_.events.push_back({end_.end_s, std::string(name)}); }
 
-  /// Events that crowd together: contact chatters faster than anything the model describes.
+  /// Events that crowd together: contact chatters faster than anything the model describes. So does
+  /// a body that settles on its wall, by ever smaller impacts on both rims.
   [[nodiscard]] bool chattering(double t_s) {
     constexpr int kMany = 50;
-    constexpr double kShort_s = 1e-6;
+    constexpr double kShort = 1e-3;  // of the time in which the body falls by its size
+    const double short_s = kShort * std::sqrt(roll_.body.R / roll_.body.g);
     if (static_cast<int>(switch_times_s_.size()) >= kMany &&
-        t_s - switch_times_s_[switch_times_s_.size() - kMany] < kShort_s)
+        t_s - switch_times_s_[switch_times_s_.size() - kMany] < short_s)
       return true;
     switch_times_s_.push_back(t_s);
     return false;
   }
 
   /// The limit on steps is one of the whole run, however many phases it has.
+  [[nodiscard]] int steps_left() const {
+    return options_.max_steps - end_.statistics.steps - end_.statistics.rejected;
+  }
   template <int N>
   [[nodiscard]] StepControl<N> control(const RimBody& body) const {
     StepControl<N> control = rim_control<N>(body, options_);
-    const int taken = end_.statistics.steps + end_.statistics.rejected;
-    control.max_steps = std::max(1, control.max_steps - taken);
+    control.max_steps = steps_left();
     return control;
   }
 

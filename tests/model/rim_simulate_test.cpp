@@ -220,5 +220,29 @@ TEST(RimExtreme, ABodyThatTipsOverByTheErrorOfItsRunEndsWhereItDoes) {
   EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.06);
 }
 
+// A thick disc that rolls almost upright rocks from rim to rim, by less each time, and stands on
+// its wall after a finite time and impacts without number.
+TEST(RimExtreme, ABodyThatSettlesOnItsWallEndsThereAfterAFewHundredImpacts) {
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = 0.03;
+  body.thickness_m = 0.008;
+  body.mass_kg = 0.06;
+  scene.model.friction = 0.3;
+  scene.start.theta_rad = 1.55;
+  scene.start.w3_rad_s = 20.0;
+  scene.run.until_s = 2.0;
+  scene.run.rim_switch = "impact";
+  for (const char* law : {"sliding", "rolling"}) {
+    scene.model.name = law;
+    if (scene.model.name == "rolling") scene.model.pivoting_friction_m = 1e-4;
+    const Trajectory run = simulate(scene);
+    EXPECT_EQ(run.outcome, Outcome::rim_switch) << law;
+    EXPECT_LT(run.events.size(), 600u) << law;
+    EXPECT_GT(run.end_s, 1.4) << law;
+    EXPECT_NEAR(column(run, "theta_rad").tail(1)[0], 0.5 * M_PI, 1e-3) << law;
+  }
+}
+
 }  // namespace
 }  // namespace trochoid::model
