@@ -45,9 +45,16 @@ bool is_alive(long process) {
   return ::kill(static_cast<pid_t>(process), 0) == 0 || errno != ESRCH;
 }
 
+// ".STEM." of a temporary neighbour. A name has 255 bytes at most, and the neighbour's holds more
+// than its target's: of a long one it has the beginning.
+std::string head_of_pending(const fs::path& target) {
+  constexpr std::size_t kLongest = 160;
+  return fmt::format(".{}.", target.stem().string().substr(0, kLongest));
+}
+
 // What a killed process left beside the target: ".STEM.PID-N.partial.EXT" of no living process.
 void sweep(const fs::path& target, const fs::path& folder) {
-  const std::string head = fmt::format(".{}.", target.stem().string());
+  const std::string head = head_of_pending(target);
   const std::string tail = ".partial" + target.extension().string();
   std::error_code code;
   for (fs::directory_iterator entry(folder, code), end; !code && entry != end;
@@ -103,7 +110,7 @@ fs::path pending_neighbour(const fs::path& target) {
                                                      : fs::path(".");
   sweep(target, folder);
   // The extension stays last: video encoders choose the container by it.
-  const fs::path path = folder / fmt::format(".{}.{}-{}.partial{}", target.stem().string(),
+  const fs::path path = folder / fmt::format("{}{}-{}.partial{}", head_of_pending(target),
                                              ::getpid(), counter++, target.extension().string());
   const std::lock_guard lock(pending().mutex);
   pending().paths.insert(path);

@@ -12,6 +12,17 @@ TEST(WriteText, LeavesTheWholeTextAndNoTemporaryFile) {
   EXPECT_EQ(folder.entries(), 1);
 }
 
+TEST(WriteText, TakesANameAsLongAsNamesMayBe) {
+  const TestFolder folder;
+  const std::string longest = std::string(251, 'a') + ".txt";
+  write_text("hello\n", folder / longest);
+  EXPECT_EQ(content(folder / longest), "hello\n");
+  EXPECT_EQ(folder.entries(), 1);
+  const std::string message = refusal([&] { write_text("x", folder / ("a" + longest)); });
+  EXPECT_NE(message.find("too long"), std::string::npos) << message;
+  EXPECT_EQ(folder.entries(), 1);
+}
+
 TEST(WriteText, RefusesAFolderThatDoesNotExistAndNamesIt) {
   const TestFolder folder;
   const std::string message = refusal([&] { write_text("x", folder / "missing" / "a.txt"); });
