@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -163,6 +164,14 @@ void CsvReader::note_decimal_mark(std::string_view cell) {
         "{}: {} has a decimal {} where numbers before it have a {}; write all of them alike",
         place(), in_quotes(cell), cell[at] == ',' ? "comma" : "point",
         decimal_mark_ == ',' ? "comma" : "point"));
+}
+
+bool CsvReader::unknown(int column) const {
+  constexpr std::string_view kNaN = "nan";
+  std::string_view cell = column < 0 ? std::string_view() : cells_[column];
+  if (cell.starts_with('-')) cell.remove_prefix(1);  // as some programs write 0 / 0
+  return cell.empty() || std::equal(cell.begin(), cell.end(), kNaN.begin(), kNaN.end(),
+                                    [](unsigned char a, char b) { return std::tolower(a) == b; });
 }
 
 double CsvReader::number(int column) {

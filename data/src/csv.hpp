@@ -30,6 +30,9 @@ class CsvReader {
   /// Moves to the next row. @returns false at the end. @throws InputError on a wrong cell count.
   bool next();
   [[nodiscard]] std::string_view cell(int column) const { return cells_[column]; }
+  /// Whether a cell holds no number: empty, NaN as any other tool writes it, or of a column that is
+  /// absent (index -1).
+  [[nodiscard]] bool unknown(int column) const;
   /// The number in a cell, NaN if the cell is empty or the column is absent (index -1).
   /// @throws InputError naming line and column if it is no finite number, or one with a decimal
   ///         comma where others have points.

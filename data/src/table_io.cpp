@@ -18,8 +18,7 @@ Table read_table(const std::filesystem::path& path) {
   std::vector<double> cells;
   while (csv.next())
     for (int i = 0; i < static_cast<int>(table.columns.size()); ++i)
-      cells.push_back(csv.cell(i) == "nan" ? std::numeric_limits<double>::quiet_NaN()
-                                           : csv.number(i));
+      cells.push_back(csv.unknown(i) ? std::numeric_limits<double>::quiet_NaN() : csv.number(i));
   table.header = csv.header();
   table.set_rows(cells);
   return table;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 
@@ -61,16 +60,10 @@ struct TrackColumns {
   }
 };
 
-/// Nothing was seen in a row whose places are all empty, or NaN as other tools write it.
+/// Nothing was seen in a row whose places are all unknown.
 bool gives_no_place(const CsvReader& csv, const TrackColumns& columns) {
-  const auto unknown = [&](int column) {
-    constexpr std::string_view kNaN = "nan";
-    std::string_view cell = column < 0 ? std::string_view() : csv.cell(column);
-    if (cell.starts_with('-')) cell.remove_prefix(1);  // as some programs write 0 / 0
-    return cell.empty() || std::equal(cell.begin(), cell.end(), kNaN.begin(), kNaN.end(),
-                                      [](unsigned char a, char b) { return std::tolower(a) == b; });
-  };
-  return unknown(columns.x) && unknown(columns.y) && unknown(columns.x_px) && unknown(columns.y_px);
+  return csv.unknown(columns.x) && csv.unknown(columns.y) && csv.unknown(columns.x_px) &&
+         csv.unknown(columns.y_px);
 }
 
 std::int64_t integer(CsvReader& csv, int column, double largest) {

@@ -25,6 +25,14 @@ TEST(TableFile, KeepsHeaderColumnsAndEveryBitOfTheValues) {
   EXPECT_EQ(read.column("t_s")(1), 0.2);
 }
 
+TEST(TableFile, MayLeaveNumbersOutAsAnyToolWritesIt) {
+  const TestFolder folder;
+  const Table read = read_table(folder.write("t.csv", "t_s,x_m\n0,nan\n1,NaN\n2,-nan\n3,\n4,7\n"));
+  ASSERT_EQ(read.values.rows(), 5);
+  EXPECT_TRUE(read.values.col(1).head(4).array().isNaN().all());
+  EXPECT_EQ(read.values(4, 1), 7.0);
+}
+
 TEST(TableFile, NamesTheColumnsThereAreWhenOneIsMissing) {
   Table table;
   table.columns = {"t_s", "x_m"};
