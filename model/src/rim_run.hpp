@@ -516,47 +516,73 @@ class RimRun {
     note("rim_switch");
     if (!options_.impact_at_rim || chattering(end_.end_s)) return finish(Outcome::rim_switch);
     const RimBody& body = roll_.body;
-    const double m = body.m, A = body.A, C = body.C, R = body.R, h = -body.signed_h();
-    if (A + m * (R * R - h * h) <= 0.0) return finish(Outcome::rim_switch);  // line contact
+    if (body.A + body.m * (body.R * body.R - body.h * body.h) <= 0.0)
+      return finish(Outcome::rim_switch);  // line contact
     Roll after = roll_;
     after.body.side = -body.side;
-    end_.y = with_slip(
-        across_event(roll_, after, end_.end_s, y, delay,
-                     [&](State<S, 8> s) {
-                       const S w1 = s[Rim::w1], w2 = s[Rim::w2], w3 = s[Rim::w3];
-                       const S v1 = -h * w2 - R * w3;
-                       const S b2 = A * w2 + m * h * v1, b3 = C * w3 - m * R * v1;
-                       const double inverse = 1.0 / (A * C + m * R * R * A + m * h * h * C);
-                       s[Rim::w1] = w1 * ((A + m * (R * R - h * h)) / (A + m * (R * R + h * h)));
-                       s[Rim::w2] = ((C + m * R * R) * b2 + m * h * R * b3) * inverse;
-                       s[Rim::w3] = (m * h * R * b2 + (A + m * h * h) * b3) * inverse;
-                       return s;
-                     }),
-        S(0.0), S(0.0));
+    if constexpr (kCoulomb) {
+      if (exact() && !bears_impact(y, after)) return jump_sliding(roll_, y, delay);
+    }
+    end_.y = with_slip(across_event(roll_, after, end_.end_s, y, delay,
+                                    [&](const State<S, 8>& at) { return on_new_rim(at); }),
+                       S(0.0), S(0.0));
     set_side(after.body.side);
     if constexpr (kCoulomb) {
       if (exact()) stick_or_slip();
     }
   }
+  /// (12), to the rim that does not touch yet.
+  [[nodiscard]] State<S, 8> on_new_rim(State<S, 8> s) const {
+    const RimBody& body = roll_.body;
+    const double m = body.m, A = body.A, C = body.C, R = body.R, h = -body.signed_h();
+    const S w2 = s[Rim::w2], w3 = s[Rim::w3];
+    const S v1 = -h * w2 - R * w3;
+    const S b2 = A * w2 + m * h * v1, b3 = C * w3 - m * R * v1;
+    const double inverse = 1.0 / (A * C + m * R * R * A + m * h * h * C);
+    s[Rim::w1] *= (A + m * (R * R - h * h)) / (A + m * (R * R + h * h));
+    s[Rim::w2] = ((C + m * R * R) * b2 + m * h * R * b3) * inverse;
+    s[Rim::w3] = (m * h * R * b2 + (A + m * h * h) * b3) * inverse;
+    return s;
+  }
+  /// Whether friction can give the impulse that lets the new rim rest at once: at most mu times the
+  /// normal one. On edge e2 is vertical.
+  [[nodiscard]] bool bears_impact(const State<S, 8>& y, const Roll& after) const {
+    const auto before = roll_.motion(y), then = after.motion(on_new_rim(y));
+    const double along_n = value_of(then.v1 - before.v1), along_k = value_of(then.v3 - before.v3);
+    return std::hypot(along_n, along_k) <= value_of(roll_.friction) * value_of(then.v2 - before.v2);
+  }
 
-  /// The same with a vertical impulse only: while the contact slides, friction's share of the short
-  /// impulse, mu times it, is left out (S15).
   void sliding_rim_switch(const State<S, 10>& y, const S& delay) {
     note("rim_switch");
     if (!options_.impact_at_rim || chattering(end_.end_s)) return finish(Outcome::rim_switch);
+    jump_sliding(slide_, y, delay);
+  }
+  [[nodiscard]] static const State<S, 10>& with_its_slip(const State<S, 10>& y) { return y; }
+  [[nodiscard]] static State<S, 10> with_its_slip(const State<S, 8>& y) {
+    return with_slip(y, S(0.0), S(0.0));
+  }
+  /// To the other rim, by a vertical impulse only: where the contact slides, friction's share of
+  /// the short impulse, mu times it, is left out (S15).
+  template <class Before, int N>
+  void jump_sliding(const Before& before, const State<S, N>& y, const S& delay) {
     const RimBody& body = slide_.body;
     const double A = body.A, mh2 = body.m * body.h * body.h, h = body.signed_h();
     if (A <= mh2) return finish(Outcome::rim_switch);
     Slide after = slide_;
     after.body.side = -body.side;
-    end_.y = across_event(slide_, after, end_.end_s, y, delay, [&](State<S, 10> s) {
-      const S before = s[Rim::w1];
-      s[Rim::w1] = before * ((A - mh2) / (A + mh2));
+    end_.y = across_event(before, after, end_.end_s, y, delay, [&](const State<S, N>& at) {
+      State<S, 10> s = with_its_slip(at);
+      const S w1 = s[Rim::w1];
+      s[Rim::w1] = w1 * ((A - mh2) / (A + mh2));
       s[Rim::un] += 2.0 * h * s[Rim::w2];
-      s[Rim::ut] += body.R * (s[Rim::w1] - before);
+      s[Rim::ut] += body.R * (s[Rim::w1] - w1);
       return s;
     });
+    end_.regime = Regime::sliding;
     set_side(after.body.side);
+    if constexpr (kCoulomb) {
+      if (exact() && slip_of(end_.y) <= slide_.stick_speed_m_s) stick_or_slip();
+    }
   }
 
   Roll roll_;
