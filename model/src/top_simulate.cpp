@@ -1,6 +1,9 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "decay.hpp"
 #include "factories.hpp"
@@ -68,8 +71,9 @@ TopColumns run_kernel(Kernel kernel, const TopSettings& top, const std::vector<d
 }
 
 template <class S>
-WithSpinAngle<TopWithDrag<S>> system_of(const TopSettings& top) {
+WithSpinAngle<TopWithDrag<S>> system_of(const TopSettings& top, double side) {
   WithSpinAngle<TopWithDrag<S>> system;
+  system.side = side;
   system.a_1_s2 = S(top.a_1_s2);
   system.gamma1_1_s = S(top.gamma1_1_s);
   system.gamma3_1_s = S(top.gamma3_1_s);
@@ -79,6 +83,7 @@ WithSpinAngle<TopWithDrag<S>> system_of(const TopSettings& top) {
 struct DualTop : WithSpinAngle<TopWithDrag<Dual<8>>> {
   [[nodiscard]] WithSpinAngle<TopWithDrag<double>> values() const {
     WithSpinAngle<TopWithDrag<double>> system;
+    system.side = side;
     system.a_1_s2 = a_1_s2.value;
     system.gamma1_1_s = gamma1_1_s.value;
     system.gamma3_1_s = gamma3_1_s.value;
@@ -86,12 +91,12 @@ struct DualTop : WithSpinAngle<TopWithDrag<Dual<8>>> {
   }
 };
 
-TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, double tolerance,
-                        Method method) {
-  if (top.dry_drag || top.quadratic_drag)
-    throw NotOffered(
-        "SUNDIALS runs a top with linear drag only; drag_spin_dry_N_m and "
-        "drag_spin_quadratic_N_m_s2 take run.integrator = \"auto\", \"taylor\" or \"dop853\"");
+/// @param side  which combination of (9) tells the spin angle.
+/// @returns nothing where the axis comes so near to the pole at which that is singular that a step
+///          might pass over it.
+std::optional<TopColumns> run_sundials_by(double side, const TopSettings& top,
+                                          const std::vector<double>& t_s, double tolerance,
+                                          Method method) {
   TopColumns columns(t_s);
   const auto start = axis_and_momentum<double>(
       {top.theta_rad, top.phi_rad, top.dtheta_rad_s, top.dphi_rad_s}, top.b_1_s);
@@ -100,6 +105,7 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   int parts = 1;
   // The azimuth is followed from one look to the next; near the vertical it turns fastest.
   constexpr double kLargestTurn_rad = 0.25;
+  const double singular = -std::cos(1.2 * kLargestTurn_rad);
   const std::vector<double> fine = times_between(t_s, rate, kLargestTurn_rad, parts);
   StepControl<8> control = uniform_control<8>(tolerance);
   for (int i = 0; i < 3; ++i) control.atol[i] *= rate;
@@ -110,11 +116,12 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   for (int i = 0; i < 7; ++i) y0[i] = base[i];
   y0[7] = top.phi_rad;
   DualTop duals;
-  static_cast<WithSpinAngle<TopWithDrag<Dual<8>>>&>(duals) = system_of<Dual<8>>(top);
-  const Solution solution = solve(system_of<double>(top), duals, y0, fine, control, method);
+  static_cast<WithSpinAngle<TopWithDrag<Dual<8>>>&>(duals) = system_of<Dual<8>>(top, side);
+  const Solution solution = solve(system_of<double>(top, side), duals, y0, fine, control, method);
   double phi = top.phi_rad;
   for (Eigen::Index row = 0; row < solution.states.rows(); ++row) {
     const auto y = solution.states.row(row);
+    if (side * y[5] < singular) return std::nullopt;
     const double raw = std::atan2(y[3], -y[4]);
     if (y[3] != 0.0 || y[4] != 0.0) phi += data::wrapped(raw - phi);
     if (row % parts != 0) continue;
@@ -126,7 +133,7 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
       columns.column[kTopAngleColumns + i][n] = at.L[i];
     }
     columns.column[3][n] = phi;
-    columns.column[4][n] = y[7] - phi;
+    columns.column[4][n] = side * (y[7] - phi);
     columns.rows = static_cast<int>(n) + 1;
   }
   columns.outcome = solution.outcome;
@@ -135,6 +142,24 @@ TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, 
   columns.result.rejected = solution.statistics.rejected;
   columns.result.evaluations = solution.statistics.evaluations;
   return columns;
+}
+
+TopColumns run_sundials(const TopSettings& top, const std::vector<double>& t_s, double tolerance,
+                        Method method) {
+  constexpr const char* kOurs = "run.integrator = \"auto\", \"taylor\" or \"dop853\"";
+  if (top.dry_drag || top.quadratic_drag)
+    throw NotOffered(
+        fmt::format("SUNDIALS runs a top with linear drag only; drag_spin_dry_N_m and "
+                    "drag_spin_quadratic_N_m_s2 take {}",
+                    kOurs));
+  const double nearer = std::cos(top.theta_rad) < 0.0 ? -1.0 : 1.0;
+  for (const double side : {nearer, -nearer})
+    if (auto columns = run_sundials_by(side, top, t_s, tolerance, method))
+      return *std::move(columns);
+  throw NotOffered(fmt::format(
+      "SUNDIALS follows a top's spin angle near one of the poles, theta_rad = 0 and pi, only; this "
+      "top, which comes near both, takes {}",
+      kOurs));
 }
 
 /// How far the axes of two runs are apart at every time both reached [rad].
