@@ -50,10 +50,18 @@ class Azimuth {
   double phi_ = 0.0;
 };
 
+/// Whether the axis is upright to rounding: there is no azimuth then.
+template <class S>
+TROCHOID_INLINE bool at_pole(const S& kx, const S& ky) {
+  const double x = value_of(kx), y = value_of(ky);
+  return x * x + y * y == 0.0;
+}
+
 template <class S>
 TROCHOID_INLINE S azimuth(const S& kx, const S& ky, double near) {
   const double phi = near;
   if constexpr (requires { S::kLanes; }) {
+    if (at_pole(kx, ky)) return S(phi);
     S result = atan2(kx, -ky);
     result.value = phi;
     return result;
@@ -231,10 +239,25 @@ class Run {
     result_.evaluations = counts.evaluations;
     store_end_state(stepper);
   }
+  /// As angles_of(), where the axis is upright: of the azimuth there is what it was before, of its
+  /// rate nothing. The tilt grows by how far the axis moves, to whatever side.
+  [[nodiscard]] TopAngles<S> angles_at_pole(const AxisAndMomentum<S>& state) {
+    const double phi = azimuth_.follow(0.0, 0.0), side = value_of(state.k[2]) < 0.0 ? -1.0 : 1.0;
+    S theta(side < 0.0 ? kPi : 0.0);
+    if constexpr (requires { S::kLanes; }) {
+      for (int lane = 0; lane < S::kLanes; ++lane)
+        set_lane(theta.derivative, lane,
+                 side * __builtin_hypot(state.k[0].derivative[lane], state.k[1].derivative[lane]));
+    }
+    return {theta, S(phi), state.L[0] * __builtin_cos(phi) + state.L[1] * __builtin_sin(phi),
+            S(0.0)};
+  }
+
   void store_end_state(Stepper& stepper) {
     const auto& y = stepper.y();
     const auto [state, b] = unpack(stepper.system(), y);
-    const TopAngles<S> angles = angles_of(state);
+    const TopAngles<S> angles =
+        at_pole(state.k[0], state.k[1]) ? angles_at_pole(state) : angles_of(state);
     S phi = angles.phi_rad;
     if constexpr (kAngles) {
       phi = azimuth(state.k[0], state.k[1],

@@ -308,8 +308,10 @@ double TopPredictor::derivative(const Work& work, Observable what, Parameter by,
     case Observable::theta_rad: {
       if (lane < 0) return 0.0;
       const double s = std::hypot(kx, ky);
-      const double ds = (kx * work.lane(0, n, lane) + ky * work.lane(1, n, lane)) / s;
-      return kz * ds - s * work.lane(2, n, lane);
+      const double dkx = work.lane(0, n, lane), dky = work.lane(1, n, lane);
+      // Upright, the tilt grows by how far the axis moves, to whatever side.
+      if (s == 0.0) return std::copysign(std::hypot(dkx, dky), kz);
+      return kz * (kx * dkx + ky * dky) / s - s * work.lane(2, n, lane);
     }
     case Observable::phi_rad:
       return lane >= 0 ? work.lane(3, n, lane) : by == kPhi ? 1.0 : 0.0;

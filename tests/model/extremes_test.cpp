@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "common.hpp"
 #include "quad.hpp"
 #include "trochoid/model/free_body.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -228,6 +229,33 @@ TEST(TopExtremes, ASleepingTopStaysAsleepAndItsAnglesAreNumbers) {
     EXPECT_TRUE(run.values.allFinite()) << theta;
     constexpr double kRounding = 1e-12;  // of an equilibrium
     EXPECT_LT((run.values.col(2).array() - theta).abs().maxCoeff(), kRounding);
+  }
+}
+
+// At the pole there is no azimuth; all else is told, and the tilt one-sidedly.
+TEST(TopExtremes, ASleepingTopsPredictionHoldsNothingButNumbers) {
+  constexpr Observable kEverything[] = {Observable::x_m, Observable::theta_rad, Observable::phi_rad,
+                                        Observable::psi_rad};
+  for (const double theta : {0.0, 1e-300}) {
+    data::Scene scene;
+    scene.model.name = "top";
+    scene.start.theta_rad = theta;
+    const auto predictor = make_predictor(scene);
+    const std::vector<double> t_s{0.0, 0.5};
+    PredictRequest request;
+    request.t_s = t_s;
+    request.observables.assign(std::begin(kEverything), std::end(kEverything));
+    request.want_end_state = true;
+    for (std::size_t i = 0; i < predictor->parameters().size(); ++i)
+      request.derivatives.push_back(static_cast<int>(i));
+    const Prediction run = predictor->predict(defaults(*predictor), request);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_TRUE(run.values.allFinite());
+    EXPECT_TRUE(run.jacobian.allFinite());
+    EXPECT_TRUE(run.end_state.allFinite()) << run.end_state.transpose();
+    EXPECT_TRUE(run.end_state_jacobian.allFinite());
+    constexpr int kTheta = 1;  // the second observable at the start
+    EXPECT_EQ(run.jacobian(kTheta, predictor->index_of("theta_rad")), 1.0);
   }
 }
 
