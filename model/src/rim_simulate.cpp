@@ -93,7 +93,9 @@ struct RimJob {
   [[nodiscard]] RimRunOptions options(double tolerance, double stick) const {
     RimRunOptions options;
     options.tolerance = tolerance;
-    options.end_s = t_s.back();
+    // Rows are read off steps: where none but the start is asked for, one is made all the same.
+    constexpr double kInstant_s = 1e-9;
+    options.end_s = std::max(t_s.back(), kInstant_s);
     options.impact_at_rim = impact;
     options.stick_factor = stick;
     options.stiff = method == Method::radau;
@@ -374,7 +376,7 @@ Trajectory simulate_rim(const data::Scene& scene, const std::string& law) {
         record.rows[n].data(), static_cast<Eigen::Index>(run.columns.size()));
   run.events = std::move(record.end.events);
   run.outcome = record.end.outcome;
-  run.end_s = record.end.end_s;
+  run.end_s = std::min(record.end.end_s, job.t_s.back());
   run.statistics = record.end.statistics;
   estimate_error(record, other, run);
   return run;

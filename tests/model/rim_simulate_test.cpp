@@ -130,6 +130,16 @@ TEST(RimSimulation, OfABodyThatLiesFlatEndsAtOnceWithAnyIntegrator) {
   }
 }
 
+TEST(RimSimulation, ShorterThanOneIntervalHasItsStart) {
+  data::Scene scene = reference_scene("s06_roll_disc");
+  scene.run.until_s = 0.5 / scene.run.rate_hz;
+  const Trajectory run = simulate(scene);
+  EXPECT_EQ(run.outcome, Outcome::reached_end);
+  EXPECT_EQ(run.end_s, 0.0);
+  ASSERT_EQ(run.values.rows(), 1);
+  EXPECT_EQ(column(run, "theta_rad")[0], scene.start.theta_rad);
+}
+
 // Which rim touches decides how the contact moves; exactly on edge that is the one it falls on.
 TEST(RimSimulation, OfABodyOnEdgeBeginsWithTheVelocityItIsGiven) {
   data::Scene scene = reference_scene("s08_slide_disc");
