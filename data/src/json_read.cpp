@@ -4,15 +4,42 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <set>
 
 #include "text.hpp"
 #include "trochoid/data/io.hpp"
 
 namespace trochoid::data {
 
+namespace {
+
+/// Refuses an object that has a key twice: the second value would silently take the first one's
+/// place.
+class KeysOnce {
+ public:
+  explicit KeysOnce(const std::string& where) : where_(where) {}
+  bool operator()(int /*depth*/, nlohmann::json::parse_event_t event, const nlohmann::json& key) {
+    using Event = nlohmann::json::parse_event_t;
+    if (event == Event::object_start) open_.emplace_back();
+    if (event == Event::object_end) open_.pop_back();
+    if (event == Event::key && !open_.back().insert(key.get<std::string>()).second)
+      throw InputError(fmt::format("{}: key \"{}\" is there twice; keep one", where_,
+                                   one_line(key.get<std::string>(), 40)));
+    return true;
+  }
+
+ private:
+  const std::string& where_;
+  std::vector<std::set<std::string>> open_;  ///< keys of the objects that are being read
+};
+
+}  // namespace
+
 nlohmann::json parse_json_object(const std::string& text, const std::string& where) {
   try {
-    nlohmann::json json = nlohmann::json::parse(text);
+    KeysOnce once(where);
+    nlohmann::json json = nlohmann::json::parse(text, std::ref(once));
     if (!json.is_object())
       throw InputError(fmt::format("{}: expected a JSON object {{...}}", where));
     return json;

@@ -10,7 +10,7 @@
 namespace trochoid::data {
 
 /// Parses a text holding one object; `where` stands for its file in messages.
-/// @throws InputError naming `where` and the line.
+/// @throws InputError naming `where` and the line, or the key that an object has twice.
 [[nodiscard]] nlohmann::json parse_json_object(const std::string& text, const std::string& where);
 [[nodiscard]] nlohmann::json read_json_object(const std::filesystem::path& path);
 

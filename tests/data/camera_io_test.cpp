@@ -104,6 +104,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         RefusedCamera{"Empty", "", "empty"}, RefusedCamera{"NotJson", "width = 3", "not JSON"},
         RefusedCamera{"Missing", with("\"fx\"", "\"gx\""), "key \"fx\" is missing"},
+        RefusedCamera{"TwoFocalLengths", with("\"fx\"", "\"fx\": 900, \"fx\""),
+                      "key \"fx\" is there twice"},
         RefusedCamera{"ZeroFocalLength", with("1180.0", "0"), "\"fx\" = 0 must be greater than 0"},
         RefusedCamera{"WordForNumber", with("406.3", "\"middle\""),
                       "\"cx\" must be a finite number"},
