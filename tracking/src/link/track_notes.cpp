@@ -131,7 +131,7 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
 }
 
 std::optional<std::string> note_about_steps(const data::Track& track) {
-  constexpr double kTold = 0.1;
+  constexpr double kTold = 0.05;
   constexpr std::size_t kFew = 6, kRarely = 40;
   const auto& samples = track.samples;
   std::vector<double> t_s;
