@@ -27,9 +27,28 @@ std::vector<double> ticks_of(const Range& range, bool logarithmic) {
   return ticks;
 }
 
-std::string tick_words(double tick, bool logarithmic) {
+/// @param digits  as many as tell the ticks of the axis apart.
+std::string tick_words(double tick, bool logarithmic, int digits) {
   return logarithmic ? fmt::format("10<tspan dy=\"-5\" font-size=\"9\">{:.0f}</tspan>", tick)
-                     : fmt::format("{:.6g}", tick);
+                     : fmt::format("{:.{}g}", tick, digits);
+}
+
+int digits_of(const std::vector<double>& ticks) {
+  constexpr int kUsual = 6;
+  if (ticks.size() < 2) return kUsual;
+  const double largest = std::max(std::abs(ticks.front()), std::abs(ticks.back()));
+  const double parts = largest / (ticks[1] - ticks[0]);
+  return std::max(kUsual, 1 + static_cast<int>(std::ceil(std::log10(parts))));
+}
+
+/// Room around the data. Values that differ by rounding alone, as the places of a disc on a pin do,
+/// are one value: ticks between them would have no end.
+Range with_margin(const Range& data) {
+  constexpr double kShare = 0.04, kOfOneValue = 0.5, kRounding = 1e-6;
+  const double rounding = kRounding * std::max(std::abs(data.low), std::abs(data.high));
+  const double margin =
+      data.span() > rounding ? kShare * data.span() : std::max(kOfOneValue, rounding);
+  return {data.low - margin, data.high + margin};
 }
 
 }  // namespace
@@ -49,8 +68,7 @@ SvgPlot::SvgPlot(std::string id, Range x, Range y, AxisWords words, Scale scale,
     : id_(std::move(id)), x_(x), y_(y), scale_(scale), width_(width), height_(height) {
   for (Range* range : {&x_, &y_}) {
     if (!(range->low <= range->high)) *range = {0.0, 1.0};
-    const double margin = range->span() > 0.0 ? 0.04 * range->span() : 0.5;
-    *range = {range->low - margin, range->high + margin};
+    *range = with_margin(*range);
   }
   if (scale_ == Scale::equal) {
     const double inner_width = width_ - left_ - right_, inner_height = height_ - top_ - bottom_;
@@ -74,23 +92,24 @@ double SvgPlot::px_y(double y) const {
 void SvgPlot::axes(const AxisWords& words) {
   const bool logarithmic = scale_ == Scale::logarithmic;
   const double base = height_ - bottom_;
-  for (const double tick : ticks_of(x_, logarithmic)) {
+  const std::vector<double> across = ticks_of(x_, logarithmic), up = ticks_of(y_, logarithmic);
+  for (const double tick : across) {
     const double x = px_x(tick);
     frame_ += fmt::format(
         "<line x1=\"{0:.2f}\" y1=\"{1:.2f}\" x2=\"{0:.2f}\" y2=\"{2:.2f}\" stroke=\"{3}\" "
         "stroke-width=\"0.5\"/>",
         x, top_, base, ink::faint);
     frame_ += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\">{}</text>", x,
-                          base + 16.0, tick_words(tick, logarithmic));
+                          base + 16.0, tick_words(tick, logarithmic, digits_of(across)));
   }
-  for (const double tick : ticks_of(y_, logarithmic)) {
+  for (const double tick : up) {
     const double y = px_y(tick);
     frame_ += fmt::format(
         "<line x1=\"{0:.2f}\" y1=\"{1:.2f}\" x2=\"{2:.2f}\" y2=\"{1:.2f}\" stroke=\"{3}\" "
         "stroke-width=\"0.5\"/>",
         left_, y, width_ - right_, ink::faint);
     frame_ += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"end\">{}</text>",
-                          left_ - 6.0, y + 4.0, tick_words(tick, logarithmic));
+                          left_ - 6.0, y + 4.0, tick_words(tick, logarithmic, digits_of(up)));
   }
   frame_ += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\">{}</text>",
                         0.5 * (left_ + width_ - right_), height_ - 6.0, escaped(words.x));
