@@ -81,7 +81,7 @@ std::string key_of(const Campaign& campaign, const CampaignItem& item) {
       fmt::format("{} {}", TROCHOID_VERSION, fmt::join(command_of(campaign, item), " "));
   for (const fs::path& file : inputs_of(item))
     key += file == item.video ? state_of_recording(file) : state_of(file);
-  return key;
+  return as_utf8(key);  // as the record will hold it
 }
 
 Json json_of(const CampaignRecord& record) {
@@ -203,7 +203,7 @@ CampaignRecord run_item(const Campaign& campaign, const CampaignItem& item) {
   if (record.done) read_answer(answer.path(), record);
   if (record.exit_status != 0 && record.message.empty())
     record.message = last_line(run.error_output);
-  data::write_text(json_of(record).dump(1) + "\n", record_path(campaign, item));
+  data::write_text(json_text(json_of(record)) + "\n", record_path(campaign, item));
   return record;
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "common/json_object.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/progress.hpp"
@@ -155,11 +156,20 @@ std::string camera_words(const Inspection& seen, const std::optional<double>& ra
   return text;
 }
 
+/// A name for a line of comment, which holds neither ends of lines nor broken UTF-8.
+std::string in_comment(const std::string& name) {
+  std::string words = as_utf8(name);
+  for (char& c : words)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  return words;
+}
+
 std::string scene_text(const InitOptions& options, const Inspection& seen, double radius_mm) {
   std::string text = fmt::format(
       "# {}: what a first look tells. Read it, correct it, then\n#   trochoid run {} --scene {}\n",
-      options.video.filename().string(), shell_quoted(options.video.string()),
-      shell_quoted(options.output.string()));
+      in_comment(options.video.filename().string()),
+      in_comment(shell_quoted(options.video.string())),
+      in_comment(shell_quoted(options.output.string())));
   text += video_words(seen.video);
   if (!seen.body) text += "# NO MOVING BODY FOUND: point at it with [tracking] at_px\n";
   if (seen.restless > 0.3)

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "commands.hpp"
+#include "common/json_object.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/pending_folder.hpp"
@@ -392,7 +393,7 @@ void write_recording(const RenderOptions& options, const data::Scene& scene, con
   video.finish();
   data::write_text(truth, targets.truth);
   data::write_camera(camera, targets.camera);
-  data::write_text(object_of(scene, motion.model()).dump(1) + "\n", targets.object);
+  data::write_text(json_text(object_of(scene, motion.model())) + "\n", targets.object);
   video.commit();
 }
 

@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "commands/body_camera.hpp"
 #include "common/fit_job.hpp"
+#include "common/json_object.hpp"
 #include "common/json_summary.hpp"
 #include "common/outputs.hpp"
 #include "common/pending_folder.hpp"
@@ -334,7 +335,7 @@ void write_run_file(const Run& run, const RunOptions& options, const fs::path& f
   file["overlay"] = {{"frame_rate_hz", run.overlay.frame_rate_hz},
                      {"slowed", run.overlay.slowed},
                      {"t_s", run.overlay.t_s}};
-  data::write_text(file.dump(1) + "\n", folder / kRunFile);
+  data::write_text(json_text(file) + "\n", folder / kRunFile);
 }
 
 void write_times(const Run& run, const RunOptions& options, const fs::path& folder) {

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "common/json_object.hpp"
+
 namespace trochoid::tools {
 
 void add_json_flag(CLI::App& command, bool& json) {
@@ -9,7 +11,7 @@ void add_json_flag(CLI::App& command, bool& json) {
 }
 
 void print_json(const nlohmann::ordered_json& summary) {
-  fmt::print("{}\n", summary.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", json_text(summary, 2));
 }
 
 }  // namespace trochoid::tools

@@ -8,7 +8,7 @@ namespace trochoid::tools {
 /// (docs/formats.md lists the keys).
 void add_json_flag(CLI::App& command, bool& json);
 
-/// Names from outside may be broken UTF-8: replaced rather than refused.
+/// As json_text() has it.
 void print_json(const nlohmann::ordered_json& summary);
 
 }  // namespace trochoid::tools

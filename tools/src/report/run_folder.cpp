@@ -84,7 +84,7 @@ void check_holds_results_only(const fs::path& folder) {
                              ".fit.timing.json"})  // the last two where track or fit were repeated
     results.push_back(stem + ending);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
+    const std::string name = as_utf8(entry.path().filename().string());  // as run.json has the stem
     if (std::find(results.begin(), results.end(), name) == results.end() ||
         !entry.is_regular_file())
       throw InputError(
