@@ -213,11 +213,23 @@ Targets targets_of(const fs::path& output, bool lossless) {
   return {output, beside(".truth.csv"), beside(".camera.json"), beside(".object.json")};
 }
 
+// What was filmed is not to be had again. What was rendered has its truth beside it.
+void check_not_filmed(const Targets& targets) {
+  std::error_code ignored;
+  if (fs::exists(targets.truth, ignored)) return;
+  for (const fs::path& file : {targets.video, targets.camera, targets.object})
+    if (fs::exists(file, ignored))
+      throw InputError(
+          fmt::format("{}: exists and was not rendered, as there is no {}; name another output",
+                      file.string(), targets.truth.string()));
+}
+
 void check_targets(const RenderOptions& options, const Targets& targets) {
   if (is_folder(options.output)) check_folder(options.output);
   if (is_folder(options.output) && !fs::exists(options.output)) return;
   for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
     check_output(file, {options.scene, options.camera});
+  check_not_filmed(targets);
 }
 
 // As a share of the frame interval: by option, scene, camera file.
