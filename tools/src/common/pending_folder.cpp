@@ -11,17 +11,43 @@ namespace trochoid::tools {
 
 namespace fs = std::filesystem;
 
-PendingFolder::PendingFolder(fs::path target) : target_(std::move(target)) {
+namespace {
+
+/// "ring" of ring/ and ring/. too.
+fs::path without_end(fs::path folder) {
+  while (folder.has_relative_path() && folder.has_parent_path() &&
+         (!folder.has_filename() || folder.filename() == "."))
+    folder = folder.parent_path();
+  return folder;
+}
+
+/// Where a link leads, also if nothing is there yet.
+fs::path behind_links(fs::path folder) {
+  constexpr int kMost = 40;  // as the system has it
   std::error_code code;
-  if (!target_.has_filename()) target_ = target_.parent_path();
-  const fs::path parent = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+  for (int i = 0; i < kMost && fs::is_symlink(fs::symlink_status(folder, code)); ++i)
+    folder = folder.parent_path() / fs::read_symlink(folder, code);
+  return without_end(folder);
+}
+
+}  // namespace
+
+PendingFolder::PendingFolder(fs::path target) : target_(without_end(std::move(target))) {
+  std::error_code code;
+  if (fs::equivalent(target_, ".", code))
+    throw InputError(
+        fmt::format("{}: is the folder that this is run in and cannot be replaced; name "
+                    "one with -o",
+                    target_.string()));
+  place_ = behind_links(target_);
+  const fs::path parent = place_.has_parent_path() ? place_.parent_path() : fs::path(".");
   if (!fs::is_directory(parent, code))
     throw InputError(fmt::format("{}: cannot be made, the folder {} does not exist",
                                  target_.string(), parent.string()));
   if (::access(parent.c_str(), W_OK) != 0)
     throw InputError(fmt::format("{}: cannot be made, the folder {} does not allow it",
                                  target_.string(), parent.string()));
-  temporary_ = data::pending_neighbour(target_);
+  temporary_ = data::pending_neighbour(place_);
   if (!fs::create_directory(temporary_, code)) {
     data::discard_pending(temporary_);
     throw InputError(fmt::format("{}: cannot be made: {}", target_.string(),
@@ -42,7 +68,7 @@ std::string PendingFolder::with_own_name(std::string message) const {
 }
 
 void PendingFolder::commit() {
-  if (const std::error_code code = data::rename_pending(temporary_, target_))
+  if (const std::error_code code = data::rename_pending(temporary_, place_))
     throw InputError(fmt::format("{}: cannot be written: {}", target_.string(), code.message()));
   temporary_.clear();
 }

@@ -7,7 +7,8 @@
 namespace trochoid::tools {
 
 /// A folder beside `target` that becomes `target` on commit() and vanishes otherwise, by Ctrl-C
-/// too, so that a command leaves all files of a folder or none. An existing folder is replaced.
+/// too, so that a command leaves all files of a folder or none. An existing folder is replaced; of
+/// a link, the folder it leads to.
 class PendingFolder {
  public:
   /// @throws InputError if the target cannot be written.
@@ -29,7 +30,8 @@ class PendingFolder {
 
  private:
   [[nodiscard]] std::string with_own_name(std::string message) const;
-  std::filesystem::path target_, temporary_;
+  std::filesystem::path target_;  ///< as it was named
+  std::filesystem::path place_, temporary_;
 };
 
 }  // namespace trochoid::tools
