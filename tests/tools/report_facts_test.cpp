@@ -92,5 +92,17 @@ TEST(Report, AFitFromWhosePathMostPositionsLieFarIsOfAnotherTrack) {
   EXPECT_THAT(verdict.sentence, testing::StartsWith("17 of 20 positions lie far off the path"));
 }
 
+// Another body's positions, of which the fit knows nothing, do not make up for it.
+TEST(Report, AFitOfOneOfSeveralBodiesIsJudgedByThatOne) {
+  ReportInput input = sliding_puck();
+  data::Track other = input.tracks.tracks.front();
+  other.object = 1;
+  for (data::TrackSample& sample : input.tracks.tracks.front().samples) sample.centre_m.y() += 0.1;
+  input.tracks.tracks.push_back(other);
+  const Verdict verdict = judge(gather(input));
+  EXPECT_EQ(verdict.grade, "bad");
+  EXPECT_THAT(verdict.sentence, testing::StartsWith("20 of 20 positions lie far off the path"));
+}
+
 }  // namespace
 }  // namespace trochoid::tools

@@ -109,9 +109,9 @@ std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& input
                                      std::vector<std::string>& remarks,
                                      std::vector<std::string>& cameras) {
   std::vector<data::Track> tracks;
-  std::set<int> objects;
   for (const std::string& path : command.tracks) {
     const data::TrackFile file = data::read_track(path);
+    std::set<int> objects;
     for (const data::Track& track : file.tracks) objects.insert(track.object);
     for (const std::string& line : file.notes) remarks.push_back(path + ": " + line);
     if (const std::string camera = camera_file_of(file); !camera.empty())
@@ -122,16 +122,16 @@ std::vector<data::Track> read_tracks(const FitCommand& command, Checksums& input
     add_track(inputs, path);
     add_recording(inputs, file.source, file.source_sha256, path);
     check_not_recording(command.output, path, file.source);
+    const std::size_t before = tracks.size();
     for (const data::Track& track : file.tracks)
       if (!command.object || track.object == *command.object) {
         tell_odd_units(path, track);
         tracks.push_back(track);
       }
+    if (tracks.size() == before)
+      throw InputError(fmt::format("--object {}: no such number in {}, only {}",
+                                   command.object.value_or(0), path, fmt::join(objects, ", ")));
   }
-  if (tracks.empty())
-    throw InputError(fmt::format("--object {}: no such number in {}, only {}",
-                                 command.object.value_or(0), fmt::join(command.tracks, " and "),
-                                 fmt::join(objects, ", ")));
   return tracks;
 }
 

@@ -143,8 +143,10 @@ struct Wanted {
 Wanted wanted(const SimulateOptions& options) {
   Wanted wanted;
   if (!options.fit.empty()) wanted.fit = data::read_fit(options.fit);
-  wanted.scene =
-      wanted.fit ? fitted_scene(*wanted.fit, options.arc.value_or(0)) : load_scene(options.scene);
+  wanted.scene = wanted.fit
+                     ? in_scene(options.fit.string(),
+                                [&] { return fitted_scene(*wanted.fit, options.arc.value_or(0)); })
+                     : load_scene(options.scene);
   apply_overrides(options, wanted.scene);
   return wanted;
 }
@@ -229,8 +231,9 @@ void run(const SimulateOptions& options) {
         "simulate: name either a scene with --scene FILE or --scene NAME (--list shows names), or "
         "a fit with --fit FILE");
   if (options.steady) {
+    const data::Scene scene = wanted(options).scene;
     return in_scene(options.fit.empty() ? options.scene : options.fit.string(),
-                    [&] { print_steady(wanted(options).scene, options.json); });
+                    [&] { print_steady(scene, options.json); });
   }
   simulate_scene(options);
 }

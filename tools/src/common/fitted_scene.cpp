@@ -125,8 +125,8 @@ data::Scene scene_of(const data::Fit& fit, const std::string& name) {
 
 data::Scene fitted_scene(const data::Fit& fit, std::size_t arc) {
   if (arc >= fit.arcs.size())
-    throw InputError(
-        fmt::format("the fit has {} arcs, counted from 0: no arc {}", fit.arcs.size(), arc));
+    throw InputError(fmt::format("the fit has {} arc{}, counted from 0: no arc {}", fit.arcs.size(),
+                                 fit.arcs.size() == 1 ? "" : "s", arc));
   data::Scene scene = scene_of(fit);
   scene.start = {};
   for (const auto& [name, field] : kStart)

@@ -7,6 +7,7 @@
 
 #include "common/constants.hpp"
 #include "common/fitted_scene.hpp"
+#include "common/provenance.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -142,11 +143,11 @@ void put_where_seen(PredictedArc& arc, const data::Track& track) {
 
 }  // namespace
 
-const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& file,
+const data::Track* track_of_arc(const data::Fit& fit, std::size_t arc, const data::TrackFile& file,
                                 int first_track) {
-  const int place = arc.track - first_track;
-  if (place < 0 || place >= static_cast<int>(file.tracks.size())) return nullptr;
-  const data::Track* track = track_of(file, arc.object);
+  const int place = fit.arcs[arc].track - first_track;
+  if (place < 0 || place >= tracks_fitted(fit, file)) return nullptr;
+  const data::Track* track = track_of(file, fit.arcs[arc].object);
   return track == nullptr || track->samples.empty() ? nullptr : track;
 }
 
@@ -154,7 +155,7 @@ PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int tr
   const data::Scene scene = scene_of(fit);
   PredictedPath path{.model = fit.model, .arcs = {}};
   for (std::size_t i = 0; i < fit.arcs.size(); ++i)
-    if (const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index)) {
+    if (const data::Track* track = track_of_arc(fit, i, tracks, track_index)) {
       path.arcs.push_back(replay_arc(path.model, fit, scene, *track, i));
       if (path.angles_alone()) put_where_seen(path.arcs.back(), *track);
     }
@@ -169,7 +170,7 @@ PredictedPath replay(const data::Fit& fit, const data::TrackFile& tracks, int tr
 std::optional<Eigen::VectorXd> replay_first_arc(const data::Fit& fit, const data::TrackFile& tracks,
                                                 int track_index, double tolerance) {
   for (std::size_t i = 0; i < fit.arcs.size(); ++i) {
-    const data::Track* track = track_of_arc(fit.arcs[i], tracks, track_index);
+    const data::Track* track = track_of_arc(fit, i, tracks, track_index);
     if (track == nullptr) continue;
     const std::vector<double> grid = grid_of(*track, fit.arcs[i]);
     model::PredictRequest request;

@@ -37,9 +37,10 @@ struct PredictedPath {
 };
 
 /// The track of a file that an arc of a fit was made from; null: of another recording.
+/// @param arc  place in Fit::arcs
 /// @param first_track  which of the fitted tracks is the file's first
-[[nodiscard]] const data::Track* track_of_arc(const data::FitArc& arc, const data::TrackFile& file,
-                                              int first_track);
+[[nodiscard]] const data::Track* track_of_arc(const data::Fit& fit, std::size_t arc,
+                                              const data::TrackFile& file, int first_track);
 
 /// Replays a fit: rebuilds its model from the scene stored in it and runs it with the fitted
 /// values.

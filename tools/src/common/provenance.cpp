@@ -57,18 +57,32 @@ void check_made_from(const data::Fit& fit, const fs::path& fit_path, const fs::p
                                  fit_path.string(), track_path.string()));
 }
 
+int tracks_fitted(const data::Fit& fit, const data::TrackFile& file) {
+  const auto is_fitted = [&](const data::Track& track) {
+    return std::any_of(fit.arcs.begin(), fit.arcs.end(),
+                       [&](const data::FitArc& arc) { return arc.object == track.object; });
+  };
+  const auto fitted = std::count_if(file.tracks.begin(), file.tracks.end(), is_fitted);
+  // The only body of another tool's file may have any number.
+  return fitted == 0 ? static_cast<int>(file.tracks.size()) : static_cast<int>(fitted);
+}
+
 int place_in_fit(const data::Fit& fit, const std::string& fit_name, const data::TrackFile& file,
                  std::optional<int> asked) {
-  if (asked) return *asked;
   int fitted = 0;
   for (const data::FitArc& arc : fit.arcs) fitted = std::max(fitted, arc.track + 1);
-  const int others = fitted - static_cast<int>(file.tracks.size());
-  if (others > 0)
+  const int others = std::max(0, fitted - tracks_fitted(fit, file));
+  const std::string count = fmt::format("{} track{}", fitted, fitted == 1 ? "" : "s");
+  if (fitted > 0 && asked && (*asked < 0 || *asked > others))
+    throw InputError(fmt::format(
+        "{}: is of {}, counted from 0: --fit-track (fit_track) = {} is none that this may be",
+        fit_name, count, *asked));
+  if (!asked && others > 0)
     throw InputError(
-        fmt::format("{}: is of {} tracks; --fit-track (fit_track) must say which of them this is, "
+        fmt::format("{}: is of {}; --fit-track (fit_track) must say which of them this is, "
                     "from 0 to {}",
-                    fit_name, fitted, others));
-  return 0;
+                    fit_name, count, others));
+  return asked.value_or(0);
 }
 
 }  // namespace trochoid::tools

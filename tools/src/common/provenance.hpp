@@ -33,9 +33,13 @@ void add_recording(Checksums& checksums, const std::string& source, const std::s
 void check_made_from(const data::Fit& fit, const std::filesystem::path& fit_path,
                      const std::filesystem::path& track_path);
 
+/// How many tracks of a file a fit of it counts: all, or the one body that --object picked.
+[[nodiscard]] int tracks_fitted(const data::Fit& fit, const data::TrackFile& file);
+
 /// Which of the tracks fitted together a track file is, from 0; the only one if there is no other.
 /// @param asked  what the user says.
-/// @throws InputError if the fit is of several files and nobody says.
+/// @throws InputError if the fit is of several files and nobody says, or it holds none of that
+/// place.
 [[nodiscard]] int place_in_fit(const data::Fit& fit, const std::string& fit_name,
                                const data::TrackFile& file, std::optional<int> asked);
 

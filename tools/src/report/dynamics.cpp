@@ -79,7 +79,7 @@ std::vector<DynamicsChart> dynamics_of(const ReportInput& input, const data::Tra
   const data::Scene given = scene_of(fit);
   const bool mass_known = given.body && given.body->mass_kg;
   for (std::size_t arc = 0; arc < fit.arcs.size(); ++arc) {
-    if (track_of_arc(fit.arcs[arc], input.tracks, input.fit_track) != &track) continue;
+    if (track_of_arc(fit, arc, input.tracks, input.fit_track) != &track) continue;
     data::Scene scene;
     const auto table = run_arc(fit, arc, scene);
     if (!table) continue;

@@ -30,6 +30,7 @@ void measure_residuals(ReportFacts& facts) {
   int count = 0, with_sigma = 0;
   for (const auto& list : facts.residuals)
     for (const Residual& residual : list) {
+      ++facts.compared;
       if (lies_far_off(residual, facts)) {
         ++facts.far_off;
         continue;

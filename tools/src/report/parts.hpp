@@ -23,7 +23,8 @@ struct ReportFacts {
   int missing = 0;   ///< frames in those gaps
   int doubtful = 0;  ///< samples of low quality
   double first_s = 0.0, last_s = 0.0;
-  int far_off = 0;          ///< positions that an accepted fit gave up, in neither rms
+  int compared = 0;         ///< positions that were predicted
+  int far_off = 0;          ///< those of them that an accepted fit gave up, in neither rms
   double rms_axis_m = 0.0;  ///< residual per axis
   double rms_axis_sigma =
       0.0;  ///< the same in sigmas of the track (before rescaling); NaN if unknown

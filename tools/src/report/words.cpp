@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/provenance.hpp"
 #include "report/parts.hpp"
 
 namespace trochoid::tools {
@@ -27,7 +28,7 @@ std::string tracked_words(const ReportFacts& facts) {
 // The same of what a fit was made from, which may be some bodies, arcs or a stretch of the track.
 std::string fitted_words(const ReportFacts& facts, const data::Fit& fit) {
   const int first = facts.input.fit_track;
-  const int end = first + static_cast<int>(facts.input.tracks.tracks.size());
+  const int end = first + tracks_fitted(fit, facts.input.tracks);
   std::set<int> bodies;
   int samples = 0;
   double from_s = facts.last_s, to_s = facts.first_s;
@@ -67,12 +68,12 @@ Verdict judge_fit(const ReportFacts& facts, const data::Fit& fit) {
             {}};
   }
   constexpr double kMostly = 0.5;
-  if (facts.far_off > kMostly * facts.samples)
+  if (facts.far_off > kMostly * facts.compared)
     return {"bad",
             "not of this track",
             fmt::format("{} of {} positions lie far off the path that the model “{}” was fitted "
                         "to: the fit is of another body or recording (--fit-track, --object).",
-                        facts.far_off, facts.samples, fit.model),
+                        facts.far_off, facts.compared, fit.model),
             {}};
   const bool followed = fit.verdict == data::FitVerdict::doubtful;
   const bool correlated = fit.verdict == data::FitVerdict::good_correlated;
