@@ -81,6 +81,9 @@ class OverlayPainter {
   [[nodiscard]] cv::Mat paint(const tracking::Frame& frame, double t_s);
 
  private:
+  [[nodiscard]] int line_px() const { return 2 * static_cast<int>(std::lround(1.3 * text_px_)); }
+  [[nodiscard]] double margin_px() const { return 1.2 * text_px_; }
+  [[nodiscard]] std::string header_words(std::int64_t frame, double t_s) const;
   void draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const;
   void draw_predicted(cv::Mat& picture, const ObjectPaths& paths, double t_s) const;
   void draw_past(cv::Mat& picture, double t_s);
@@ -92,7 +95,7 @@ class OverlayPainter {
   const OverlayContent& content_;
   Enlargement view_;
   double text_px_, slowed_, trail_s_;
-  int header_px_, height_px_;
+  int header_px_, height_px_;  ///< the header has one line, or two where one has no room for all
   ResidualStrip strip_;
   Ink whole_prediction_, past_points_;
   std::vector<std::size_t> drawn_;  ///< observed points in past_points_, per object
@@ -105,12 +108,15 @@ OverlayPainter::OverlayPainter(const OverlayContent& content, const tracking::Vi
       text_px_(text_size_px(view_.size().width)),
       slowed_(slowed),
       trail_s_(kTrailFrames / std::max(1.0, info.frame_rate_hz)),
-      header_px_(2 * static_cast<int>(std::lround(1.3 * text_px_))),
+      header_px_(line_px()),
       height_px_(0),
       strip_(content, content.first_s(), content.last_s(), view_.size().width, text_px_),
       whole_prediction_(view_.size()),
       past_points_(view_.size()),
       drawn_(content.objects().size(), 0) {
+  if (!legend_fits_beside(header_words(info.frames, content.last_s()), content,
+                          view_.size().width - 2.0 * margin_px(), text_px_))
+    header_px_ = 2 * line_px();
   height_px_ = header_px_ + view_.size().height + strip_.height_px();
   for (const ObjectPaths& paths : content_.objects())
     for (const PredictedLine& line : paths.predicted)
@@ -135,12 +141,16 @@ cv::Mat OverlayPainter::paint(const tracking::Frame& frame, double t_s) {
   return page;
 }
 
-void OverlayPainter::draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const {
-  const double base = 0.5 * band.rows + 0.5 * text_px_;
-  std::string words = fmt::format("t = {:.4f} s   frame {}", t_s, frame.index);
+std::string OverlayPainter::header_words(std::int64_t frame, double t_s) const {
+  std::string words = fmt::format("t = {:.4f} s   frame {}", t_s, frame);
   if (slowed_ > 1.001) words += fmt::format("   {:.3g} x slower", slowed_);
-  draw_text(band, words, {1.2 * text_px_, base}, text_px_, palette::white);
-  draw_legend(band, content_, {band.cols - 1.2 * text_px_, base}, text_px_);
+  return words;
+}
+
+void OverlayPainter::draw_header(cv::Mat band, const tracking::Frame& frame, double t_s) const {
+  const double base = 0.5 * line_px() + 0.5 * text_px_;
+  draw_text(band, header_words(frame.index, t_s), {margin_px(), base}, text_px_, palette::white);
+  draw_legend(band, content_, {band.cols - margin_px(), base + band.rows - line_px()}, text_px_);
 }
 
 // The predicted path of the last moments, brighter towards now.

@@ -76,8 +76,8 @@ void draw_scale_bar(cv::Mat picture, std::optional<double> scale_px_per_m, doubl
       {left + 0.5 * length_px, base - 0.9 * text_px}, text_px, palette::white, Align::centre);
 }
 
-void draw_legend(cv::Mat picture, const OverlayContent& content, const cv::Point2d& right,
-                 double text_px) {
+double draw_legend(cv::Mat picture, const OverlayContent& content, const cv::Point2d& right,
+                   double text_px) {
   const double middle = right.y - 0.45 * text_px;
   double x = right.x;
   const auto words = [&](const std::string& text) {
@@ -98,6 +98,14 @@ void draw_legend(cv::Mat picture, const OverlayContent& content, const cv::Point
   for (const double at : {0.4, 1.3, 2.2})
     ink.dot({x - at * text_px, middle}, 0.28 * text_px, dots, 1.0 - 0.3 * at);
   ink.lay_on(picture, dots);
+  return x - 2.6 * text_px;
+}
+
+bool legend_fits_beside(const std::string& words, const OverlayContent& content, double width_px,
+                        double text_px) {
+  cv::Mat scratch(1, 1, CV_8UC3);
+  const double legend_px = -draw_legend(scratch, content, {0.0, 0.0}, text_px);
+  return text_width_px(words, text_px) + text_px + legend_px <= width_px;
 }
 
 std::vector<Eigen::Vector2d> thinned(const std::vector<Eigen::Vector2d>& points,

@@ -33,8 +33,12 @@ void draw_scale_bar(cv::Mat picture, std::optional<double> scale_px_per_m, doubl
                     double text_px);
 
 /// Key to dots, line and wireframe, right-aligned so that it ends at `right`.
-void draw_legend(cv::Mat picture, const OverlayContent& content, const cv::Point2d& right,
-                 double text_px);
+/// @returns where it begins, x [px].
+double draw_legend(cv::Mat picture, const OverlayContent& content, const cv::Point2d& right,
+                   double text_px);
+/// Whether words and the key have room beside each other.
+[[nodiscard]] bool legend_fits_beside(const std::string& words, const OverlayContent& content,
+                                      double width_px, double text_px);
 
 /// Points at least `spacing_px` apart (the last one kept), NaN points removed: what a screen can
 /// show.

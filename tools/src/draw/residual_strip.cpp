@@ -33,7 +33,27 @@ double limit_mm(const std::vector<Residual>& list) {
   return limit > 0.0 ? limit : 1.0;
 }
 
+constexpr double kCaption = 2.4;           // of a row [heights of a capital]
+constexpr double kKey = 3.4, kKeyY = 1.6;  // from the left ends of "x" and "y" to the bands' words
+
 }  // namespace
+
+double RowCaption::width_px(double text_px) const {
+  return text_width_px(words, text_px) + (1.0 + kKey) * text_px + text_width_px(bands, text_px);
+}
+
+RowCaption row_caption(const std::string& name, double rms_mm, double width_px, double text_px) {
+  const auto tried = [&](int brevity, const std::string& rms) {
+    const std::string words = brevity == 4 ? name + "[mm]"
+                              : brevity % 2 == 0
+                                  ? name + "observed - predicted [mm]   rms per axis " + rms
+                                  : name + "residual [mm], rms " + rms;
+    return RowCaption{words, brevity < 2 ? "bands: 1, 2 sigma" : ""};
+  };
+  int brevity = 0;  // by the longest number, so that all rows say the same
+  while (brevity < 4 && tried(brevity, "8.88e-88").width_px(text_px) > width_px) ++brevity;
+  return tried(brevity, fmt::format("{:.3g}", rms_mm));
+}
 
 ResidualStrip::ResidualStrip(const OverlayContent& content, double from_s, double to_s,
                              int width_px, double text_px)
@@ -43,15 +63,17 @@ ResidualStrip::ResidualStrip(const OverlayContent& content, double from_s, doubl
     if (!paths.residuals.empty()) with_residuals.push_back(&paths);
   const double row_px = with_residuals.empty() ? 2.0 * text_px : 8.0 * text_px;
   const std::size_t rows = std::max<std::size_t>(1, with_residuals.size());
+  const double pitch_px = row_px + kCaption * text_px;
   left_px_ = 6.5 * text_px;
   right_px_ = width_px - 1.2 * text_px;
   plot_top_px_ = (with_residuals.empty() ? 0.8 : 2.6) * text_px;
-  plot_bottom_px_ = plot_top_px_ + static_cast<double>(rows) * (row_px + 0.8 * text_px);
+  plot_bottom_px_ =
+      plot_top_px_ + static_cast<double>(rows - 1) * pitch_px + row_px + 0.8 * text_px;
   const int height = static_cast<int>(plot_bottom_px_ + 2.4 * text_px);
   picture_ = cv::Mat(height + height % 2, width_px, CV_8UC3, kPaper);
   for (std::size_t i = 0; i < with_residuals.size(); ++i) {
     Row row{};
-    row.top_px = plot_top_px_ + static_cast<double>(i) * (row_px + 0.8 * text_px);
+    row.top_px = plot_top_px_ + static_cast<double>(i) * pitch_px;
     row.bottom_px = row.top_px + row_px;
     row.limit_mm = limit_mm(with_residuals[i]->residuals);
     const std::string name =
@@ -106,7 +128,7 @@ void ResidualStrip::draw_bands(const ObjectPaths& paths, const Row& row) {
 void ResidualStrip::draw_row(const ObjectPaths& paths, const Row& row, const std::string& name) {
   draw_bands(paths, row);
   const auto pixel = [](double value) { return static_cast<int>(std::lround(value)); };
-  const double step_mm = round_step(2.0 * row.limit_mm, 4);
+  const double step_mm = round_length(row.limit_mm);  // three numbers at least
   for (int k = -static_cast<int>(row.limit_mm / step_mm); k * step_mm <= row.limit_mm; ++k) {
     const double y = y_of(row, k * step_mm);
     cv::line(picture_, {pixel(left_px_) - 3, pixel(y)},
@@ -134,15 +156,13 @@ void ResidualStrip::draw_row(const ObjectPaths& paths, const Row& row, const std
     ink.lay_on(picture_, stroke);
   }
   const double base = row.top_px - 0.5 * text_px_;
-  const std::string bands = "bands: 1, 2 sigma";
-  const double words_left = right_px_ - text_width_px(bands, text_px_);
-  draw_text(picture_,
-            fmt::format("{}observed - predicted [mm]   rms per axis {:.3g}", name,
-                        rms_m(paths.residuals) * kMmPerM),
-            {left_px_, base}, text_px_, kWords);
-  draw_text(picture_, "x", {words_left - 3.4 * text_px_, base}, text_px_, palette::residual_x);
-  draw_text(picture_, "y", {words_left - 1.6 * text_px_, base}, text_px_, palette::residual_y);
-  draw_text(picture_, bands, {right_px_, base}, text_px_, kWords, Align::right);
+  const RowCaption caption =
+      row_caption(name, rms_m(paths.residuals) * kMmPerM, right_px_ - left_px_, text_px_);
+  const double words_left = right_px_ - text_width_px(caption.bands, text_px_);
+  draw_text(picture_, caption.words, {left_px_, base}, text_px_, kWords);
+  draw_text(picture_, "x", {words_left - kKey * text_px_, base}, text_px_, palette::residual_x);
+  draw_text(picture_, "y", {words_left - kKeyY * text_px_, base}, text_px_, palette::residual_y);
+  draw_text(picture_, caption.bands, {right_px_, base}, text_px_, kWords, Align::right);
 }
 
 void ResidualStrip::draw_gaps(const ObjectPaths& paths, double top_px, double bottom_px) {
@@ -169,8 +189,10 @@ void ResidualStrip::draw_time_axis(double top_px) {
        ++k) {
     const double x = x_of(k * step_s);
     cv::line(picture_, {pixel(x), pixel(top_px)}, {pixel(x), pixel(top_px) + 3}, kAxis);
-    draw_text(picture_, fmt::format("{:.{}f}", k * step_s, decimals_of_step(step_s)),
-              {x, top_px + 1.7 * text_px_}, 0.85 * text_px_, kWords, Align::centre);
+    const std::string words = fmt::format("{:.{}f}", k * step_s, decimals_of_step(step_s));
+    const double half_px = 0.5 * text_width_px(words, 0.85 * text_px_) + 1.0;
+    draw_text(picture_, words, {std::min(x, picture_.cols - half_px), top_px + 1.7 * text_px_},
+              0.85 * text_px_, kWords, Align::centre);
   }
   draw_text(picture_, "t [s]", {1.2 * text_px_, top_px + 1.7 * text_px_}, 0.85 * text_px_, kWords);
 }

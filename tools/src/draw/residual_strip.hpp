@@ -1,9 +1,21 @@
 #pragma once
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "draw/overlay_content.hpp"
 
 namespace trochoid::tools {
+
+/// What stands above a row: words at its left end, and at its right one "x y" with the meaning of
+/// the bands; the shorter, the narrower the row.
+struct RowCaption {
+  std::string words, bands;
+  /// With x and y, and a gap before them.
+  [[nodiscard]] double width_px(double text_px) const;
+};
+/// @param name  what the row is of, in front of the words.
+[[nodiscard]] RowCaption row_caption(const std::string& name, double rms_mm, double width_px,
+                                     double text_px);
 
 /// Residuals (observed minus predicted) against time, x and y of every object, with bands of one
 /// and two sigma and the frames without a detection hatched; without a fit only the hatched time

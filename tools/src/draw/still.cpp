@@ -151,14 +151,18 @@ void write_still(const OverlayInput& input, const OverlayOptions& options,
   draw_paths(picture, content, view);
   name_ends(picture, content, view, text_px);
   draw_scale_bar(picture, content.scale_px_per_m(), view.factor, text_px);
-  const int lines = 1 + static_cast<int>(content.objects().size());
+  const std::string name = input.video.filename().string();
+  const bool beside =
+      legend_fits_beside(name, content, picture.cols - 2.0 * 1.2 * text_px, text_px);
+  const int lines = (beside ? 1 : 2) + static_cast<int>(content.objects().size());
   const int caption = static_cast<int>(2.0 * text_px * lines + text_px);
   cv::Mat page(picture.rows + caption + (picture.rows + caption) % 2, picture.cols, CV_8UC3,
                cv::Scalar(34, 34, 34));
   picture.copyTo(page.rowRange(0, picture.rows));
   double base = picture.rows + 1.9 * text_px;
+  draw_text(page, name, {1.2 * text_px, base}, text_px, palette::white);
+  if (!beside) base += 2.0 * text_px;
   draw_legend(page, content, {page.cols - 1.2 * text_px, base}, text_px);
-  draw_text(page, input.video.filename().string(), {1.2 * text_px, base}, text_px, palette::white);
   for (const ObjectPaths& paths : content.objects()) {
     if (paths.observed.empty()) continue;
     base += 2.0 * text_px;
