@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 
 #include "common/child_process.hpp"
+#include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 
@@ -49,6 +51,24 @@ std::string terminal(const std::filesystem::path& path, const std::vector<Axes>&
   return fmt::format("pngcairo size {},{} font 'sans,11'", width, height);
 }
 
+/// Least and largest value of all series; of NaN alone, the other way round.
+Eigen::Vector2d extent(const Axes& axes, Eigen::VectorXd Series::*values) {
+  Eigen::Vector2d range(INFINITY, -INFINITY);
+  for (const Series& series : axes.series)
+    for (const double value : series.*values)
+      if (std::isfinite(value)) range = {std::min(range.x(), value), std::max(range.y(), value)};
+  return range;
+}
+
+/// With equal units a path that hardly has a width would leave its numbers no room.
+std::string range_of(const Eigen::Vector2d& its, const Eigen::Vector2d& other) {
+  constexpr double kLeast = 0.25;
+  const double width = its.y() - its.x(), least = kLeast * (other.y() - other.x());
+  if (!(width < least)) return "[*:*]";
+  const double middle = 0.5 * (its.x() + its.y());
+  return fmt::format("[{}:{}]", middle - 0.5 * least, middle + 0.5 * least);
+}
+
 void add_settings(const Axes& axes, std::back_insert_iterator<std::string> out) {
   fmt::format_to(out,
                  "set title {} noenhanced\nset xlabel {} noenhanced\nset ylabel {} noenhanced\n",
@@ -60,10 +80,14 @@ void add_settings(const Axes& axes, std::back_insert_iterator<std::string> out) 
   // One legend entry says nothing that the title does not.
   fmt::format_to(out, "set size {}\nset key {}\n", axes.equal ? "ratio -1" : "noratio",
                  axes.series.size() > 1 ? "on" : "off");
-  if (axes.y_range)
-    fmt::format_to(out, "set yrange [{}:{}]\n", axes.y_range->x(), axes.y_range->y());
-  else
-    fmt::format_to(out, "set yrange [*:*]\n");
+  std::string x_range = "[*:*]", y_range = x_range;
+  if (axes.equal) {
+    const Eigen::Vector2d x = extent(axes, &Series::x), y = extent(axes, &Series::y);
+    x_range = range_of(x, y);
+    y_range = range_of(y, x);
+  }
+  if (axes.y_range) y_range = fmt::format("[{}:{}]", axes.y_range->x(), axes.y_range->y());
+  fmt::format_to(out, "set xrange {}\nset yrange {}\n", x_range, y_range);
 }
 
 void add_data(const Axes& axes, std::size_t panel, std::back_insert_iterator<std::string> out) {
@@ -115,6 +139,23 @@ std::string script(const std::vector<Axes>& panels, const std::filesystem::path&
 }
 
 }  // namespace
+
+Series with_gaps_at_turns(const Series& angle_rad) {
+  std::vector<double> x, y;
+  for (Eigen::Index i = 0; i < angle_rad.y.size(); ++i) {
+    if (i > 0 && std::abs(angle_rad.y[i] - angle_rad.y[i - 1]) > data::kPi) {
+      x.push_back(angle_rad.x[i]);
+      y.push_back(NAN);
+    }
+    x.push_back(angle_rad.x[i]);
+    y.push_back(angle_rad.y[i]);
+  }
+  const auto size = static_cast<Eigen::Index>(x.size());
+  Series series = angle_rad;
+  series.x = Eigen::Map<const Eigen::VectorXd>(x.data(), size);
+  series.y = Eigen::Map<const Eigen::VectorXd>(y.data(), size);
+  return series;
+}
 
 void check_plot_name(const std::filesystem::path& path) {
   if (path.extension() != ".svg" && path.extension() != ".png")

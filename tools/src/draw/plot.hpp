@@ -16,10 +16,14 @@ struct Series {
   int colour = -1;  ///< place in the palette; -1: the place in the list
 };
 
+/// The series of an angle within one turn, with a gap where it jumps from one end of the turn to
+/// the other: no line is drawn across.
+[[nodiscard]] Series with_gaps_at_turns(const Series& angle_rad);
+
 struct Axes {
   std::string title, x_label, y_label;
   bool log_x = false, log_y = false;
-  bool equal = false;  ///< the same length unit on both axes
+  bool equal = false;  ///< the same length unit on both axes; a path without width gets some room
   std::vector<Series> series;
   std::optional<Eigen::Vector2d> y_range{};  ///< lowest and highest y shown; all of it if absent
 };

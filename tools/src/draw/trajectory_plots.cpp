@@ -43,12 +43,21 @@ void write_one(const std::vector<Axes>& panels, const std::filesystem::path& pat
   written.push_back(path);
 }
 
+Series with_gaps_at_turns_of(const std::string& column, const Series& series) {
+  return column.ends_with("_wrapped_rad") ? with_gaps_at_turns(series) : series;
+}
+
+bool is_constant(const Eigen::VectorXd& values) {
+  return values.size() == 0 || values.isConstant(values[0], 1e-12);
+}
+
 void over_time(const data::Table& table, const PlotRecipe& recipe, const std::string& title,
                const std::filesystem::path& folder, std::vector<std::filesystem::path>& written) {
   Axes axes{.title = title, .x_label = "t [s]", .y_label = recipe.y_label, .series = {}};
   for (const auto& [column, label] : recipe.columns)
     if (table.has(column))
-      axes.series.push_back({.label = label, .x = table.column("t_s"), .y = table.column(column)});
+      axes.series.push_back(with_gaps_at_turns_of(
+          column, {.label = label, .x = table.column("t_s"), .y = table.column(column)}));
   if (!axes.series.empty())
     write_one({axes}, folder / (std::string(recipe.file) + ".svg"), written);
 }
@@ -58,7 +67,8 @@ void projection(const data::Table& table, const char* x, const char* y, const ch
                 std::vector<std::filesystem::path>& written) {
   if (!table.has(x) || !table.has(y)) return;
   const Eigen::VectorXd across = table.column(x), up = table.column(y);
-  if (across.isZero(0.0) && up.isZero(0.0)) return;  // a free body has no path
+  if (is_constant(across) && is_constant(up)) return;  // of a free body, or on a pin
+  if (labels[1] == 'z' && is_constant(up)) return;     // what lies flat has no height to show
   Axes axes{.title = title,
             .x_label = std::string(1, labels[0]) + " [m]",
             .y_label = std::string(1, labels[1]) + " [m]",

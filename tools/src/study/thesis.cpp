@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -154,18 +153,6 @@ constexpr Quantity kSixPanels[] = {
     {"phi_rad", "phi [rad]", true}, {"dphi_rad_s", "dphi/dt [rad/s]"},
     {"psi_rad", "psi [rad]", true}, {"dpsi_rad_s", "dpsi/dt [rad/s]"}};
 
-/// Into (-pi, pi], with a gap where the angle jumps, so that no line is drawn across.
-Eigen::VectorXd wrapped(Eigen::VectorXd angle) {
-  double before = 0.0;
-  for (double& value : angle) {
-    value = data::wrapped(value);
-    const double now = value;
-    if (std::abs(now - before) > data::kPi) value = std::numeric_limits<double>::quiet_NaN();
-    before = now;
-  }
-  return angle;
-}
-
 Axes panel(const std::vector<Line>& lines, const Quantity& quantity, const std::string& title,
            double until_s) {
   constexpr double kRows = 300.0, kRate_hz = 7.5;  // as fine as the eye resolves
@@ -175,11 +162,15 @@ Axes panel(const std::vector<Line>& lines, const Quantity& quantity, const std::
     scene.run.until_s = until_s;
     scene.run.rate_hz = std::min(kRate_hz, kRows / until_s);
     const data::Table run = simulated(scene);
-    const Eigen::VectorXd values = run.column(quantity.column);
-    axes.series.push_back({.label = label,
-                           .x = run.column("t_s"),
-                           .y = quantity.wrapped ? wrapped(values) : values,
-                           .dashed = axes.series.size() % 2 == 1});
+    Series series{.label = label,
+                  .x = run.column("t_s"),
+                  .y = run.column(quantity.column),
+                  .dashed = axes.series.size() % 2 == 1};
+    if (quantity.wrapped) {
+      for (double& value : series.y) value = data::wrapped(value);
+      series = with_gaps_at_turns(series);
+    }
+    axes.series.push_back(std::move(series));
   }
   return axes;
 }
