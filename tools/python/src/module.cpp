@@ -14,6 +14,7 @@
 #include "common/provenance.hpp"
 #include "common/scene_library.hpp"
 #include "common/trajectory_table.hpp"
+#include "common/value_words.hpp"
 #include "interruptible.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
@@ -253,7 +254,9 @@ void add_fit_parts(py::module_& module) {
           "status", [](const FitParameter& p) { return name(p.status); },
           "free, fixed, derived or prior")
       .def("__repr__", [](const FitParameter& p) {
-        return py::str("{} = {:.8g} ± {:.2g} {}").format(p.name, p.value, p.sigma, p.unit);
+        const std::string unit = tools::unit_words(p.unit);
+        return py::str("{} = {:.8g} ± {:.2g}{}{}")
+            .format(p.name, p.value, p.sigma, unit.empty() ? "" : " ", unit);
       });
   py::class_<FitArc>(module, "Arc", "A stretch of a track that was fitted as one motion.")
       .def_readonly("track", &FitArc::track)

@@ -87,7 +87,7 @@ std::string spread_table(const std::vector<CampaignLine>& lines) {
       html += fmt::format("<tr><td>{}<td>{}<td>{}<td>{:.6g}<td>{:.2g}<td>{:.2g}<td>{}</tr>\n",
                           escaped(model), escaped(name), spread.values.size(),
                           data::median(spread.values), half_width, data::median(spread.sigmas),
-                          escaped(spread.unit));
+                          escaped(unit_words(spread.unit)));
     }
   return html + "</table>\n";
 }

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include <set>
 
 #include "commands.hpp"
+#include "common/comparison_table.hpp"
 #include "common/fit_job.hpp"
 #include "common/odd_units.hpp"
 #include "common/outputs.hpp"
@@ -46,23 +46,6 @@ void print_notes(const data::Fit& fit) {
     fmt::print("  note: {}\n", broken.words);
 }
 
-void print_comparison(const std::vector<data::ModelScore>& models) {
-  if (models.empty()) return;
-  fmt::print("  {:>10}{:>12}{:>12}{:>12}   model\n", "AICc", "BIC", "held back", "parameters");
-  for (const data::ModelScore& m : models) {
-    const std::string held_back = std::isnan(m.held_back_rms_sigma)
-                                      ? "-"
-                                      : fmt::format("{:.2f} sigma", m.held_back_rms_sigma);
-    if (std::isnan(m.bic))
-      fmt::print("  {:>10}{:>12}{:>12}{:>12}   {}: not fitted: {}\n", "-", "-", "-", "-", m.model,
-                 m.reason);
-    else
-      fmt::print("{} {:>10.2f}{:>12.2f}{:>12}{:>12}   {}{}\n", m.recommended ? "*" : " ", m.aicc,
-                 m.bic, held_back, m.parameters, m.model,
-                 m.reason.empty() ? "" : ": not accepted: " + m.reason);
-  }
-}
-
 void print(const data::Fit& fit) {
   fmt::print("model {}: {} ({}), start {}\n", fit.model, name(fit.outcome), fit.reason,
              fit.start_path);
@@ -70,8 +53,9 @@ void print(const data::Fit& fit) {
   if (fit.parameters.empty()) return print_notes(fit);
   if (fit.converged) fmt::print("  {}: {}\n", name(fit.verdict), fit.verdict_words);
   for (const data::FitParameter& p : fit.parameters)
-    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, value_words(p.value, p.sigma), p.unit,
-               word(p.status), p.identifiable ? "" : " not identifiable;", p.note);
+    fmt::print("  {:<26} {:>28} {:<8} {:<8}{} {}\n", p.name, value_words(p.value, p.sigma),
+               unit_words(p.unit), word(p.status), p.identifiable ? "" : " not identifiable;",
+               p.note);
   fmt::print("  chi2 {:.6g} for {} degrees of freedom, noise x {:.3g}, whiteness p {:.2g}\n",
              fit.chi2, fit.dof, fit.noise_scale, fit.whiteness_p);
   fmt::print("  rank {} of {}, integration error {:.1e} sigma\n", fit.rank,
@@ -82,7 +66,7 @@ void print(const data::Fit& fit) {
   for (const data::BootstrapSpread& b : fit.bootstrap.parameters)
     fmt::print("  bootstrap of {:<20} ± {:.2g}  95 % {:.6g} .. {:.6g}\n", b.parameter, b.sigma,
                b.lower_95, b.upper_95);
-  print_comparison(fit.comparison);
+  fmt::print("{}", comparison_table(fit.comparison));
   if (!fit.recommendation.empty()) fmt::print("  {}\n", fit.recommendation);
   print_notes(fit);
 }

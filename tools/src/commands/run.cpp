@@ -369,7 +369,7 @@ void tell(const Run& run, const Verdict& verdict, const RunOptions& options) {
       if (p.status != data::ParameterStatus::fixed && p.name.find('@') == std::string::npos)
         fmt::print("  {:<26} {} {}{}\n", p.name,
                    p.identifiable ? value_words(p.value, p.sigma) : "not seen by the data",
-                   p.identifiable ? p.unit : "",
+                   p.identifiable ? unit_words(p.unit) : "",
                    p.status == data::ParameterStatus::free      ? ""
                    : p.status == data::ParameterStatus::derived ? "   (derived)"
                                                                 : "   (from the prior)");

@@ -29,6 +29,10 @@ std::string value_words(double value, double sigma) {
   return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, sigma, decimals);
 }
 
+std::string unit_words(const std::string& unit) {
+  return unit == "1" ? "" : unit;
+}
+
 std::string short_number(double value) {
   return std::isfinite(value) ? fmt::format("{:.5g}", value) : "—";
 }

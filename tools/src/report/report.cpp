@@ -114,8 +114,7 @@ std::string parameter_section(const data::Fit& fit) {
           escaped(parameter.name), given || !parameter.identifiable ? "" : " strong",
           shown ? with_superscripts(value_words(parameter.value, parameter.sigma))
                 : fmt::format("{} ± ∞", short_number(parameter.value)),
-          parameter.unit == "1" ? "" : escaped(parameter.unit), status_words(parameter),
-          escaped(parameter.note));
+          escaped(unit_words(parameter.unit)), status_words(parameter), escaped(parameter.note));
     }
   html += "</tbody></table></div>";
   html += fmt::format(
