@@ -120,7 +120,7 @@ class Errors(unittest.TestCase):
     def test_a_wrong_kind_of_value_is_named_in_one_line(self):
         track, fit = noisy_track(), trochoid.fit
         wrong = [lambda: fit(track, TOP, model=None), lambda: fit(track, TOP, compare="yes"),
-                 lambda: fit(track, TOP, bootstrap=1.5), lambda: fit(track, TOP, threads=-1),
+                 lambda: fit(track, TOP, bootstrap=1.5), lambda: fit(track, TOP, bootstrap=10**9), lambda: fit(track, TOP, threads=-1),
                  lambda: fit(track, TOP, seed=None), lambda: fit(track, TOP, start={"l_m": "long"}),
                  lambda: fit(track, TOP, from_=[1.0]), lambda: fit(track, TOP, output=3),
                  lambda: fit(trochoid.Track(track.t_s, track.centre_m, object=None), TOP),
@@ -302,6 +302,19 @@ class Fit(unittest.TestCase):
         track = noisy_track()
         with self.assertRaisesRegex(trochoid.InputError, "is given twice"):
             trochoid.fit([track, trochoid.TrackFile([track])], model="top")
+
+    def test_a_name_that_is_no_utf_8_is_shown_as_far_as_it_can_be(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, os.fsdecode(b"r\xe9.csv"))
+            with open(path, "wb") as file:
+                file.write(b"# source: r\xe9.mp4\nt_s,x_m,y_m\n")
+                track = noisy_track()
+                np.savetxt(file, np.column_stack([track.t_s, track.centre_m]), delimiter=",")
+            self.assertEqual(trochoid.read_track(path).source, "r\ufffd.mp4")
+            self.assertEqual(set(trochoid.fit(path, model="top").inputs), {"r\ufffd.csv"})
+            for load in (trochoid.read_track, trochoid.Scene):
+                with self.assertRaisesRegex(trochoid.InputError, "no\ufffd.csv: "):
+                    load(os.path.join(folder, os.fsdecode(b"no\xe9.csv")))
 
     def test_samples_without_a_position_are_gaps_and_counted(self):
         track, seen = noisy_track(), noisy_track()

@@ -87,6 +87,13 @@ void leave_out_gaps(data::Track& track) {
 
 }  // namespace
 
+py::str text_of(const std::string& text) {
+  PyObject* decoded =
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace");
+  if (decoded == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(decoded);
+}
+
 py::array_t<double> array_of(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
   py::array_t<double> array({matrix.rows(), matrix.cols()});
   auto view = array.mutable_unchecked<2>();
@@ -181,12 +188,14 @@ py::dict dict_of(const data::TrackFile& file) {
   for (const data::Track& track : file.tracks) tracks.append(arrays_of(track));
   py::dict dict;
   dict["tracks"] = tracks;
-  dict["source"] = file.source;
+  dict["source"] = text_of(file.source);
   dict["source_sha256"] = file.source_sha256;
-  dict["camera"] = file.camera;
-  dict["made_by"] = file.made_by;
+  dict["camera"] = text_of(file.camera);
+  dict["made_by"] = text_of(file.made_by);
   dict["angles_folded"] = file.angles_folded;
-  dict["notes"] = file.notes;
+  py::list notes;
+  for (const std::string& note : file.notes) notes.append(text_of(note));
+  dict["notes"] = notes;
   return dict;
 }
 

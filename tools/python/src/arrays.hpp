@@ -2,11 +2,15 @@
 #include <pybind11/numpy.h>
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "trochoid/data/track.hpp"
 
 namespace trochoid::python {
+
+/// Names of files may be no UTF-8, which Python's texts are: what is none becomes U+FFFD.
+[[nodiscard]] pybind11::str text_of(const std::string& text);
 
 /// A matrix as a new C-ordered array of the same shape.
 [[nodiscard]] pybind11::array_t<double> array_of(const Eigen::Ref<const Eigen::MatrixXd>& matrix);

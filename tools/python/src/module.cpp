@@ -194,7 +194,7 @@ py::tuple track(const fs::path& video, const SceneValue& scene,
   summary["lost"] = s.lost;
   summary["doubtful"] = s.doubtful;
   summary["damaged"] = s.damaged;
-  summary["metres"] = s.camera_words;
+  summary["metres"] = text_of(s.camera_words);
   return py::make_tuple(dict_of(result.file), summary);
 }
 
@@ -355,8 +355,7 @@ void add_fit_values(py::module_& module) {
 void add_scene(py::module_& module) {
   py::class_<SceneValue>(module, "SceneValue")
       .def(py::init())
-      .def_static("load",
-                  [](const std::string& name) { return SceneValue{tools::load_scene(name)}; })
+      .def_static("load", [](const fs::path& name) { return SceneValue{tools::load_scene(name)}; })
       .def_static("parse",
                   [](const std::string& toml, const std::string& where) {
                     return SceneValue{data::parse_scene(toml, where)};
@@ -387,21 +386,59 @@ void add_scene(py::module_& module) {
   });
 }
 
+py::dict texts_of(const tools::Checksums& checksums) {
+  py::dict dict;
+  for (const auto& [name, digest] : checksums) dict[text_of(name)] = digest;
+  return dict;
+}
+
 /// Of the files behind a fit; what is handed in comes back with one more.
+// Kept for as long as the module is.
+PyObject *error_type = nullptr, *input_error_type = nullptr, *numerical_error_type = nullptr;
+
+/// pybind11 would leave a message that names a file in no UTF-8 empty.
+void raise(std::exception_ptr thrown) {
+  const auto set = [](PyObject* type, const std::exception& error) {
+    PyErr_SetObject(type, text_of(error.what()).ptr());
+  };
+  try {
+    std::rethrow_exception(std::move(thrown));
+  } catch (const InputError& error) {
+    set(input_error_type, error);
+  } catch (const NumericalError& error) {
+    set(numerical_error_type, error);
+  } catch (const Error& error) {
+    set(error_type, error);
+  }
+}
+
+void add_errors(py::module_& module) {
+  const auto added = [&](const char* name, const py::object& bases) {
+    const py::exception<Error> type(module, name, bases);
+    return type.inc_ref().ptr();
+  };
+  error_type = added("Error", py::reinterpret_borrow<py::object>(PyExc_Exception));
+  const py::handle base(error_type);
+  input_error_type = added("InputError", py::make_tuple(base, py::handle(PyExc_ValueError)));
+  numerical_error_type =
+      added("NumericalError", py::make_tuple(base, py::handle(PyExc_ArithmeticError)));
+  py::register_exception_translator(&raise);
+}
+
 void add_provenance(py::module_& module) {
   using tools::Checksums;
   module.def("with_scene", [](Checksums known, const fs::path& named, const SceneValue& scene) {
     tools::add_scene(known, named, scene.scene);
-    return known;
+    return texts_of(known);
   });
   module.def("with_track", [](Checksums known, const fs::path& file) {
     tools::add_track(known, file);
-    return known;
+    return texts_of(known);
   });
   module.def("with_recording", [](Checksums known, const std::string& source,
-                                  const std::string& sha256, const std::string& track) {
-    tools::add_recording(known, source, sha256, track);
-    return known;
+                                  const std::string& sha256, const fs::path& track) {
+    tools::add_recording(known, source, sha256, track.string());
+    return texts_of(known);
   });
   module.def("check_made_from", &tools::check_made_from);
 }
@@ -411,11 +448,7 @@ void add_provenance(py::module_& module) {
 PYBIND11_MODULE(_core, module) {
   tools::set_talk(tools::Talk::quiet);
   fitting::silence_solver_log();
-  const auto base = py::register_exception<Error>(module, "Error");
-  py::register_exception<InputError>(module, "InputError",
-                                     py::make_tuple(base, py::handle(PyExc_ValueError)));
-  py::register_exception<NumericalError>(module, "NumericalError",
-                                         py::make_tuple(base, py::handle(PyExc_ArithmeticError)));
+  add_errors(module);
   module.attr("__version__") = TROCHOID_VERSION;
   add_scene(module);
   add_fit_values(module);

@@ -531,7 +531,7 @@ def fit(tracks: Tracks, scene: Union[None, Path, Mapping, Scene] = None, *, mode
                    for name, value in (start or {}).items()}
     options = {"model": _text("model", model), "from": _moment("from_", from_),
                "to": _moment("to", to), "free_pivot": _flag("free_pivot", free_pivot),
-               "profile": _flag("profile", profile), "bootstrap": _whole("bootstrap", bootstrap),
+               "profile": _flag("profile", profile), "bootstrap": _whole("bootstrap", bootstrap, most=100000),
                "threads": _whole("threads", threads), "seed": _whole("seed", seed, most=2**64 - 1),
                "start": first_guess}
     one = isinstance(tracks, (str, Track, TrackFile, Trajectory)) or not isinstance(tracks, Sequence)
