@@ -211,11 +211,11 @@ std::vector<CampaignLine> collect(const Campaign& campaign) {
   std::vector<CampaignLine> lines;
   for (const CampaignItem& item : campaign.items) {
     CampaignLine line;
-    line.record.name = item.name;
     if (auto record = current_record(campaign, item)) {
       line.record = std::move(*record);
       line.known = true;
     }
+    line.record.name = item.name;  // as its folder has it, be it UTF-8 or not
     if (line.record.done) {
       if (const auto run = read_json_object(folder_of(campaign, item.name) / kRunFile)) {
         line.frames = run->value("frames", std::int64_t{0});

@@ -6,6 +6,7 @@
 
 #include "campaign/campaign.hpp"
 #include "common/fitted_scene.hpp"
+#include "common/json_object.hpp"
 #include "draw/svg.hpp"
 #include "report/parts.hpp"
 #include "trochoid/data/quantile.hpp"
@@ -77,10 +78,12 @@ std::map<std::string, std::map<std::string, Spread>> spreads(
 }
 
 std::string spread_table(const std::vector<CampaignLine>& lines) {
+  const auto all = spreads(lines);
+  if (all.empty()) return {};
   std::string html =
       "<h2>Parameters over all recordings</h2>\n<table><tr><th>model<th>parameter<th>fits<th>median"
       "<th>spread (half the middle 68 %)<th>median of the stated errors<th>unit</tr>\n";
-  for (const auto& [model, parameters] : spreads(lines))
+  for (const auto& [model, parameters] : all)
     for (const auto& [name, spread] : parameters) {
       const double half_width =
           0.5 * (data::quantile(spread.values, 0.84) - data::quantile(spread.values, 0.16));
@@ -96,7 +99,7 @@ std::string failures(const std::vector<CampaignLine>& lines) {
   std::string html;
   for (const CampaignLine& line : lines)
     if (failed(line))
-      html += fmt::format("<tr><td>{}<td>{}<td>{}</tr>\n", escaped(line.record.name),
+      html += fmt::format("<tr><td>{}<td>{}<td>{}</tr>\n", escaped(as_utf8(line.record.name)),
                           line.record.exit_status, escaped(line.record.message));
   if (html.empty()) return {};
   return "<h2>Failed</h2>\n<table><tr><th>recording<th>exit status<th>reason</tr>\n" + html +
@@ -120,7 +123,7 @@ std::string all_items(const std::vector<CampaignLine>& lines) {
       "<h2>All recordings</h2>\n<table><tr><th>recording<th>status<th>model<th>found<th>noise "
       "&times;<th>whiteness p<th>time [s]<th>verdict</tr>\n";
   for (const CampaignLine& line : lines) {
-    const std::string name = escaped(line.record.name);
+    const std::string name = escaped(as_utf8(line.record.name));
     html += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
                         line.record.done ? fmt::format("<a href=\"{}.trochoid/report.html\">{}</a>",
                                                        in_address(line.record.name), name)
@@ -146,7 +149,7 @@ std::string summary_csv(const std::vector<CampaignLine>& lines) {
   csv += ",video_sha256,version,message\n";
   for (const CampaignLine& line : lines) {
     const CampaignRecord& r = line.record;
-    csv += fmt::format("{},{},{},{},{},{},{},{},", csv_text(r.name), status_of(line),
+    csv += fmt::format("{},{},{},{},{},{},{},{},", csv_text(as_utf8(r.name)), status_of(line),
                        line.known ? fmt::format("{}", r.exit_status) : "", r.grade,
                        line.fit ? line.fit->model : "", line.fit ? line.fit->converged : 0,
                        line.frames, line.found);

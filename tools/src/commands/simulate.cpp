@@ -207,6 +207,9 @@ void simulate_scene(const SimulateOptions& options) {
     tell_origin(*fit, options.arc.value_or(0), table);
   }
   if (options.thesis || !options.plots.empty()) add_thesis_quantities(scene, table);
+#ifdef TROCHOID_HAS_TRACKING
+  if (!options.animation.empty()) check_has_path(table, options.animation);
+#endif
   data::write_table(table, output);
   std::vector<std::string> pictures;
   if (!options.plots.empty())

@@ -45,11 +45,16 @@ void check_animation_name(const std::filesystem::path& path) {
     throw InputError(fmt::format("{}: an animation is an mp4 file; name it .mp4", path.string()));
 }
 
+void check_has_path(const data::Table& trajectory, const std::filesystem::path& path) {
+  const Eigen::VectorXd x = trajectory.column("x_m"), y = trajectory.column("y_m");
+  if (x.size() < 2 || (x.isZero(0.0) && y.isZero(0.0)))
+    throw InputError(fmt::format("{}: the run has no path to draw", path.string()));
+}
+
 void write_animation(const data::Table& trajectory, const std::filesystem::path& path) {
   const Eigen::VectorXd t = trajectory.column("t_s");
   const Eigen::VectorXd x = trajectory.column("x_m"), y = trajectory.column("y_m");
-  if (t.size() < 2 || (x.isZero(0.0) && y.isZero(0.0)))
-    throw InputError(fmt::format("{}: the run has no path to draw", path.string()));
+  check_has_path(trajectory, path);
   check_animation_name(path);
   const double span_s = t[t.size() - 1] - t[0];
   const double speed = std::max(1.0, span_s / kLongest_s);

@@ -360,8 +360,11 @@ std::string origin_section(const ReportInput& input) {
   for (const auto& [name, version] : versions) row(name, version);
   for (const auto& [name, digest] : checksums)
     row(name, digest.empty() ? "no checksum" : "sha256 " + digest);
-  for (const auto& [stage, seconds] : input.times_s)
-    if (stage != "fit" || input.fit) row("time to " + stage, fmt::format("{:.2f} s", seconds));
+  for (const auto& [stage, seconds] : input.times_s) {
+    std::string words = "time to " + stage;
+    std::replace(words.begin(), words.end(), '_', ' ');
+    if (stage != "fit" || input.fit) row(words, fmt::format("{:.2f} s", seconds));
+  }
   html += "</tbody></table></div>";
   if (input.scene)
     html += fmt::format(
