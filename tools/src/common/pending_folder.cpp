@@ -40,6 +40,8 @@ PendingFolder::PendingFolder(fs::path target) : target_(without_end(std::move(ta
                     "one with -o",
                     target_.string()));
   place_ = behind_links(target_);
+  if (fs::exists(place_, code) && !fs::is_directory(place_, code))
+    throw InputError(fmt::format("{}: names a file; give a folder", target_.string()));
   const fs::path parent = place_.has_parent_path() ? place_.parent_path() : fs::path(".");
   if (!fs::is_directory(parent, code))
     throw InputError(fmt::format("{}: cannot be made, the folder {} does not exist",
