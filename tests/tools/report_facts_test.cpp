@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "report/parts.hpp"
 
@@ -74,6 +75,15 @@ TEST(Report, APositionThatWasGivenUpIsCountedAndNotInTheScatter) {
   input.fit->arcs = {{.track = 0, .object = 0, .from_s = 0.05, .to_s = 0.15, .samples = 11}};
   EXPECT_THAT(judge(gather(input)).sentence,
               testing::StartsWith("The path of 11 of the 20 positions, over 0.1 s"));
+}
+
+TEST(Report, ThePredictionIsDrawnOverTheDotsThatItFollows) {
+  const ReportInput input = sliding_puck();
+  const nlohmann::json charts = series_of(gather(input))["objects"][0]["charts"];
+  for (const nlohmann::json& chart : {charts[0], charts[1]}) {
+    EXPECT_EQ(chart["series"].front()["label"], "observed");
+    EXPECT_EQ(chart["series"].back()["label"], "predicted");
+  }
 }
 
 TEST(Report, SaysFirstWhatTheTrackerNotedOfItsRecording) {

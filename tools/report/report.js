@@ -8,6 +8,15 @@
   const charts = [];
   let now_s = null;
 
+  const font = "12px system-ui, sans-serif";
+  const pen = document.createElement("canvas").getContext("2d");
+  // Room for the numbers of an axis between its line and its label.
+  function width_of(numbers) {
+    const ticks = 20;
+    pen.font = font;
+    return Math.max(56, ticks + Math.ceil(Math.max(0, ...(numbers || []).map((text) => pen.measureText(text || "").width))));
+  }
+
   const digits = (value) => (value == null ? "--" : Number(value.toPrecision(4)).toString());
 
   function series(spec) {
@@ -35,11 +44,11 @@
   function build(holder) {
     const object = data.objects[Number(holder.dataset.object)];
     const chart = object.charts[Number(holder.dataset.chart)];
-    const axis = { stroke: colour("words"), grid: { stroke: colour("rule"), width: 0.5 }, ticks: { stroke: colour("rule"), width: 0.5 }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif" };
+    const axis = { stroke: colour("words"), grid: { stroke: colour("rule"), width: 0.5 }, ticks: { stroke: colour("rule"), width: 0.5 }, font, labelFont: font };
     const options = {
       width: Math.max(260, holder.clientWidth), height: 240,
       scales: { x: { time: false }, y: chart.limit ? { range: [-chart.limit, chart.limit] } : {} },
-      axes: [{ ...axis, label: "t [s]", labelSize: 18, size: 34 }, { ...axis, label: chart.label, labelSize: 20, size: 56 }],
+      axes: [{ ...axis, label: "t [s]", labelSize: 18, size: 34 }, { ...axis, label: chart.label, labelSize: 20, size: (u, numbers) => width_of(numbers) }],
       series: [{ label: "t", value: (u, v) => (v == null ? "--" : v.toFixed(4) + " s") }, ...chart.series.map(series)],
       bands: bands(chart.series),
       cursor: { y: false, sync: { key: "time" }, drag: { x: true, y: false }, points: { size: 7 } },

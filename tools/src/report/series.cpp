@@ -118,11 +118,11 @@ class ObjectSeries {
                                           : "-y") +
                              unit},
                {"series", json::array()}};
-    if (arc_ != nullptr)
-      chart["series"].push_back(line("predicted", "line", "predicted",
-                                     column([&](std::size_t i) { return expected(i, axis); })));
     chart["series"].push_back(
         line("observed", "dots", "observed", column([&](std::size_t i) { return seen(i, axis); })));
+    if (arc_ != nullptr)  // over the dots, which would hide it
+      chart["series"].push_back(line("predicted", "line", "predicted",
+                                     column([&](std::size_t i) { return expected(i, axis); })));
     return chart;
   }
 
@@ -198,13 +198,13 @@ class ObjectSeries {
       if (!any_seen && (!angle.modelled || is_spin)) continue;  // an unseen spin has no zero
       if (angle.predicted != &data::Pose<>::theta_rad) align(predicted, measured);
       json chart{{"label", angle.label}, {"series", json::array()}};
-      if (angle.modelled)
-        chart["series"].push_back(line("predicted", "line", "predicted", column([&](std::size_t i) {
-                                         return data::degrees(predicted[i]);
-                                       })));
       if (any_seen)
         chart["series"].push_back(line("observed", "dots", "observed", column([&](std::size_t i) {
                                          return data::degrees(measured[i]);
+                                       })));
+      if (angle.modelled)
+        chart["series"].push_back(line("predicted", "line", "predicted", column([&](std::size_t i) {
+                                         return data::degrees(predicted[i]);
                                        })));
       charts.push_back(std::move(chart));
     }
