@@ -466,6 +466,14 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
   return one.described(Bars::full);
 }
 
+void check_scene(const data::Scene& given, const FitOptions& options) {
+  constexpr double kAnyFrame_s = 1.0;  // how long one is tells the track
+  data::Scene scene = completed(given, options);
+  const auto plain = model::make_predictor(scene);
+  const auto wrapped = observed(*plain, scene, kAnyFrame_s);
+  static_cast<void>(make_problem(wrapped ? *wrapped : *plain, {}, scene));
+}
+
 data::Fit fit_one_of_several(std::span<const data::Track> tracks, const data::Scene& given,
                              const FitOptions& options, Bars bars, const Settled& near) {
   CompletedFit one(tracks, completed(given, options), options, Purpose::candidate);

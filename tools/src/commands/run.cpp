@@ -76,6 +76,15 @@ std::string stem_of(const RunOptions& options) {
   return recording_name(options.inputs.video);
 }
 
+// A model that is named must be able to take its scene: said before the recording is tracked.
+// Without a scale none is fitted.
+void check_model(const data::Scene& scene, const std::optional<data::Camera>& camera,
+                 const std::string& scene_name) {
+  const bool scaled = camera || scene.camera.scale_px_per_m || scene.body;
+  if (scene.model.name == "auto" || !scaled) return;
+  in_scene(scene_name, [&] { fitting::check_scene(with_rows(scene)); });
+}
+
 Run prepared(const RunOptions& options) {
   Run run;
   const TrackInputs& inputs = options.inputs;
@@ -89,6 +98,7 @@ Run prepared(const RunOptions& options) {
     run.scene.camera.scale_px_per_m.reset();
     run.scene.camera.height_m.reset();
   }
+  check_model(run.scene, run.camera, inputs.scene);
   return run;
 }
 

@@ -65,6 +65,11 @@ struct FitOptions {
 [[nodiscard]] data::Fit fit(std::span<const data::Track> tracks, const model::Predictor& predictor,
                             const data::Scene& scene, const FitOptions& options = {});
 
+/// What fit() refuses a scene for whatever the tracks: before there are any, which takes time.
+/// @throws InputError if the scene lacks what its model needs, or [fit] names what the model does
+///         not have or gives it a value that it cannot have.
+void check_scene(const data::Scene& scene, const FitOptions& options = {});
+
 /// The values of all parameters of a predictor, made of the scene that a fit is of, in one of its
 /// arcs; what the fit says nothing of as the predictor has it.
 [[nodiscard]] Eigen::VectorXd fitted_values(const model::Predictor& predictor, const data::Fit& fit,
