@@ -32,6 +32,11 @@ struct FitsOptions {
   fs::path out = "study-fits";
 };
 
+/// Nothing is the median of nothing.
+std::string median_words(const std::vector<double>& values) {
+  return values.empty() ? "-" : fmt::format("{:.2e}", data::median(values));
+}
+
 void print_table(const std::vector<FitStrategy>& strategies, const std::vector<FitTrial>& trials) {
   fmt::print("{:<22} {:>8} {:>6} {:>10} {:>12} {:>10} {:>10}\n", "strategy", "optimum", "of",
              "unnoticed", "median error", "median ms", "90 % ms");
@@ -46,8 +51,9 @@ void print_table(const std::vector<FitStrategy>& strategies, const std::vector<F
       time.push_back(trial.time_ms);
       if (trial.optimum) error.push_back(trial.error);
     }
-    fmt::print("{:<22} {:>8} {:>6} {:>10} {:>12.2e} {:>10.2f} {:>10.2f}\n", strategies[s].name,
-               good, count, unnoticed, data::median(error), data::median(time),
+    if (count == 0) continue;  // it is for other models
+    fmt::print("{:<22} {:>8} {:>6} {:>10} {:>12} {:>10.2f} {:>10.2f}\n", strategies[s].name, good,
+               count, unnoticed, median_words(error), data::median(time),
                data::quantile(time, 0.9));
   }
 }

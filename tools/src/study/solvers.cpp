@@ -52,8 +52,13 @@ std::string processor() {
 }
 
 void print_machine() {
-  fmt::print("# trochoid {}, {}, {} threads, g++ {}\n", TROCHOID_VERSION, processor(),
-             std::thread::hardware_concurrency(), __VERSION__);
+#ifdef __clang__
+  constexpr const char* kCompiler = "";  // its version says who it is
+#else
+  constexpr const char* kCompiler = "g++ ";
+#endif
+  fmt::print("# trochoid {}, {}, {} threads, {}{}\n", TROCHOID_VERSION, processor(),
+             std::thread::hardware_concurrency(), kCompiler, __VERSION__);
   fmt::print(
       "# error: largest |k - k_reference| over the run, against an 80-bit extrapolation "
       "method in vector form\n# time: whole simulate() call: every column, the run that estimates "
