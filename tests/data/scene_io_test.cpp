@@ -132,6 +132,7 @@ height_m = 2.0
 readout_s = 0.5
 rows = 720.0
 frame_rate_hz = 60.0
+missing_frames = [80, 159, 159]
 exposure_s = 0.25
 transfer = "linear"
 
@@ -324,6 +325,10 @@ INSTANTIATE_TEST_SUITE_P(
                      ":3:", "keep one"},
         RefusedScene{"EmptyFile", "[camera]\nfile = ''", ":2:", "leave the key out"},
         RefusedScene{"NegativeReadout", "[camera]\nreadout_s = -0.1", ":2:", "0 or greater"},
+        RefusedScene{"MissingFirstFrame", "[camera]\nmissing_frames = [3, 0]",
+                     ":2:", "numbers of frames after the first"},
+        RefusedScene{"HalfAMissingFrame", "[camera]\nmissing_frames = [1.5]", ":2:", "whole"},
+        RefusedScene{"OneMissingFrame", "[camera]\nmissing_frames = 3", ":2:", "[80, 159]"},
         RefusedScene{"NoObjects", "[tracking]\nobjects = 0", ":2:", "1..64"},
         RefusedScene{"HalfObjects", "[tracking]\nobjects = 1.5", ":2:", "whole number"},
         RefusedScene{"BadFrom", "[tracking]\nfrom = 'soon'", ":2:", "seconds (1.5) or a frame"},

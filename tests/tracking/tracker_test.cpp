@@ -120,6 +120,32 @@ TEST(TrackVideo, ABarInFrontLeavesAGapAndTheDiscIsFoundAgain) {
   EXPECT_LT(largest_error_px(result.file.tracks[0], truth), 1.0);
 }
 
+// A recorder that drops a picture and goes on counting: the disc is a frame's way ahead of its
+// time.
+TEST(TrackVideo, APictureThatIsMissingUnseenIsToldAndPutRight) {
+  const ScratchFolder folder("missing");
+  const auto truth = [](int i) {
+    const double frame = i < 60 ? i : i + 1;
+    return Eigen::Vector2d(25.0 + 2.2 * frame, 60.0 + 8.0 * std::sin(0.1 * frame));
+  };
+  write_clip(folder / "clip.mkv", drawn_floor(290, 130, 170.0), kDrawnFrames, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, truth(i).x(), truth(i).y(), 14.0, 14.0, 0.0, 60.0);
+             });
+  const auto remedy = testing::Contains(testing::HasSubstr("missing_frames = [60]"));
+  data::Scene scene;
+  const TrackResult told = track_video(folder / "clip.mkv", scene, std::nullopt);
+  EXPECT_THAT(told.file.notes, remedy);
+  scene.camera.missing_frames = {60};
+  const TrackResult right = track_video(folder / "clip.mkv", scene, std::nullopt);
+  EXPECT_THAT(right.file.notes, testing::Not(remedy));
+  const auto& before = told.file.tracks.at(0).samples.back();
+  const auto& after = right.file.tracks.at(0).samples.back();
+  ASSERT_EQ(before.frame, after.frame);
+  const double step_s = before.t_s / static_cast<double>(before.frame);
+  EXPECT_NEAR(after.t_s - before.t_s, step_s, 1e-3 * step_s);
+}
+
 TEST(TrackVideo, AMarkTellsTheSpinAndARadiusTheScale) {
   const ScratchFolder folder("mark");
   const auto psi = [](int i) { return 0.3 + 0.11 * i; };  // seen from above, anticlockwise
