@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -102,6 +103,15 @@ std::vector<PathStep> path_steps(const std::vector<double>& t_s, const Eigen::Ma
       found.back() = *step;
   }
   return found;
+}
+
+std::vector<PathStep> clear_path_steps(const std::vector<double>& t_s, const Eigen::MatrixX2d& at,
+                                       double most_sigma) {
+  constexpr std::size_t kFew = 6, kRarely = 40;
+  std::vector<PathStep> steps = path_steps(t_s, at);
+  std::erase_if(steps, [&](const PathStep& step) { return step.sigma > most_sigma; });
+  if (steps.size() > std::min(kFew, t_s.size() / kRarely)) steps.clear();
+  return steps;
 }
 
 std::string words_of(const std::vector<PathStep>& steps, const std::vector<double>& t_s) {

@@ -8,61 +8,76 @@
 namespace trochoid::data {
 namespace {
 
-// A point on a circle that drifts, seen with noise.
-struct Path {
-  std::vector<double> t_s;
-  Eigen::MatrixX2d at{0, 2};
-  std::mt19937_64 generator{4};
-  void add(double shown_s, double true_s) {
-    std::normal_distribution<double> normal(0.0, 0.02);
-    t_s.push_back(shown_s);
-    at.conservativeResize(at.rows() + 1, Eigen::NoChange);
-    at.bottomRows<1>() << 40.0 * std::cos(9.0 * true_s) + normal(generator),
-        40.0 * std::sin(9.0 * true_s) + 25.0 * true_s + normal(generator);
-  }
-};
-
 constexpr double kStep_s = 0.01;
 
-// Of each: from which sample on, by how many steps.
-Path path_with(const std::vector<std::pair<int, double>>& steps) {
-  Path path;
-  for (int i = 0; i < 200; ++i) {
-    double true_s = kStep_s * i;
-    for (const auto& [from, frames] : steps)
-      if (i >= from) true_s += kStep_s * frames;
-    path.add(kStep_s * i, true_s);
+// Of a round of two seconds.
+Eigen::Vector2d place(double frame) {
+  const double turned = 3.14 * kStep_s * frame;
+  return {std::cos(turned), std::sin(turned)};
+}
+
+// A hundred pictures, of which from the fiftieth on each is so many frames later than its time.
+std::vector<PathStep> steps_of(double frames, double noise) {
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  std::vector<double> t_s;
+  Eigen::MatrixX2d at(100, 2);
+  for (int i = 0; i < 100; ++i) {
+    t_s.push_back(kStep_s * i);
+    at.row(i) = place(i + (i >= 50 ? frames : 0.0)) +
+                noise * Eigen::Vector2d(normal(generator), normal(generator));
   }
-  return path;
+  return path_steps(t_s, at);
 }
 
-TEST(PathSteps, AreFoundWhereTheyAreByHowManyFrames) {
-  const Path path = path_with({{60, 1.0}, {120, -1.0}, {160, 2.0}});
-  const auto steps = path_steps(path.t_s, path.at);
-  ASSERT_EQ(steps.size(), 3u);
-  for (const auto& [step, sample, frames] :
-       {std::tuple(steps[0], 60, 1.0), {steps[1], 120, -1.0}, {steps[2], 160, 2.0}}) {
-    EXPECT_EQ(step.sample, sample);
-    EXPECT_NEAR(step.frames, frames, 4.0 * step.sigma);
-    EXPECT_LT(step.sigma, 0.1);
+TEST(PathSteps, TellWholeFramesThatAreMissingOrTooMany) {
+  for (const double frames : {1.0, 3.0, -1.0, -2.0}) {
+    const auto steps = steps_of(frames, 1e-3);
+    ASSERT_EQ(steps.size(), 1U) << frames;
+    EXPECT_EQ(steps[0].sample, 50);
+    EXPECT_LT(std::abs(steps[0].frames - frames), 4.0 * steps[0].sigma);
   }
-  EXPECT_TRUE(words_of(steps, path.t_s).starts_with("1.0"));
 }
 
-TEST(PathSteps, AreNoneOfASmoothPathNorOfHalfAFrame) {
-  EXPECT_TRUE(path_steps(path_with({}).t_s, path_with({}).at).empty());
-  const Path half = path_with({{100, 0.5}});
-  EXPECT_TRUE(path_steps(half.t_s, half.at).empty());
+TEST(PathSteps, AreNoneOfASmoothPathOrOfHalfAFrame) {
+  EXPECT_TRUE(steps_of(0.0, 1e-3).empty());
+  EXPECT_TRUE(steps_of(0.5, 1e-3).empty());
 }
 
-// A gap that the times show is none, nor is a few samples' path or one that stands still.
-TEST(PathSteps, AreNoneWhereTheTimesShowThem) {
-  Path gap, few, still;
-  for (int i = 0; i < 100; ++i) gap.add(kStep_s * (i + (i >= 50)), kStep_s * (i + (i >= 50)));
-  for (int i = 0; i < 12; ++i) few.add(kStep_s * i, kStep_s * i);
-  for (int i = 0; i < 60; ++i) still.add(kStep_s * i, 0.0);
-  for (const Path& path : {gap, few, still, Path{}})
-    EXPECT_TRUE(path_steps(path.t_s, path.at).empty());
+// A gap that the times show is no step; a few samples, or a body at rest, show none.
+TEST(PathSteps, AreNoneWhereTheTimesShowThemOrNothingMoves) {
+  const auto steps_of_places = [](int count, const auto& frame, const auto& shown) {
+    std::vector<double> t_s;
+    Eigen::MatrixX2d at(count, 2);
+    for (int i = 0; i < count; ++i) {
+      t_s.push_back(kStep_s * shown(i));
+      at.row(i) = place(frame(i));
+    }
+    return path_steps(t_s, at);
+  };
+  const auto each = [](int i) { return i; };
+  const auto with_gap = [](int i) { return i < 50 ? i : i + 1; };
+  EXPECT_FALSE(steps_of_places(100, with_gap, each).empty()) << "else it tests nothing";
+  EXPECT_TRUE(steps_of_places(100, with_gap, with_gap).empty());
+  EXPECT_TRUE(steps_of_places(12, each, each).empty());
+  EXPECT_TRUE(steps_of_places(0, each, each).empty());
+  EXPECT_TRUE(steps_of_places(
+                  60, [](int) { return 0; }, each)
+                  .empty());
+}
+
+// By a third of a frame: here and there it looks like a picture that came twice.
+TEST(PathSteps, AreNotClearWhereTimesJitter) {
+  std::mt19937 generator(1);
+  std::normal_distribution<double> jitter(0.0, 0.3);
+  std::vector<double> t_s;
+  Eigen::MatrixX2d at(4000, 2);
+  for (int i = 0; i < 4000; ++i) {
+    t_s.push_back(kStep_s * i);
+    at.row(i) = place(i + jitter(generator));
+  }
+  EXPECT_FALSE(path_steps(t_s, at).empty()) << "else it tests nothing";
+  EXPECT_TRUE(clear_path_steps(t_s, at, 0.1).empty());
 }
 
 }  // namespace

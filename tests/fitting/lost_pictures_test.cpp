@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "reference_motion.hpp"
 #include "trochoid/fitting/fit.hpp"
@@ -63,6 +64,28 @@ TEST_F(LostPictures, AreToldFromOneThatCameTwice) {
   const data::Fit fit = found();
   EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(fit.verdict_words, HasSubstr("1 frame too late from " + time_s(151)));
+}
+
+// Glitches had turned the parameters, by which frames were told that nothing had happened at.
+TEST_F(LostPictures, AreToldBesideGlitches) {
+  for (const std::size_t glitch : {40U, 130U, 220U})
+    motion_.track.samples[glitch].centre_m.x() += 0.02;
+  drop(100);
+  drop(180);
+  const data::Fit fit = found();
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
+  const auto told = testing::MatchesRegex(
+      fmt::format(".*times are 1 frame too early from {} on, 1 frame too early from {} on: .*",
+                  time_s(100), time_s(180)));
+  EXPECT_THAT(fit.verdict_words, told);
+}
+
+// Their times alone do not say of which track they are.
+TEST_F(LostPictures, AreToldOfTheirTrack) {
+  const std::vector<data::Track> tracks{noisy("s06_roll_disc", 2.0, kSigma_m, 2, 8).track,
+                                        (drop(100), motion_.track)};
+  const data::Fit fit = fitting::fit(tracks, motion_.scene);
+  EXPECT_THAT(fit.verdict_words, HasSubstr("1 frame too early in track 2 from " + time_s(100)));
 }
 
 // Half a frame is no picture: a shutter that was late, or a model that lacks something.

@@ -27,7 +27,7 @@ constexpr double kWorth = 40.0;  // of chi-square by the noise, for one of hundr
 struct Place {
   int sample = 0;
   Eigen::Index row = 0;
-  Eigen::Vector2d per_frame;
+  Eigen::Vector2d per_frame = Eigen::Vector2d::Zero();
 };
 
 struct ArcPlaces {
@@ -56,6 +56,21 @@ ArcPlaces places_of(const Problem& problem, int arc, Eigen::Index first_row,
         {reading.sample, first_row + reading.row, reading.whitener * velocity_m_s * all.frame_s});
   }
   return all;
+}
+
+// A position that lies on no path with the others would turn parameters towards itself, and pass
+// for noise beside which steps are nothing.
+void leave_out_others(const ArcData& data, Eigen::Index first_row, const ArcPlaces& kept,
+                      Linearised& all) {
+  const auto is_kept = [&](int sample) {
+    return std::binary_search(kept.places.begin(), kept.places.end(), Place{.sample = sample},
+                              [](const Place& a, const Place& b) { return a.sample < b.sample; });
+  };
+  for (const Reading& reading : data.readings) {
+    if (reading.channel != Channel::position || is_kept(reading.sample)) continue;
+    all.residuals.segment<2>(first_row + reading.row).setZero();
+    all.jacobian.middleRows<2>(first_row + reading.row).setZero();
+  }
 }
 
 // From which of an arc's places on times are off.
@@ -175,13 +190,14 @@ struct TimeJump {
 std::vector<TimeJump> jumps_of(const Problem& problem, const Eigen::VectorXd& u) {
   constexpr std::size_t kLeastPlaces = 40;
   const Problem plain = in_stated_sigmas(problem, Weights::dropped);
-  const Linearised all = linearise(plain, u);
+  Linearised all = linearise(plain, u);
   std::vector<ArcPlaces> arcs;
   Eigen::Index row = 0;
   for (int arc = 0; arc < static_cast<int>(plain.arcs.size()); ++arc) {
     const ArcData& data = plain.arcs[arc];
     if (data.observable_index(model::Observable::x_m) >= 0) {
       ArcPlaces places = places_of(plain, arc, row, all.residuals.segment(row, data.rows));
+      leave_out_others(data, row, places, all);
       if (places.places.size() >= kLeastPlaces) arcs.push_back(std::move(places));
     }
     row += data.rows;
@@ -256,12 +272,13 @@ LostPictures lost_pictures(const Problem& problem, const Eigen::VectorXd& u) {
 
 namespace {
 
-std::string words(const LostPictures& lost) {
+std::string words(const Problem& problem, const LostPictures& lost) {
   std::vector<std::string> told;
   for (const LostPictures::TimeStep& step : lost.steps)
-    told.push_back(fmt::format("{} frame{} too {} from {:.4g} s on", std::abs(step.frames),
+    told.push_back(fmt::format("{} frame{} too {}{} from {:.4g} s on", std::abs(step.frames),
                                std::abs(step.frames) == 1 ? "" : "s",
-                               step.frames > 0 ? "early" : "late", step.t_s));
+                               step.frames > 0 ? "early" : "late",
+                               in_track(problem, problem.arcs[step.arc]), step.t_s));
   return fmt::format(
       "times are {}: pictures were dropped, or written twice, and the times do not show it; "
       "put right they leave residuals of {:.2g} times the stated noise",
@@ -279,11 +296,12 @@ void doubt_if_pictures_are_lost(const Problem& problem, const Eigen::VectorXd& u
     tell_steps_of_path(problem, fit);
   if (lost.steps.empty()) return;
   if (!says_explained(fit)) {
-    fit.warnings.push_back(words(lost));
+    fit.warnings.push_back(words(problem, lost));
     return;
   }
   fit.verdict = data::FitVerdict::doubtful;
-  fit.verdict_words = "the model follows the track, but does not explain it: " + words(lost);
+  fit.verdict_words =
+      "the model follows the track, but does not explain it: " + words(problem, lost);
 }
 
 }  // namespace trochoid::fitting

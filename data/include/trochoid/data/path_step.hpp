@@ -22,6 +22,11 @@ struct PathStep {
 [[nodiscard]] std::vector<PathStep> path_steps(const std::vector<double>& t_s,
                                                const Eigen::MatrixX2d& at);
 
+/// Those of them whose standard deviation is at most so many frames, if they are rare: many are of
+/// times that jitter, or of a path with corners, and none is told.
+[[nodiscard]] std::vector<PathStep> clear_path_steps(const std::vector<double>& t_s,
+                                                     const Eigen::MatrixX2d& at, double most_sigma);
+
 /// "0.99 ± 0.01 at 0.8 s, ...": the steps of a path with these times.
 [[nodiscard]] std::string words_of(const std::vector<PathStep>& steps,
                                    const std::vector<double>& t_s);
