@@ -513,6 +513,25 @@ TEST_F(FrameSourceTest, APictureLostInsideAVideoShiftsNoOthersInTime) {
   }
 }
 
+// Two before picture 3 and one before picture 7: by the rate of the file, or the one that is given.
+TEST_F(FrameSourceTest, PicturesKnownToBeMissingMakeTheOthersLater) {
+  const fs::path path = write_clip("clip.mkv", "MJPG", 50.0);
+  for (const double rate_hz : {50.0, 500.0}) {
+    SourceOptions options{.missing_frames = {7, 3, 3}};
+    if (rate_hz != 50.0) options.frame_rate_hz = rate_hz;
+    const auto source = open_video(path, options);
+    for (int i = 0; i < kClipFrames; ++i) {
+      const auto frame = source->next();
+      ASSERT_TRUE(frame);
+      EXPECT_EQ(frame->index, i);
+      EXPECT_NEAR(frame->t_s, (i + (i >= 3 ? 2 : 0) + (i >= 7 ? 1 : 0)) / rate_hz, 1e-4);
+    }
+  }
+  // A window is one of the times that are right.
+  const auto source = open_video(path, {.missing_frames = {3, 3}, .from = "0.09"});
+  EXPECT_EQ(source->next()->index, 3);
+}
+
 TEST_F(FrameSourceTest, APictureNamedLikeASeriesIsAPictureWhereItExists) {
   cv::imwrite((folder_ / "half.png").string(),
               cv::Mat(kClipHeight, kClipWidth, CV_8UC1, cv::Scalar(90)));

@@ -641,7 +641,7 @@ class Tracking {
       result.summary.lost += frames_ - found;
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
-      if (auto note = note_about_steps(result.file.tracks.back()))
+      if (auto note = note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames))
         result.file.notes.push_back(std::move(*note));
     }
     if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))

@@ -340,7 +340,9 @@ class LibavSource final : public FrameSource {
     const auto lost = std::count_if(missing.begin(), missing.end(),
                                     [&](std::int64_t frame) { return frame <= index; });
     if (lost == 0) return 0.0;
-    const double rate_hz = options_.frame_rate_hz.value_or(info_.frame_rate_hz);
+    // The average is lower where the times tell of other pictures that are missing.
+    const double own_hz = steady_rate_hz_ > 0.0 ? steady_rate_hz_ : info_.frame_rate_hz;
+    const double rate_hz = options_.frame_rate_hz.value_or(own_hz);
     if (!(rate_hz > 0.0))
       fail(
           "has no rate to tell the missing_frames' time by; give it, frame_rate_hz under [camera]");

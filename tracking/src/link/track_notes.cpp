@@ -130,9 +130,9 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
 }
 
-std::optional<std::string> note_about_steps(const data::Track& track) {
-  constexpr double kTold = 0.05;
-  constexpr std::size_t kFew = 6, kRarely = 40;
+std::optional<std::string> note_about_steps(const data::Track& track,
+                                            const std::vector<std::int64_t>& known) {
+  constexpr double kClear = 0.05;
   const auto& samples = track.samples;
   std::vector<double> t_s;
   Eigen::MatrixX2d at_px(std::ssize(samples), 2);
@@ -140,10 +140,9 @@ std::optional<std::string> note_about_steps(const data::Track& track) {
     t_s.push_back(samples[i].t_s);
     at_px.row(static_cast<Eigen::Index>(i)) = samples[i].centre_px;
   }
-  std::vector<data::PathStep> steps = data::path_steps(t_s, at_px);
-  std::erase_if(steps, [](const data::PathStep& step) { return step.sigma > kTold; });
-  if (steps.empty() || steps.size() > std::min(kFew, samples.size() / kRarely)) return std::nullopt;
-  std::vector<std::int64_t> missing;
+  const std::vector<data::PathStep> steps = data::clear_path_steps(t_s, at_px, kClear);
+  if (steps.empty()) return std::nullopt;
+  std::vector<std::int64_t> missing = known;
   bool all_missing = true;
   for (const data::PathStep& step : steps) {
     all_missing = all_missing && step.frames > 0.0;
@@ -154,6 +153,7 @@ std::optional<std::string> note_about_steps(const data::Track& track) {
       "the body goes on by whole frames at once ({}), as where a recorder dropped pictures, or "
       "wrote some twice, and its times do not show it",
       data::words_of(steps, t_s));
+  std::sort(missing.begin(), missing.end());
   if (all_missing)
     note += fmt::format("; [camera] missing_frames = [{}] puts the times right",
                         fmt::join(missing, ", "));

@@ -37,7 +37,9 @@ struct WhatWasRead {
 
 /// Where a body goes on by whole frames at once, as it does where pictures are missing, or come
 /// twice, that the times do not show: rarely, and told well. Nothing of a path with corners.
-[[nodiscard]] std::optional<std::string> note_about_steps(const data::Track& track);
+/// @param known  frames before which pictures are missing that the times allow for already.
+[[nodiscard]] std::optional<std::string> note_about_steps(const data::Track& track,
+                                                          const std::vector<std::int64_t>& known);
 
 /// How long the shutter was taken to be open, for want of better knowledge.
 [[nodiscard]] std::string note_about_seen_exposure(double fraction, double frame_rate_hz);
