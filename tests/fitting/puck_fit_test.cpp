@@ -352,6 +352,22 @@ TEST(PuckFit, AllowsForASpinThatNothingShows) {
   EXPECT_LT(told.find("friction")->sigma, 0.5 * friction->sigma);
 }
 
+// Of one recording alone: that of the other stays unknown.
+TEST(PuckFit, TakesAPriorOnTheSpinOfOneArc) {
+  Turning turning{.generator = std::mt19937_64(8)};
+  const double spin_rad_s = turning.spin_rad_s(1.0, 0.8);
+  data::Track track = turning.slide({{"vx_m_s", 0.8}, {"w3_rad_s", spin_rad_s}}, 24).track;
+  for (data::TrackSample& sample : track.samples) sample.psi.reset();
+  data::Scene scene = turning.scene;
+  scene.fit.prior["w3_rad_s@1"] = {spin_rad_s, 1.0};
+  data::Track beside = track;
+  for (data::TrackSample& sample : beside.samples) sample.centre_m.y() += 0.1;
+  const data::Fit two = fit(std::vector{track, beside}, scene);
+  ASSERT_NE(two.find("w3_rad_s@1"), nullptr);
+  EXPECT_EQ(two.find("w3_rad_s@1")->status, data::ParameterStatus::prior);
+  EXPECT_EQ(two.find("w3_rad_s"), nullptr);
+}
+
 // After every impact it turns as it likes: what one common amount of spin would do to the path is
 // ruled out, what each arc's own does is not.
 TEST(PuckFit, AllowsForASpinOfEachArcsOwn) {

@@ -120,13 +120,13 @@ void suit_to_data(Problem& problem, const data::Scene& scene) {
       if (index < 0 || scene.fit.fixed.contains(name)) continue;
       const auto same = [&](const FreeParameter& p) { return p.index == index && p.arc == arc; };
       const bool is_free = std::any_of(problem.free.begin(), problem.free.end(), same);
-      const auto prior = scene.fit.prior.find(name);
-      const bool told = puck && prior != scene.fit.prior.end();
-      const double value = told ? prior->second.value : problem.base[arc][index];
+      const data::Prior* prior = puck ? prior_of(name, arc, scene.fit) : nullptr;
+      const bool told = prior != nullptr;
+      const double value = told ? prior->value : problem.base[arc][index];
       if ((told || seen) && !is_free)
         problem.free.push_back(free_parameter(*problem.predictor, scene.fit, index, arc, value));
       if (told && !seen && name == std::string("w3_rad_s"))
-        start_turning(prior->second, problem.base[arc][index]);
+        start_turning(*prior, problem.base[arc][index]);
       if (seen || told) continue;
       if (is_free) std::erase_if(problem.free, same);
       // A first value says nothing of how fast it turns: as if it did not, which the error bars

@@ -386,16 +386,22 @@ bool leaves_choice(const std::string& name) {
          name == kSlipScale;
 }
 
+const data::Prior* prior_of(const std::string& parameter, int arc,
+                            const data::FitSettings& settings) {
+  if (arc >= 0)
+    if (const auto own = settings.prior.find(fmt::format("{}@{}", parameter, arc));
+        own != settings.prior.end())
+      return &own->second;
+  return said_of(parameter, settings.prior);
+}
+
 FreeParameter free_parameter(const model::Predictor& predictor, const data::FitSettings& settings,
                              int index, int arc, double value) {
   const ParameterInfo& info = predictor.parameters()[index];
   FreeParameter parameter{index, arc, transform_of(info, predictor.model_name(), settings), {}, {}};
   parameter.given = value;
   parameter.turns = info.name == "phi_rad" || info.name == "psi_rad";
-  if (const auto* prior = said_of(info.name, settings.prior)) parameter.prior = *prior;
-  if (const auto own = settings.prior.find(fmt::format("{}@{}", info.name, arc));
-      own != settings.prior.end())
-    parameter.prior = own->second;
+  if (const auto* prior = prior_of(info.name, arc, settings)) parameter.prior = *prior;
   return parameter;
 }
 

@@ -164,6 +164,12 @@ const Value* said_of(const std::string& parameter, const std::map<std::string, V
   return entry == entries.end() ? nullptr : &entry->second;
 }
 
+/// What is known beforehand of a parameter in an arc: of that arc alone ("theta_rad@1"), else of
+/// all.
+/// @param arc  -1: shared by all.
+[[nodiscard]] const data::Prior* prior_of(const std::string& parameter, int arc,
+                                          const data::FitSettings& settings);
+
 /// Whether a parameter is how much the floor rises.
 [[nodiscard]] bool is_slope(const std::string& name);
 
