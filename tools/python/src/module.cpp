@@ -392,7 +392,6 @@ py::dict texts_of(const tools::Checksums& checksums) {
   return dict;
 }
 
-/// Of the files behind a fit; what is handed in comes back with one more.
 // Kept for as long as the module is.
 PyObject *error_type = nullptr, *input_error_type = nullptr, *numerical_error_type = nullptr;
 
@@ -425,6 +424,7 @@ void add_errors(py::module_& module) {
   py::register_exception_translator(&raise);
 }
 
+/// Of the files behind a fit; what is handed in comes back with one more.
 void add_provenance(py::module_& module) {
   using tools::Checksums;
   module.def("with_scene", [](Checksums known, const fs::path& named, const SceneValue& scene) {
