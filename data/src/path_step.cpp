@@ -79,13 +79,14 @@ std::optional<PathStep> step_at(const std::vector<double>& t_s, const Eigen::Mat
   return step;
 }
 
-}  // namespace
-
-bool is_whole(double frames, double sigma) {
-  constexpr double kNear = 0.35, kTold = 0.15;
-  const double whole = std::round(frames);
-  return whole != 0.0 && std::abs(frames - whole) < kNear && sigma < kTold;
+bool is_whole(const PathStep& step) {
+  constexpr double kNear = 0.1, kSigmas = 3.0, kTold = 0.15;
+  const double whole = std::round(step.frames);
+  return whole != 0.0 && std::abs(step.frames - whole) < kNear + kSigmas * step.sigma &&
+         step.sigma < kTold;
 }
+
+}  // namespace
 
 std::vector<PathStep> path_steps(const std::vector<double>& t_s, const Eigen::MatrixX2d& at) {
   constexpr double kStandsOut = 6.0;
@@ -96,7 +97,7 @@ std::vector<PathStep> path_steps(const std::vector<double>& t_s, const Eigen::Ma
     if (has_gap(t_s, sample, step_s)) continue;
     const auto step = step_at(t_s, at, step_s, sample);
     const auto bars = [](const PathStep& s) { return std::abs(s.frames) / s.sigma; };
-    if (!step || !is_whole(step->frames, step->sigma) || !(bars(*step) > kStandsOut)) continue;
+    if (!step || !is_whole(*step) || !(bars(*step) > kStandsOut)) continue;
     if (found.empty() || sample - found.back().sample > kBeside)
       found.push_back(*step);
     else if (bars(*step) > bars(found.back()))

@@ -183,20 +183,6 @@ TEST_F(FrameSourceTest, ARateGivenOverridesTheTimeStamps) {
   EXPECT_DOUBLE_EQ(source->next()->t_s, 1.0 / 240.0);
 }
 
-// Times that hide what a recorder dropped are later from there on; one frame may stand for several.
-TEST_F(FrameSourceTest, PicturesKnownToBeMissingMakeTheOthersLater) {
-  const fs::path clip = write_clip("clip.mp4", "mp4v", 10.0);
-  for (const std::optional<double> rate_hz : {std::optional<double>(), std::optional(20.0)}) {
-    const double step_s = rate_hz ? 1.0 / *rate_hz : 0.1;
-    const auto frames = open_video(clip, {.frame_rate_hz = rate_hz, .missing_frames = {2, 4, 4}});
-    for (const int later : {0, 0, 1, 1, 3, 3}) {
-      const auto frame = frames->next();
-      ASSERT_TRUE(frame);
-      EXPECT_NEAR(frame->t_s, step_s * (static_cast<double>(frame->index) + later), 1e-9);
-    }
-  }
-}
-
 TEST_F(FrameSourceTest, AWindowKeepsIndexAndTimeOfTheWholeFile) {
   const fs::path clip = write_clip("clip.mp4", "mp4v", 10.0);
   const auto frames = open_video(clip, {.from = "f3", .to = "f5"});

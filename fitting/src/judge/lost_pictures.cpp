@@ -15,7 +15,6 @@
 #include "judge/path_steps.hpp"
 #include "observe/decompositions.hpp"
 #include "problem/linearise.hpp"
-#include "trochoid/data/path_step.hpp"
 #include "trochoid/data/quantile.hpp"
 
 namespace trochoid::fitting {
@@ -217,6 +216,13 @@ std::vector<TimeJump> jumps_of(const Problem& problem, const Eigen::VectorXd& u)
   return jumps;
 }
 
+// The way there may be bent, and the refit tells.
+bool may_be_whole(const TimeJump& jump) {
+  constexpr double kNear = 0.35, kTold = 0.15;
+  const double whole = std::round(jump.frames);
+  return whole != 0.0 && std::abs(jump.frames - whole) < kNear && jump.sigma < kTold;
+}
+
 // By arc and sample, how many frames are missing just before it.
 using Missing = std::map<std::pair<int, int>, int>;
 
@@ -249,7 +255,7 @@ LostPictures lost_pictures(const Problem& problem, const Eigen::VectorXd& u) {
   for (int round = 0; round < kMostRounds && !jumps.empty(); ++round) {
     const std::size_t before = missing.size();
     for (const TimeJump& jump : jumps)
-      if (data::is_whole(jump.frames, jump.sigma))
+      if (may_be_whole(jump))
         missing[{jump.arc, jump.sample}] += static_cast<int>(std::round(jump.frames));
     if (missing.size() == before) return {};
     right = with_times_put_right(problem, missing);

@@ -13,9 +13,6 @@ struct PathStep {
   double frames = 0.0, sigma = 0.0;  ///< by how many steps its time is too early
 };
 
-/// Whether steps of so many frames may be whole ones.
-[[nodiscard]] bool is_whole(double frames, double sigma);
-
 /// All such places, from a quintic in time about each sample that ten others before it and nine
 /// after it leave without a gap. A place stands out by six standard deviations among those beside.
 /// @param t_s  ascending [s]. @param at  as many positions [any unit].
