@@ -41,8 +41,8 @@ PendingFolder::PendingFolder(fs::path target) : target_(without_end(std::move(ta
                     target_.string()));
   place_ = behind_links(target_);
   if (fs::is_symlink(fs::symlink_status(place_, code)))
-    throw InputError(fmt::format("{}: is a link that leads round in a circle; give a folder",
-                                 target_.string()));
+    throw InputError(
+        fmt::format("{}: is a link that leads round in a circle; give a folder", target_.string()));
   if (fs::exists(place_, code) && !fs::is_directory(place_, code))
     throw InputError(fmt::format("{}: names a file; give a folder", target_.string()));
   const fs::path parent = place_.has_parent_path() ? place_.parent_path() : fs::path(".");
