@@ -285,10 +285,14 @@ std::string words(const Problem& problem, const LostPictures& lost) {
                                std::abs(step.frames) == 1 ? "" : "s",
                                step.frames > 0 ? "early" : "late",
                                in_track(problem, problem.arcs[step.arc]), step.t_s));
+  const bool all_missing =
+      std::all_of(lost.steps.begin(), lost.steps.end(),
+                  [](const LostPictures::TimeStep& step) { return step.frames > 0; });
   return fmt::format(
-      "times are {}: pictures were dropped, or written twice, and the times do not show it; "
-      "put right they leave residuals of {:.2g} times the stated noise",
-      fmt::join(told, ", "), lost.noise_scale);
+      "times are {}: pictures were dropped{}, and the times do not show it; put right{} they leave "
+      "residuals of {:.2g} times the stated noise",
+      fmt::join(told, ", "), all_missing ? "" : ", or written twice",
+      all_missing ? " ([camera] missing_frames, tracked again)" : "", lost.noise_scale);
 }
 
 }  // namespace
