@@ -237,7 +237,7 @@ Problem with_times_put_right(Problem problem, const Missing& missing) {
   return problem;
 }
 
-// Sum over the rows of positions of the square of their noise, in stated sigmas.
+// Squares of the noise of positions, in stated sigmas, as many as an arc has rows.
 double scatter(const Problem& problem) {
   double sum = 0.0;
   for (const ArcData& arc : problem.arcs) sum += arc.rows * std::pow(main_noise_scale(arc), 2);
@@ -253,11 +253,10 @@ LostPictures lost_pictures(const Problem& problem, const Eigen::VectorXd& u) {
   Eigen::VectorXd there = u;
   std::vector<TimeJump> jumps = jumps_of(right, there);
   for (int round = 0; round < kMostRounds && !jumps.empty(); ++round) {
-    const std::size_t before = missing.size();
+    std::erase_if(jumps, [](const TimeJump& jump) { return !may_be_whole(jump); });
+    if (jumps.empty()) return {};
     for (const TimeJump& jump : jumps)
-      if (may_be_whole(jump))
-        missing[{jump.arc, jump.sample}] += static_cast<int>(std::round(jump.frames));
-    if (missing.size() == before) return {};
+      missing[{jump.arc, jump.sample}] += static_cast<int>(std::round(jump.frames));
     right = with_times_put_right(problem, missing);
     const Solution solution = minimise(right, there);
     if (!solution.usable) return {};
