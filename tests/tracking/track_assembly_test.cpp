@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -49,6 +50,16 @@ TEST(TrackAssembly, CountsAnglesFromWithinHalfATurnOfZero) {
       EXPECT_NEAR(track.samples.back().psi->value_rad - first, 0.5 * 29, 1e-9);
     }
   }
+}
+
+TEST(TrackAssembly, TellsNoSpinWhereTheNodeLineItIsCountedFromIsNotKnown) {
+  BodyPath path = turning(1.0, 2.0);
+  path.frames[7].seen.pose->sigma_phi_rad = std::numeric_limits<double>::infinity();
+  const data::Track rolls = assemble_track(path, 0, {}, {});
+  EXPECT_TRUE(rolls.samples[6].psi && rolls.samples[8].psi);
+  EXPECT_FALSE(rolls.samples[7].phi || rolls.samples[7].psi);
+  // Seen face on, it is the turn about the vertical that is told.
+  EXPECT_TRUE(assemble_track(path, 0, {}, {.on_pin = true}).samples[7].psi);
 }
 
 // Frames that scatter twice as far as they claim and may all be off by ten times that.

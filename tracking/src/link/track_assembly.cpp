@@ -222,7 +222,7 @@ void allow_for_other_readings(const BodyPath& path, data::Track& track) {
     constexpr double kLeastSine = 1e-6;
     const double turn = std::sqrt(spread.across_rad2) / std::max(kLeastSine, std::sin(theta));
     grow(of_frame.phi, turn);
-    // Spin is counted from the node line: what precession is wrong by, it takes back.
+    // What precession is wrong by, spin takes back.
     if (of_frame.phi) grow(of_frame.psi, std::cos(theta) * turn);
   }
 }
@@ -266,6 +266,8 @@ data::Track assemble_track(const BodyPath& path, int object,
       sample.covariance_m2 = pose.covariance_m2;
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
       if (face_on) join_turns(*seen.pose, sample);
+      // Counted from the node line, spin means nothing where that is not known.
+      else if (!sample.phi) sample.psi.reset();
     } else {
       metres_from_rim(sample, seen, shift, floor);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
