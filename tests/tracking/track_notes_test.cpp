@@ -8,6 +8,7 @@
 namespace trochoid::tracking {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -37,6 +38,33 @@ TEST(TrackNotes, APictureThatCameTwiceIsNotOneThatIsMissing) {
   const auto note = note_about_steps(round_with(-1), {});
   ASSERT_TRUE(note);
   EXPECT_THAT(*note, Not(HasSubstr("missing_frames")));
+}
+
+/// A body of 20 px radius in a picture of 200 px, seen from frame 40 to frame 99 but for a few.
+BodyPath seen_late(double x_px) {
+  BodyPath path;
+  for (int frame = 40; frame < 100; ++frame) {
+    if (frame >= 60 && frame < 64) continue;
+    Sighting& seen = path.frames[frame].seen;
+    seen.centre_px = {x_px, 100.0};
+    seen.rim = Ellipse::from_axes(seen.centre_px, 20.0, 15.0, 0.0);
+    seen.accepted = 1.0;
+  }
+  return path;
+}
+
+TEST(TrackNotes, ABodyThatIsLongNotSeenIsToldWithTheReason) {
+  VideoInfo video;
+  video.width_px = video.height_px = 200;
+  const auto why = [&](double x_px, const FramesRead& read) {
+    return note_about_lost(seen_late(x_px), read, video).value_or("nothing");
+  };
+  const std::string where = "frames 0 to 39 (of 0 to 99)";
+  EXPECT_THAT(why(100.0, {.last = 99}), AllOf(HasSubstr(where), HasSubstr("stands out")));
+  EXPECT_THAT(why(10.0, {.last = 99}), AllOf(HasSubstr(where), HasSubstr("picture's edge")));
+  EXPECT_THAT(why(100.0, {.last = 99, .moving_to = 20}), HasSubstr("the camera moves"));
+  EXPECT_THAT(why(100.0, {.last = 199}), HasSubstr("frames 0 to 39, 100 to 199 (of 0 to 199)"));
+  EXPECT_EQ(why(100.0, {.first = 40, .last = 99}), "nothing");
 }
 
 }  // namespace

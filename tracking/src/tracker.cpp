@@ -119,10 +119,10 @@ class Tracking {
   }
 
   [[noreturn]] void nothing_found() {
-    if (!camera_moved_)
+    if (!read_.moving_to)
       tell_other_size(find_seed(recording_.window(), background_, *rim_finder(), explained_),
                       "moves", ", or point at the body: at x,y");
-    if (camera_moved_)
+    if (read_.moving_to)
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
                       "changes: put it on a stand, or track a "
@@ -174,7 +174,7 @@ class Tracking {
     // Who asks for a part of a recording may do so because the camera moves in the rest.
     if (background_.camera_moves() && recording_.leave_out_the_rest())
       background_ = Background::from_samples(recording_.samples());
-    camera_moved_ = camera_moved_ || background_.camera_moves();
+    if (background_.camera_moves()) read_.moving_to = recording_.window().back().index;
     explained_.assign(recording_.window().size(), {});
     for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
     for (const BodyPath& path : paths_) explain(path);
@@ -277,7 +277,11 @@ class Tracking {
       others.emplace_back(seen->centre_px, seen->rim.semi_major_px());
       paths_[k].frames[frame.index] = {frame.t_s, trimmed(std::move(*seen))};
     }
-    if (frames_++ > 0) missing_ += frame.missing_before;
+    if (frames_++ > 0)
+      missing_ += frame.missing_before;
+    else
+      read_.first = frame.index;
+    read_.last = frame.index;
     damaged_ += frame.damaged ? 1 : 0;
     if (frames_ % 16 == 0) report_progress();
   }
@@ -641,6 +645,9 @@ class Tracking {
       result.summary.lost += frames_ - found;
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
+      if (auto note = note_about_lost(path, read_, recording_.info()))
+        result.file.notes.push_back(paths_.size() == 1 ? std::move(*note)
+                                                       : fmt::format("object {}: {}", k, *note));
       if (auto note = note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames))
         result.file.notes.push_back(std::move(*note));
     }
@@ -682,13 +689,13 @@ class Tracking {
   std::unique_ptr<BodyFinder> finder_;
   Background background_;
   std::vector<Ellipse> in_plate_;  ///< rims of bodies that never move off the plate
-  bool camera_moved_ = false;
   bool exposure_sought_ = false;
   std::optional<double> seen_exposure_;      ///< over the frame interval, by how edges are smeared
   std::vector<Follower::Others> explained_;  ///< per frame of the window
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;
   std::optional<CameraMotion> camera_motion_;
+  FramesRead read_;
   std::int64_t frames_ = 0, damaged_ = 0, missing_ = 0;
   /// The last frames of a window open the next.
   static constexpr std::size_t kOverlap = 12;

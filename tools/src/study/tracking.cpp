@@ -221,6 +221,7 @@ bool study(const Recording& r, const TrackingStudyOptions& options) {
     print_labels(r, file, options);
   else
     fmt::print("  no truth and no labels: tracked only, {} bodies\n", file.tracks.size());
+  for (const std::string& note : file.notes) fmt::print("  note: {}\n", note);
   print_speed(ours, ffmpeg, frames_tracked(target));
   if (options.baselines) print_baselines(r.video, r.truth, r.labels, radius_px(r));
   return true;

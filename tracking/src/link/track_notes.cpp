@@ -77,6 +77,42 @@ Note note_on_interlaced(const VideoInfo& video) {
          "deinterlace it first";
 }
 
+/// Frames in a row without a sample, and the samples on both sides of them.
+struct Gap {
+  std::int64_t from = 0, to = 0;
+  const Sighting *before = nullptr, *after = nullptr;
+
+  [[nodiscard]] std::int64_t frames() const { return to - from + 1; }
+};
+
+std::vector<Gap> gaps_in(const BodyPath& path, const FramesRead& read) {
+  std::vector<Gap> gaps;
+  Gap gap{.from = read.first};
+  for (const auto& [index, at] : path.frames) {
+    gap.to = index - 1, gap.after = &at.seen;
+    if (gap.frames() > 0) gaps.push_back(gap);
+    gap = {.from = index + 1, .before = &at.seen};
+  }
+  gap.to = read.last;
+  if (gap.frames() > 0) gaps.push_back(gap);
+  return gaps;
+}
+
+bool is_cut_off(const Sighting* seen, double radius_px, const VideoInfo& video) {
+  if (seen == nullptr) return false;
+  const Eigen::Vector2d &at = seen->centre_px, size{video.width_px, video.height_px};
+  return at.minCoeff() < radius_px || (size - at).minCoeff() < radius_px;
+}
+
+std::string why_lost(const Gap& gap, const FramesRead& read, double radius_px,
+                     const VideoInfo& video) {
+  if (read.moving_to && gap.from <= *read.moving_to)
+    return "the camera moves there, and nearly all of the picture changes: put it on a stand";
+  if (is_cut_off(gap.before, radius_px, video) || is_cut_off(gap.after, radius_px, video))
+    return "it is beside the picture's edge there";
+  return "no outline of its own stands out there: it is covered, smeared, or like the background";
+}
+
 }  // namespace
 
 std::vector<std::string> notes_about_recording(const VideoInfo& video, const WhatWasRead& read) {
@@ -158,6 +194,27 @@ std::optional<std::string> note_about_steps(const data::Track& track,
     note += fmt::format("; [camera] missing_frames = [{}] puts the times right",
                         fmt::join(missing, ", "));
   return note;
+}
+
+std::optional<std::string> note_about_lost(const BodyPath& path, const FramesRead& read,
+                                           const VideoInfo& video) {
+  constexpr double kMuch = 0.1;
+  const std::int64_t frames = read.last - read.first + 1;
+  std::vector<Gap> gaps = gaps_in(path, read);
+  std::erase_if(gaps, [&](const Gap& gap) {
+    return static_cast<double>(gap.frames()) < kMuch * static_cast<double>(frames);
+  });
+  if (gaps.empty()) return std::nullopt;
+  std::vector<std::string> where;
+  for (const Gap& gap : gaps) where.push_back(fmt::format("{} to {}", gap.from, gap.to));
+  const Gap& longest = *std::max_element(
+      gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.frames() < b.frames(); });
+  return fmt::format(
+      "not seen in frames {} (of {} to {}): {}; if it is to be seen there, point at it: at x,y, "
+      "from "
+      "a frame in which it is",
+      fmt::join(where, ", "), read.first, read.last,
+      why_lost(longest, read, usual_radius_px(path), video));
 }
 
 std::string note_about_seen_exposure(double fraction, double frame_rate_hz) {

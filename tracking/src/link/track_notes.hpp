@@ -41,6 +41,20 @@ struct WhatWasRead {
 [[nodiscard]] std::optional<std::string> note_about_steps(const data::Track& track,
                                                           const std::vector<std::int64_t>& known);
 
+/// Which frames were looked at for a body.
+struct FramesRead {
+  std::int64_t first = 0, last = 0;
+  /// Up to there, if at all, the whole picture changed, and no background was known.
+  std::optional<std::int64_t> moving_to{};
+};
+
+/// In which frames a body is not seen, and why as far as that shows: where that is a tenth of them
+/// or more at one go.
+/// @param path  with one frame at least.
+[[nodiscard]] std::optional<std::string> note_about_lost(const BodyPath& path,
+                                                         const FramesRead& read,
+                                                         const VideoInfo& video);
+
 /// How long the shutter was taken to be open, for want of better knowledge.
 [[nodiscard]] std::string note_about_seen_exposure(double fraction, double frame_rate_hz);
 
