@@ -645,11 +645,13 @@ class Tracking {
       result.summary.lost += frames_ - found;
       result.summary.doubtful +=
           std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
-      if (auto note = note_about_lost(path, read_, recording_.info()))
-        result.file.notes.push_back(paths_.size() == 1 ? std::move(*note)
+      const auto add = [&](const std::optional<std::string>& note) {
+        if (!note) return;
+        result.file.notes.push_back(paths_.size() == 1 ? *note
                                                        : fmt::format("object {}: {}", k, *note));
-      if (auto note = note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames))
-        result.file.notes.push_back(std::move(*note));
+      };
+      add(note_about_lost(path, read_, recording_.info()));
+      add(note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames));
     }
     if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))
       result.file.notes.push_back(std::move(*note));

@@ -35,10 +35,17 @@ bool is_same(const fs::path& a, const fs::path& b) {
   return fs::equivalent(a, b, ignored) || plain(a) == plain(b);
 }
 
+// Elsewhere it stands for standard output, where no result goes: each has others beside it.
+void refuse_dash(const fs::path& output) {
+  if (output == "-")
+    throw InputError("-: results are files; give a name (./- for a file called so)");
+}
+
 }  // namespace
 
 void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (output.empty()) return;
+  refuse_dash(output);
   data::check_writable(output);
   for (const fs::path& input : inputs) {
     if (is_same(output, input))
@@ -61,6 +68,7 @@ void check_outputs(const std::vector<fs::path>& outputs, const std::vector<fs::p
 }
 
 void check_folder(const fs::path& folder) {
+  refuse_dash(folder);
   std::error_code ignored;  // what cannot be looked at is not there
   const std::string ending = folder.extension().string();
   const bool is_folder = fs::is_directory(folder, ignored);
