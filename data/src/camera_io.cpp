@@ -222,6 +222,7 @@ Camera read_camera(const std::filesystem::path& path) {
       json.fail(fmt::format("\"shutter_fraction_of_frame\" = {} must lie in 0..1",
                             *camera.exposure_fraction));
   }
+  if (json.has("readout_s")) camera.readout_s = positive(json, "readout_s");
   camera.transfer = transfer_of(json);
   camera.metres_by_radius = metres_by_radius(json);
   if (json.has("covariance")) camera.covariance = covariance_of(json, "covariance");
@@ -244,6 +245,7 @@ void write_camera(const Camera& camera, const std::filesystem::path& path) {
   json["height"] = camera.height_px;
   if (camera.frame_rate_hz) json["fps"] = *camera.frame_rate_hz;
   if (camera.exposure_fraction) json["shutter_fraction_of_frame"] = *camera.exposure_fraction;
+  if (camera.readout_s) json["readout_s"] = *camera.readout_s;
   if (camera.transfer == Transfer::linear) json["transfer"] = "linear";
   if (camera.metres_by_radius) json["metres_by"] = "body_radius";
   json["pixel_convention"] = "centre of the top-left pixel is (0,0); x right, y down";

@@ -68,6 +68,21 @@ INSTANTIATE_TEST_SUITE_P(PictureRenderer, CameraAbove,
                            return instance.index == 0 ? "AtAHeight" : "FarAway";
                          });
 
+// Rows that are read one after the other show the body where it is by then.
+TEST(PictureRenderer, GivesEveryRowItsOwnExposure) {
+  const data::Camera camera = data::Camera::from_scale(80, 60, 1000.0);
+  const PictureRenderer renderer(flat_disc(), camera, plain());
+  const auto exposure_of = [](double row_px) {
+    data::Pose<> pose;
+    pose.centre_m = {row_px < 30.0 ? -0.004 : 0.004, 0.0, 5e-7};
+    return std::vector{pose};
+  };
+  const cv::Mat light = renderer.rolling_light(exposure_of);
+  for (const int row : {20, 40})
+    EXPECT_EQ(cv::norm(light.row(row), renderer.light(exposure_of(row)).row(row)), 0.0);
+  EXPECT_GT(cv::norm(light.row(20), renderer.light(exposure_of(40)).row(20)), 0.1);
+}
+
 // The tracker's outline and the renderer's rays know nothing of each other.
 TEST(PictureRenderer, HasItsEdgesWhereTheOutlineOfATiltedRingIsPredicted) {
   data::Body body = flat_disc();

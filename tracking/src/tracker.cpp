@@ -14,6 +14,7 @@
 #include "find/stoppable_finder.hpp"
 #include "link/linking.hpp"
 #include "link/path_motion.hpp"
+#include "link/rolling_shutter.hpp"
 #include "link/track_assembly.hpp"
 #include "link/track_notes.hpp"
 #include "trochoid/data/error.hpp"
@@ -84,12 +85,18 @@ class Tracking {
   /// shows only when it is done.
   void check_readout() const {
     constexpr double kRoom = 1.01;  // the rate is an average
-    const double rate_hz = recording_.info().frame_rate_hz, readout_s = scene_.camera.readout_s;
+    const double rate_hz = recording_.info().frame_rate_hz, readout_s = this->readout_s();
     if (rate_hz > 0.0 && readout_s * rate_hz > kRoom)
       throw InputError(
           fmt::format("{}: camera.readout_s = {:g} is longer than the {:.4g} s from picture to "
                       "picture; is it in seconds?",
                       video_.string(), readout_s, 1.0 / rate_hz));
+  }
+
+  /// As the scene says, else the camera's file; 0: all rows at once.
+  [[nodiscard]] double readout_s() const {
+    if (scene_.camera.readout_s > 0.0 || !camera_) return scene_.camera.readout_s;
+    return camera_->readout_s.value_or(0.0);
   }
 
   void choose_finder() {
@@ -99,7 +106,9 @@ class Tracking {
 
   [[nodiscard]] std::unique_ptr<BodyFinder> cylinder_finder(double exposure_fraction) const {
     return make_stoppable(make_cylinder_finder(*scene_.body, scene_.support, *camera_,
-                                               exposure_fraction, options_.effort),
+                                               exposure_fraction, options_.effort,
+                                               readout_s() * recording_.info().frame_rate_hz *
+                                                   readout_share_per_px(recording_.info())),
                           options_.checkpoint);
   }
 
@@ -621,13 +630,16 @@ class Tracking {
     result.summary.frames = frames_;
     result.summary.damaged = damaged_;
     std::string words = fmt::format("{}: the CoM of the fitted cylinder", camera_words());
-    AssemblyOptions how{.readout_s = scene_.camera.readout_s, .video = recording_.info()};
+    AssemblyOptions how{.readout_s = readout_s(), .video = recording_.info()};
     if (camera_) how.camera = &*camera_;
     if (camera_motion_) how.shifts = camera_motion_->shifts();
     if (scene_.body && !scene_.body->marks.empty())
       how.mark_rad = scene_.body->marks.front().angle_rad;
     for (std::size_t k = 0; k < paths_.size(); ++k) {
-      const BodyPath& path = paths_[k];
+      BodyPath& path = paths_[k];
+      if (has_shape(scene_) && camera_)
+        undo_rolling_shutter({how.readout_s, how.video, *camera_}, *scene_.body, scene_.support,
+                             path);
       std::optional<data::Camera> floor;
       if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
       how.on_pin = stays_on_a_pin(path);

@@ -292,6 +292,15 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
   return {run, scene.run.rate_hz};
 }
 
+// Rows read for longer than a frame lasts would still be read when the next one begins.
+void check_readout(const std::string& scene, const data::Camera& camera) {
+  if (camera.readout_s.value_or(0.0) * *camera.frame_rate_hz > 1.0)
+    throw InputError(
+        fmt::format("{}: camera.readout_s = {:g} is longer than a frame at {:g} frames "
+                    "per second",
+                    scene, *camera.readout_s, *camera.frame_rate_hz));
+}
+
 data::Camera recording_camera(const RenderOptions& options, const data::Scene& scene,
                               const Motion& motion) {
   data::Camera camera = camera_of(options, scene, motion);
@@ -300,6 +309,8 @@ data::Camera recording_camera(const RenderOptions& options, const data::Scene& s
                                  camera.width_px, camera.height_px));
   camera.frame_rate_hz = scene.run.rate_hz;
   camera.exposure_fraction = exposure_of(options, scene, camera);
+  if (scene.camera.readout_s > 0.0) camera.readout_s = scene.camera.readout_s;
+  check_readout(options.scene, camera);
   if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
   return camera;
 }
@@ -312,6 +323,39 @@ std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double
     poses.push_back(
         motion.at(t_s + ((i + 0.5) / style.times - 0.5) * style.exposure_fraction / rate_hz));
   return poses;
+}
+
+// When a row is read, after the first one.
+double read_s(const data::Camera& camera, double row_px) {
+  const double share = row_px / std::max(1, camera.height_px - 1);
+  return camera.readout_s.value_or(0.0) * std::clamp(share, 0.0, 1.0);
+}
+
+// When the row that shows the body's centre is read, of a picture whose first one is read at t_s.
+double centre_read_s(const Motion& motion, const data::Camera& camera, double t_s) {
+  constexpr int kRounds = 20;  // each leaves of the error what the centre moves by while it is read
+  double at_s = t_s;
+  for (int round = 0; camera.readout_s && round < kRounds; ++round)
+    at_s = t_s + read_s(camera, camera.image_from_table<double>(motion.at(at_s).centre_m).y());
+  return at_s;
+}
+
+// The lamp flickers with the mains.
+double brightness_at(double t_s, const RenderStyle& style) {
+  return 1.0 + style.flicker * std::sin(data::kTurn * 100.0 * t_s);
+}
+
+// Of the picture whose first row is read at t_s, with the flicker of the light.
+cv::Mat light_at(const PictureRenderer& renderer, const Motion& motion, const data::Camera& camera,
+                 double t_s, const RenderStyle& style) {
+  const auto exposed = [&](double at_s) {
+    return exposed_poses(motion, at_s, *camera.frame_rate_hz, style);
+  };
+  if (!camera.readout_s) return renderer.light(exposed(t_s)) * brightness_at(t_s, style);
+  const auto row_s = [&](double row_px) { return t_s + read_s(camera, row_px); };
+  cv::Mat light = renderer.rolling_light([&](double row_px) { return exposed(row_s(row_px)); });
+  for (int row = 0; row < light.rows; ++row) light.row(row) *= brightness_at(row_s(row), style);
+  return light;
 }
 
 // What the whole will take, from its first pictures; nothing where that is no time to wait for.
@@ -338,10 +382,9 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
   constexpr int kFirst = 8;  // they tell what one takes
   for (int frame = 0; frame < frames; ++frame) {
     const double t_s = frame / rate_hz;
-    const double brightness = 1.0 + style.flicker * std::sin(data::kTurn * 100.0 * t_s);
-    const auto poses = exposed_poses(motion, t_s, rate_hz, style);
-    video.write(renderer.picture(renderer.light(poses), frame, brightness));
-    truth += truth_row(frame, t_s, motion.at(t_s), camera);
+    video.write(renderer.picture(light_at(renderer, motion, camera, t_s, style), frame));
+    const double centre_s = centre_read_s(motion, camera, t_s);
+    truth += truth_row(frame, centre_s, motion.at(centre_s), camera);
     progress.update(frame + 1, frames);
     if (frame + 1 == kFirst)
       tell_cost(kFirst, frames, camera,
@@ -369,11 +412,6 @@ void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Cam
   if (scene.tracking.objects > 1)
     note(fmt::format("one body is drawn; [tracking] objects = {} is for following a recording",
                      scene.tracking.objects));
-  if (scene.camera.readout_s > 0.0)
-    note(fmt::format(
-        "all rows are exposed at once; [camera] readout_s = {:g} is for following a recording with "
-        "a rolling shutter, leave it out to follow this one",
-        scene.camera.readout_s));
   if (const auto& rate_hz = scene.camera.frame_rate_hz; rate_hz && *rate_hz != scene.run.rate_hz)
     note(fmt::format(
         "drawn at run.rate_hz = {:g}; [camera] frame_rate_hz = {:g} is for following a recording "
@@ -440,8 +478,9 @@ void run(const RenderOptions& options) {
   const data::Scene scene = scene_to_draw(options, targets);
   const Motion motion = simulated(options.scene, scene);
   const data::Camera camera = recording_camera(options, scene, motion);
+  const double last_s = motion.end_s() - camera.readout_s.value_or(0.0);
   const int frames =
-      std::max(1, static_cast<int>(std::floor(motion.end_s() * scene.run.rate_hz + 1e-9)) + 1);
+      std::max(1, static_cast<int>(std::floor(last_s * scene.run.rate_hz + 1e-9)) + 1);
   write_with_folder(options, scene, motion, camera, frames, targets);
   tell_unseen(motion, scene, camera, frames);
   tell(options, targets, camera, frames);

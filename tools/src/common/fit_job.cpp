@@ -25,8 +25,10 @@ data::Scene with_rows(data::Scene scene) {
   const auto& free = scene.fit.free;
   const bool fitted = std::find(free.begin(), free.end(), kReadout) != free.end() ||
                       scene.fit.prior.contains(kReadout);
-  if (fitted && !scene.camera.rows && !scene.camera.file.empty())
-    scene.camera.rows = data::read_camera(scene.camera.file).height_px;
+  if (!fitted || scene.camera.file.empty()) return scene;
+  const data::Camera camera = data::read_camera(scene.camera.file);
+  if (!scene.camera.rows) scene.camera.rows = camera.height_px;
+  if (!(scene.camera.readout_s > 0.0)) scene.camera.readout_s = camera.readout_s.value_or(0.0);
   return scene;
 }
 

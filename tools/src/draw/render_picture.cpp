@@ -346,8 +346,9 @@ cv::Vec3f PictureRenderer::light_of_pixel(const cv::Point& pixel, int across,
   return value + floor_.at<cv::Vec3f>(pixel) * (lit * static_cast<float>(uncovered) / rays);
 }
 
-void PictureRenderer::draw_body(const data::Pose<>& pose, float share, cv::Mat& sum) const {
-  const cv::Rect box = window(pose);
+void PictureRenderer::draw_body(const data::Pose<>& pose, const cv::Rect& within, float share,
+                                cv::Mat& sum) const {
+  const cv::Rect box = window(pose) & within;
   if (box.empty()) return;
   Posed posed{attitude(pose).transpose(), pose.centre_m, {}};
   for (const Eigen::Vector3d& to : lamp_) posed.lamp.push_back(posed.body_from_table * to);
@@ -371,14 +372,29 @@ void PictureRenderer::draw_body(const data::Pose<>& pose, float share, cv::Mat& 
   });
 }
 
+void PictureRenderer::draw_exposed(const std::vector<data::Pose<>>& poses, const cv::Rect& within,
+                                   cv::Mat& sum) const {
+  const float share = 1.0F / static_cast<float>(std::max<std::size_t>(1, poses.size()));
+  for (const data::Pose<>& pose : poses) draw_body(pose, within, share, sum);
+}
+
 cv::Mat PictureRenderer::light(const std::vector<data::Pose<>>& during_exposure) const {
   cv::Mat sum = floor_.clone();
-  const float share = 1.0F / static_cast<float>(std::max<std::size_t>(1, during_exposure.size()));
-  for (const data::Pose<>& pose : during_exposure) draw_body(pose, share, sum);
+  draw_exposed(during_exposure, {0, 0, sum.cols, sum.rows}, sum);
   return sum;
 }
 
-cv::Mat PictureRenderer::levels(const cv::Mat& light, double brightness) const {
+cv::Mat PictureRenderer::rolling_light(const ExposureOfRow& during_exposure) const {
+  constexpr int kAtOnce = 2;  // rows that nothing tells apart
+  cv::Mat sum = floor_.clone();
+  for (int row = 0; row < sum.rows; row += kAtOnce) {
+    const int rows = std::min(kAtOnce, sum.rows - row);
+    draw_exposed(during_exposure(row + 0.5 * (rows - 1)), {0, row, sum.cols, rows}, sum);
+  }
+  return sum;
+}
+
+cv::Mat PictureRenderer::levels(const cv::Mat& light) const {
   cv::Mat out = light.clone();
   if (style_.blur_px > 0.0)
     cv::GaussianBlur(light, out, {}, style_.blur_px, style_.blur_px, cv::BORDER_REPLICATE);
@@ -386,19 +402,18 @@ cv::Mat PictureRenderer::levels(const cv::Mat& light, double brightness) const {
   for (int y = 0; y < out.rows; ++y) {
     auto* row = out.ptr<float>(y);
     for (int i = 0; i < 3 * out.cols; ++i) {
-      const float seen = std::clamp(row[i] * static_cast<float>(brightness), 0.0F, 1.0F);
+      const float seen = std::clamp(row[i], 0.0F, 1.0F);
       row[i] = 255.0F * (linear ? seen : to_srgb(seen));
     }
   }
   return out;
 }
 
-cv::Mat PictureRenderer::picture(const cv::Mat& light, std::int64_t index,
-                                 double brightness) const {
+cv::Mat PictureRenderer::picture(const cv::Mat& light, std::int64_t index) const {
   cv::Mat noise(light.size(), CV_32FC3), out;
   cv::RNG random(style_.seed * 0x9E3779B97F4A7C15ULL + static_cast<std::uint64_t>(index) + 1);
   random.fill(noise, cv::RNG::NORMAL, 0.0, style_.noise_levels);
-  cv::Mat(levels(light, brightness) + noise).convertTo(out, CV_8UC3);
+  cv::Mat(levels(light) + noise).convertTo(out, CV_8UC3);
   return out;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -40,11 +41,13 @@ class PictureRenderer {
 
   /// Linear light (CV_32FC3, blue green red, 0..1), sharp but for the pixels, averaged over poses.
   [[nodiscard]] cv::Mat light(const std::vector<data::Pose<>>& during_exposure) const;
+  /// The same of rows that are not exposed all at once. @param during_exposure of a row: poses.
+  using ExposureOfRow = std::function<std::vector<data::Pose<>>(double row_px)>;
+  [[nodiscard]] cv::Mat rolling_light(const ExposureOfRow& during_exposure) const;
   /// Blurred and through the camera's transfer, 0..255, before noise and rounding (CV_32FC3).
-  [[nodiscard]] cv::Mat levels(const cv::Mat& light, double brightness = 1.0) const;
-  /// What a camera makes of it: blur, brightness, transfer, noise of frame `index`, 8 bit.
-  [[nodiscard]] cv::Mat picture(const cv::Mat& light, std::int64_t index,
-                                double brightness = 1.0) const;
+  [[nodiscard]] cv::Mat levels(const cv::Mat& light) const;
+  /// What a camera makes of it: blur, transfer, noise of frame `index`, 8 bit.
+  [[nodiscard]] cv::Mat picture(const cv::Mat& light, std::int64_t index) const;
 
  private:
   struct Posed;
@@ -62,7 +65,9 @@ class PictureRenderer {
   [[nodiscard]] cv::Vec3f light_of_pixel(const cv::Point& pixel, int across,
                                          const Posed& body) const;
   void draw_floor();
-  void draw_body(const data::Pose<>& pose, float share, cv::Mat& sum) const;
+  void draw_body(const data::Pose<>& pose, const cv::Rect& within, float share, cv::Mat& sum) const;
+  void draw_exposed(const std::vector<data::Pose<>>& poses, const cv::Rect& within,
+                    cv::Mat& sum) const;
 
   data::Body body_;
   data::Camera camera_;

@@ -524,12 +524,18 @@ std::unique_ptr<FrameSource> open_video(const fs::path& path, const SourceOption
 }
 
 double readout_share(const VideoInfo& video, const Eigen::Vector2d& point_px) {
+  const Eigen::Vector2d per_px = readout_share_per_px(video);
+  const double share = per_px.dot(point_px);
+  return std::clamp(per_px.sum() < 0.0 ? 1.0 + share : share, 0.0, 1.0);
+}
+
+Eigen::Vector2d readout_share_per_px(const VideoInfo& video) {
   const int turned = video.orientation;
   const bool along_x = turned >= 5,
              backwards = turned == 3 || turned == 4 || turned == 6 || turned == 7;
   const int rows = along_x ? video.width_px : video.height_px;
-  const double share = (along_x ? point_px.x() : point_px.y()) / std::max(1, rows - 1);
-  return std::clamp(backwards ? 1.0 - share : share, 0.0, 1.0);
+  const double per_px = (backwards ? -1.0 : 1.0) / std::max(1, rows - 1);
+  return along_x ? Eigen::Vector2d(per_px, 0.0) : Eigen::Vector2d(0.0, per_px);
 }
 
 }  // namespace trochoid::tracking

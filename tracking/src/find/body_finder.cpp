@@ -76,10 +76,11 @@ class RimFinder final : public BodyFinder {
 class CylinderFinder final : public BodyFinder {
  public:
   CylinderFinder(const data::Body& body, const data::Support& support, const data::Camera& camera,
-                 double exposure_fraction, Effort effort)
+                 double exposure_fraction, Effort effort, const Eigen::Vector2d& readout_per_px)
       : body_(body),
         camera_(camera),
         exposure_fraction_(exposure_fraction),
+        readout_per_px_(readout_per_px),
         alike_(body.faces_look_alike() && support.kind != data::SupportKind::pivot),
         pivoted_(support.kind == data::SupportKind::pivot),
         motion_(body, support, camera),
@@ -87,7 +88,8 @@ class CylinderFinder final : public BodyFinder {
         looks_again_(effort != Effort::quick) {
     if (support.kind != data::SupportKind::floor) return;
     const data::Support flat{data::SupportKind::flat, {}};
-    lying_ = std::make_unique<CylinderFinder>(body, flat, camera, exposure_fraction, effort);
+    lying_ = std::make_unique<CylinderFinder>(body, flat, camera, exposure_fraction, effort,
+                                              readout_per_px);
   }
 
   [[nodiscard]] std::optional<Sighting> find(const Look& look) const override {
@@ -100,6 +102,8 @@ class CylinderFinder final : public BodyFinder {
                          : std::nullopt,
         .previous = look.last != nullptr && look.last->pose ? std::optional(look.last->pose->pose)
                                                             : std::nullopt,
+        .side_of_previous = look.side_of_last,
+        .readout_per_px = readout_per_px_,
         .exposure_fraction = exposure_fraction_,
         .chroma = look.frame.chroma,
         .background_chroma = look.background.chroma,
@@ -201,6 +205,7 @@ class CylinderFinder final : public BodyFinder {
   data::Body body_;
   data::Camera camera_;
   double exposure_fraction_;
+  Eigen::Vector2d readout_per_px_;
   bool alike_, pivoted_;
   data::PoseMotion motion_;
   OutlineFitter fitter_;
@@ -217,8 +222,10 @@ std::unique_ptr<BodyFinder> make_rim_finder() {
 std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,
                                                  const data::Support& support,
                                                  const data::Camera& camera,
-                                                 double exposure_fraction, Effort effort) {
-  return std::make_unique<CylinderFinder>(body, support, camera, exposure_fraction, effort);
+                                                 double exposure_fraction, Effort effort,
+                                                 const Eigen::Vector2d& readout_per_px) {
+  return std::make_unique<CylinderFinder>(body, support, camera, exposure_fraction, effort,
+                                          readout_per_px);
 }
 
 }  // namespace trochoid::tracking

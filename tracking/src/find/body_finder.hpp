@@ -43,6 +43,7 @@ struct Look {
   std::optional<Detection> detection{};
   const Sighting* predicted = nullptr;
   const Sighting* last = nullptr;  ///< in the frame before, if seen there
+  int side_of_last = 1;            ///< -1: it is a later frame, of one who follows back
   double reach_px = 4.0;           ///< how far off the prediction may be
   double shape_sigma_px = 1.0;     ///< how well the predicted rim's shape is known
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< per frame
@@ -95,10 +96,10 @@ class BodyFinder {
 
 /// By the outline of the known cylinder under the known camera.
 /// @param exposure_fraction shutter time over frame interval, 0 if unknown.
-[[nodiscard]] std::unique_ptr<BodyFinder> make_cylinder_finder(const data::Body& body,
-                                                               const data::Support& support,
-                                                               const data::Camera& camera,
-                                                               double exposure_fraction,
-                                                               Effort effort = Effort::normal);
+/// @param readout_per_px OutlineView's.
+[[nodiscard]] std::unique_ptr<BodyFinder> make_cylinder_finder(
+    const data::Body& body, const data::Support& support, const data::Camera& camera,
+    double exposure_fraction, Effort effort = Effort::normal,
+    const Eigen::Vector2d& readout_per_px = Eigen::Vector2d::Zero());
 
 }  // namespace trochoid::tracking

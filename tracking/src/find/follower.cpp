@@ -146,6 +146,7 @@ std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& ex
   look.reach_px = reach_px;
   set_shape_knowledge(look, guess);
   if (lost_ == 0) look.last = &forecast_.last();
+  look.side_of_last = forecast_.side_of_last(frame.t_s);
   look.motion_px = guess.centre_px - forecast_.last().centre_px;
   auto seen = finder_.find(look);
   if (!seen || !plausible(*seen, guess, reach_px + 0.3 * size)) return std::nullopt;
@@ -199,6 +200,7 @@ Sighting Follower::as_it_moves(const Frame& frame, const Sighting& found) const 
   Look look{.frame = frame, .background = plate_};
   look.predicted = &found;
   look.last = &*earlier;
+  look.side_of_last = forecast_.side_of_last(frame.t_s);
   look.motion_px = found.centre_px - earlier->centre_px;
   auto again = finder_.find(look);
   return again && again->visible_support_px() > found.visible_support_px() ? *again : found;

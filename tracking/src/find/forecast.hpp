@@ -32,6 +32,8 @@ class Forecast {
   /// turns [px].
   [[nodiscard]] double surprise_px() const { return missed_px_[trusted()]; }
   [[nodiscard]] const Sighting& last() const { return past_.back().seen; }
+  /// 1 if that was before t_s, -1 if it was after it.
+  [[nodiscard]] int side_of_last(double t_s) const { return t_s < past_.back().t_s ? -1 : 1; }
   /// Whether the body has been seen more than once: after a single sighting it is taken for still.
   [[nodiscard]] bool knows_speed() const { return past_.size() > 1; }
   /// Frames between the last sighting and t_s.

@@ -40,11 +40,12 @@ struct Sweep {
 /// Of a place between those of two sweeps, `part` of the way.
 [[nodiscard]] Sweep between(const Sweep& from, const Sweep& to, double part);
 
-/// Outlines at the middles of so many equal parts of the exposure.
+/// Outlines at the middles of so many equal parts of the exposure, each row's its own.
 using Moments = std::vector<std::vector<OutlineSample>>;
 [[nodiscard]] Moments moments_of(const data::Body& body, const data::Camera& camera,
                                  const data::PoseMotion& motion, const ExposureMotion& exposure,
-                                 const data::Pose<>& middle, int parts);
+                                 const data::Pose<>& middle, int parts,
+                                 const MotionPerPx& per_px = {});
 
 /// Sweeps of all samples of the outline in the middle, each within as many parts as there are
 /// moments, at most Sweep::kMost.

@@ -196,6 +196,17 @@ Eigen::Vector3d axis_towards(const data::Camera& camera, const data::Pose<>& pos
   return k.dot(direction_to(camera, pose.centre_m)) < 0.0 ? Eigen::Vector3d(-k) : k;
 }
 
+void read_in_turn(const MotionPerPx& per_px, const Eigen::Vector2d& centre_px,
+                  std::vector<OutlineSample>& outline) {
+  if (per_px[0].size() == 0) return;
+  for (OutlineSample& sample : outline) {
+    const Eigen::Vector2d speed(sample.motion.dot(per_px[0]), sample.motion.dot(per_px[1]));
+    // It is read where it has gone to, not where it was.
+    const double by = speed.dot(sample.image_px - centre_px) / (1.0 - speed.dot(sample.normal_px));
+    sample.image_px += by * sample.normal_px;
+  }
+}
+
 std::vector<OutlineSample> outline_samples(const data::Body& body, const data::Pose<>& pose,
                                            const data::Camera& camera,
                                            const data::PoseMotion& motion, double step_px) {

@@ -251,7 +251,7 @@ class Chain {
   }
 
   /// Where the body was one frame from node i, in the reading that takes less of a turn.
-  [[nodiscard]] std::optional<Pose> near(std::size_t i, const Pose& pose) const {
+  [[nodiscard]] std::optional<Beside> near(std::size_t i, const Pose& pose) const {
     constexpr double kNext = 1.5;
     for (const std::size_t k : {i - 1, i + 1}) {
       if (k >= nodes_.size() || std::abs(nodes_[k].t_s - nodes_[i].t_s) > kNext * frame_s_)
@@ -262,7 +262,7 @@ class Chain {
           between_axes(axis, axis_of(one), alike_) <= between_axes(axis, axis_of(other), alike_)
               ? one
               : other;
-      return alike_ ? nearer_face(nearer, pose, 0.0) : nearer;
+      return Beside{alike_ ? nearer_face(nearer, pose, 0.0) : nearer, k < i ? 1 : -1};
     }
     return std::nullopt;
   }

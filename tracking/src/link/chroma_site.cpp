@@ -27,7 +27,7 @@ Shift seen_with(const Background& background, const BodyFinder& finder,
   std::vector<std::optional<Sighting>> seen(which.size());
   on_all_cores(background, finder, which.size(), [&](Measuring& measure, std::size_t k) {
     const std::size_t i = which[k];
-    seen[k] = measure(*glimpses[i].frame, *glimpses[i].seen, glimpses[i - 1].pose());
+    seen[k] = measure(*glimpses[i].frame, *glimpses[i].seen, Beside{glimpses[i - 1].pose(), 1});
   });
   Shift shift;
   for (const auto& again : seen)

@@ -100,7 +100,7 @@ double Measuring::agreement(const std::optional<FloorDarkening>& floor) const {
 }
 
 std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess,
-                                              const std::optional<data::Pose<>>& near,
+                                              const std::optional<Beside>& near,
                                               const ShadingMemory* shading, bool there) {
   finder_.place(guess);
   if (!prepare_plate(frame, guess, background_.lamp() ? kAround : kBeside)) return std::nullopt;
@@ -110,9 +110,10 @@ std::optional<Sighting> Measuring::operator()(const Frame& frame, Sighting guess
   look.there = there;
   Sighting last = guess;
   if (near) {
-    last.pose->pose = *near;
+    last.pose->pose = near->pose;
     finder_.place(last);
     look.last = &last;
+    look.side_of_last = near->side;
     look.motion_px = guess.centre_px - last.centre_px;
   }
   auto seen = finder_.find(look);

@@ -29,17 +29,24 @@ struct Glimpse {
 /// The same of its shadow alone.
 [[nodiscard]] double shadow_log_score_ratio(const Sighting& one, const Sighting& other);
 
+/// Where a body was one frame earlier (side 1) or will be one later (-1): how far it smears, and
+/// which way it goes.
+struct Beside {
+  data::Pose<> pose;
+  int side;
+};
+
 /// Measures a body about a guess in one frame.
 class Measuring {
  public:
   Measuring(const Background& background, const BodyFinder& finder)
       : background_(background), finder_(finder) {}
 
-  /// @param near its pose one frame earlier or later, if known: how far it smears.
+  /// @param near its pose one frame off, if known.
   /// @param shading light beside its outline in other frames, if known.
   /// @param there it is right there: nothing farther off is looked for.
   [[nodiscard]] std::optional<Sighting> operator()(const Frame& frame, Sighting guess,
-                                                   const std::optional<data::Pose<>>& near,
+                                                   const std::optional<Beside>& near,
                                                    const ShadingMemory* shading = nullptr,
                                                    bool there = false);
 

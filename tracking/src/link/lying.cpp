@@ -55,9 +55,10 @@ Pose lying(Pose pose) {
 }
 
 /// The same body lying there one frame before or after frame i.
-std::optional<Pose> neighbour(const std::vector<Glimpse>& glimpses, std::size_t i) {
+std::optional<Beside> neighbour(const std::vector<Glimpse>& glimpses, std::size_t i) {
   for (const std::size_t k : {i - 1, i + 1})
-    if (k < glimpses.size() && glimpses[k].posed()) return lying(glimpses[k].pose());
+    if (k < glimpses.size() && glimpses[k].posed())
+      return Beside{lying(glimpses[k].pose()), k < i ? 1 : -1};
   return std::nullopt;
 }
 

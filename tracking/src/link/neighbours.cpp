@@ -77,11 +77,12 @@ class Mending {
   /// What is seen in frame i where the body is expected.
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t i,
                                                  const Expected& expected) const {
-    if (!closely_) return measure(*was_[i].frame, expected.seen, expected.earlier);
+    if (!closely_) return measure(*was_[i].frame, expected.seen, Beside{expected.earlier, 1});
     const Surroundings surroundings = surroundings_of(was_, i);
     Sighting guess = expected.seen;
     guess.pose->blur_px = surroundings.blur_px;
-    return measure(*was_[i].frame, std::move(guess), expected.earlier, &surroundings.shading, true);
+    return measure(*was_[i].frame, std::move(guess), Beside{expected.earlier, 1},
+                   &surroundings.shading, true);
   }
 
   /// What is seen where the body is expected, if that explains frame i better than what it has.

@@ -56,7 +56,7 @@ class Branch {
                                                bool there) {
     const auto& [where, off] = expected;
     const Glimpse& next = as_led_[i + static_cast<std::size_t>(side_)];
-    auto seen = measure_(*glimpses_[i].frame, where, next.pose(), nullptr, there);
+    auto seen = measure_(*glimpses_[i].frame, where, Beside{next.pose(), -side_}, nullptr, there);
     if (!seen || !seen->pose || off_rad(*seen, where, finder_.faces_look_alike()) > 0.5 * off)
       return std::nullopt;
     return seen;

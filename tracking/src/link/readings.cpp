@@ -140,7 +140,7 @@ class Readings {
   }
 
   [[nodiscard]] std::optional<Sighting> measured(Measuring& measure, std::size_t k,
-                                                 const Pose& pose, const Pose& near) const {
+                                                 const Pose& pose, const Beside& near) const {
     Sighting guess = nodes_[k].seen();
     guess.pose->pose = pose;
     auto seen = measure(*glimpses_[nodes_[k].at].frame, std::move(guess), near);
@@ -161,7 +161,7 @@ class Readings {
                                                        const std::optional<Pose>& other) const {
     const auto before = other ? one_frame_off(k, *other, 1) : std::nullopt;
     if (!before) return std::nullopt;
-    auto seen = measured(measure, k, *other, *before);
+    auto seen = measured(measure, k, *other, {*before, 1});
     return seen && !same(*seen, nodes_[k].seen()) ? std::move(seen) : std::nullopt;
   }
 
@@ -279,7 +279,8 @@ class Readings {
       const Pose last = from.seen.pose->pose;
       const double last_s = nodes_[from.at].t_s;
       const double ahead = (nodes_[k].t_s - last_s) / (last_s - from.before_s);
-      auto seen = measured(measure, k, change(from.before, last).on(last, ahead, centre_), last);
+      auto seen = measured(measure, k, change(from.before, last).on(last, ahead, centre_),
+                           {last, from.side});
       if (!seen || same(*seen, nodes_[k].seen())) break;
       sum += log_score_ratio(*seen, nodes_[k].seen());
       best = std::max(best, sum);

@@ -46,7 +46,8 @@ void measure_again(const Background& background, const BodyFinder& finder, std::
     const Surroundings surroundings = surroundings_of(was, i);
     Sighting guess = seen;
     guess.pose->blur_px = surroundings.blur_px;
-    auto again = measure(*was[i].frame, std::move(guess), before, &surroundings.shading);
+    auto again =
+        measure(*was[i].frame, std::move(guess), Beside{*before, 1}, &surroundings.shading);
     if (!again || !again->pose || again->pose->support_px < kAsGood * seen.pose->support_px) return;
     const double off =
         std::max(between_axes(axis_of(again->pose->pose), axis_of(seen.pose->pose), alike),

@@ -325,6 +325,7 @@ PoseMeasurement measurement_of(const Scenery& scenery, const Fitted& fitted) {
   set_sigmas(spread_of(scenery, r.pose, r.solution.covariance), m);
   m.common = spread_of(scenery, r.pose, r.solution.common);
   m.inflation = r.solution.inflation;
+  m.sheared = r.solution.sheared;
   m.polarity_px = r.solution.polarity_px;
   m.rms_px = r.solution.rms_px;
   m.blur_px = fitted.blur_px;
@@ -369,6 +370,13 @@ std::optional<MarkReading> read_marks_of_either_face(const cv::Mat& luma, const 
   auto marks = read_marks(luma, body, camera, over);
   if (marks) pose = over;
   return marks;
+}
+
+MotionPerPx motion_per_px(const data::PoseMotion& motion, const OutlineView& view,
+                          const data::Pose<>& now) {
+  const data::PoseMotion::Step in_frame =
+      view.side_of_previous * motion.step_between(*view.previous, now);
+  return {view.readout_per_px.x() * in_frame, view.readout_per_px.y() * in_frame};
 }
 
 // Spin is counted from the node line: what phi is wrong by, psi takes back. An axis that is off
@@ -431,6 +439,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
       colour_window(view.luma, view.chroma, window, body_, camera_, starts.front());
   colour.site_px = view.chroma_site_px;
   const bool moving = view.predicted && view.previous;
+  const bool in_turn = moving && !view.readout_per_px.isZero();
   const Scenery scenery{
       .body = body_,
       .camera = camera_,
@@ -452,7 +461,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
                       ? std::optional(
                             ExposureMotion(*view.previous, starts.front(), view.exposure_fraction))
                       : std::nullopt,
-      .shading = view.shading};
+      .shading = view.shading,
+      .per_px = in_turn ? motion_per_px(motion, view, starts.front()) : MotionPerPx()};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;
@@ -463,6 +473,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
   find_uncertainty(scenery, *best);
   if (!believable(*best)) return std::nullopt;
   PoseMeasurement m = measurement_of(scenery, *best);
+  m.rows_in_turn = in_turn;
   if (moving)
     m.exposure =
         exposure_evidence(best->refined, motion.step_between(*view.previous, starts.front()));

@@ -236,8 +236,8 @@ void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round)
     longest = std::max(longest, std::abs(sample.motion.dot(scenery.smear)));
   if (longest < kLeastPx) return;
   const int parts = std::min(Sweep::kMost, static_cast<int>(std::ceil(longest / kPartPx)));
-  round.moments =
-      moments_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose, parts);
+  round.moments = moments_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose,
+                             parts, scenery.per_px);
   round.sweeps = sweeps_of(round.moments, round.outline);
 }
 
@@ -318,6 +318,8 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
   const double step_px = last ? search.step_px : search.first_step_px;
   round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion,
                                   search.exact ? kSmoothPx : step_px);
+  read_in_turn(scenery.per_px, scenery.camera.image_from_table<double>(pose.centre_m),
+               round.outline);
   find_sweeps(scenery, pose, round);
   if (search.exact) {
     round.smooth = round.outline;
@@ -427,8 +429,10 @@ void find_uncertainty(const Scenery& scenery, Refined& refined) {
   // By normalised errors of centre, tilt and precession in recordings made by two ray tracers.
   constexpr double kSides = 0.6, kFlanks = 1.5, kTwist = 0.75;
   const double narrow_rad = narrow_direction_rad(scenery.camera, refined.pose);
+  const Eigen::Vector2d centre_px = scenery.camera.image_from_table<double>(refined.pose.centre_m);
   for (size_t i = 0; i < refined.equations.size(); ++i) {
     EdgeEquation& e = refined.equations[i];
+    e.from_centre_px = refined.samples[i].image_px - centre_px;
     const double light_px = common_light_px(scenery.tints, refined.edges[i], refined.blurs_px[i]);
     e.common_px = std::hypot(kSides * light_px, sliver_px(refined.edges[i]));
     if (!refined.samples[i].silhouette) continue;

@@ -27,6 +27,7 @@ struct Scenery {
   std::optional<Tints> tints{};    ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
   const ShadingMemory* shading = nullptr;    ///< what other frames show; may be null
+  MotionPerPx per_px{};
 
   /// The same with both windows blurred.
   [[nodiscard]] Scenery blurred(double sigma_px) const {
@@ -41,7 +42,8 @@ struct Scenery {
             smear,
             tints,
             exposure,
-            shading};
+            shading,
+            per_px};
   }
 };
 

@@ -250,6 +250,29 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
   return covariance;
 }
 
+Sheared sheared_by_motion(const std::vector<EdgeEquation>& equations,
+                          const std::vector<EquationRow>& rows, const ArrowSystem& factorised,
+                          double scale, int first, int count) {
+  Sheared sheared;
+  for (const int axis : {0, 1}) {
+    auto& answers = sheared[static_cast<size_t>(axis)];
+    answers.resize(count, count);
+    for (int j = 0; j < count; ++j) {
+      Vector pattern{};
+      for (size_t i = 0; i < equations.size(); ++i) {
+        const EdgeEquation& e = equations[i];
+        rows[i].add_to(
+            e.weight / (e.variance_px2 * scale * scale) * e.motion[j] * e.from_centre_px[axis],
+            pattern);
+      }
+      factorised.solve(pattern);
+      answers.col(j) =
+          Eigen::Map<const Eigen::VectorXd>(&pattern[static_cast<size_t>(first)], count);
+    }
+  }
+  return sheared;
+}
+
 // Tukey's weights about the solution so far, for errors that are `scale` times as large as claimed.
 double weigh(std::vector<EdgeEquation>& equations, const std::vector<EquationRow>& rows,
              const Vector& x, double least_scale_px, const std::vector<double>& per_sd,
@@ -411,6 +434,7 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations,
   const double ratio = jackknife_ratio(all, sectors, solution.covariance);
   if (std::isfinite(ratio))
     solution.inflation = std::min(kBelieved * ratio + 1.0 - kBelieved, kMost);
+  solution.sheared = sheared_by_motion(equations, rows, factorised, solution.scale, first, n);
   solution.common = common_covariance(equations, rows, factorised, solution.scale, first, n);
   solution.covariance = solution.inflation * solution.covariance + solution.common;
 }

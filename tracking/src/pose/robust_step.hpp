@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct EdgeEquation {
   int group = 0;               ///< 0 .. kGroups - 1
   double direction_rad = 0.0;  ///< of the normal
   Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
+  Eigen::Vector2d from_centre_px = Eigen::Vector2d::Zero();  ///< where it is; for find_uncertainty
   /// What it may be wrong by together with all others of its group: alike for the whole lit side of
   /// a body, opposite on the dark one, so that only the answer moves and no residual shows it [px].
   double common_px = 0.0;
@@ -46,6 +48,11 @@ struct EdgeEquation {
   double residual_px = 0.0;  ///< out
 };
 
+/// PoseMeasurement::sheared.
+using Sheared = std::array<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0,
+                                         data::PoseMotion::kMost, data::PoseMotion::kMost>,
+                           2>;
+
 struct RobustSolution {
   data::PoseMotion::Step step;
   double scale = 1.0;  ///< of the errors, over what the edges claim; at least 1
@@ -55,6 +62,7 @@ struct RobustSolution {
   // From here on by find_uncertainty.
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
   Eigen::MatrixXd common;      ///< of it, what errors common to whole sides of the outline do
+  Sheared sheared{};
   /// Variance the rest has been multiplied by: how far the answer moves without parts of the
   /// outline, over what was expected. Noisy; frames of one clip have nearly the same.
   double inflation = 1.0;

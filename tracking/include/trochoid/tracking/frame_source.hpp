@@ -44,6 +44,8 @@ struct VideoInfo {
 /// Where in a rolling shutter's readout a point of the upright picture is exposed, 0 (first row) ..
 /// 1: the rows are the stored picture's, whichever way it was turned.
 [[nodiscard]] double readout_share(const VideoInfo& video, const Eigen::Vector2d& point_px);
+/// How much that grows from one pixel to the next, along x and along y [1/px].
+[[nodiscard]] Eigen::Vector2d readout_share_per_px(const VideoInfo& video);
 
 struct SourceOptions {
   bool colour = false;

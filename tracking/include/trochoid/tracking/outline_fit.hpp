@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "trochoid/data/body.hpp"
 #include "trochoid/data/camera.hpp"
 #include "trochoid/data/pose.hpp"
+#include "trochoid/data/pose_motion.hpp"
 #include "trochoid/data/scene.hpp"
 #include "trochoid/tracking/detector.hpp"
 #include "trochoid/tracking/effort.hpp"
@@ -53,6 +55,13 @@ struct PoseMeasurement {
   bool bright_marks = false;  ///< those that psi was read from look brighter than their face
   /// Of these, what does not come from the scatter of this frame's edges.
   PoseSpread common;
+  /// What a rolling shutter does to the pose, along x (first) and y of the picture: by how much it
+  /// comes out too far along each small motion (data::PoseMotion) if, from one pixel to the next,
+  /// the body goes on by one unit of a small motion (its column).
+  using PerMotion = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0,
+                                  data::PoseMotion::kMost, data::PoseMotion::kMost>;
+  std::array<PerMotion, 2> sheared{};
+  bool rows_in_turn = false;  ///< a rolling shutter was allowed for
   /// Variance by which the scatter has been multiplied because parts of the outline contradict each
   /// other; noisy, frames of one clip have nearly the same: PoseMeasurement::inflate.
   double inflation = 1.0;
@@ -93,9 +102,13 @@ struct OutlineView {
   /// Nearly right in its attitude: the mirror image is not considered.
   std::optional<data::Pose<>> predicted;
   std::optional<data::Pose<>> previous{};  ///< one frame earlier or later: how fast it moves
-  double exposure_fraction = 0.0;          ///< shutter time over frame interval: how far it smears
-  cv::Mat chroma{};                        ///< CV_8UC2 of half the size, or empty: Frame::chroma
-  cv::Mat background_chroma{};             ///< what it would be without the body, or empty
+  int side_of_previous = 1;                ///< -1: it is the later one
+  /// Rolling shutter: by what part of the frame interval a pixel is read later than the one before
+  /// it, along x and along y. Allowed for where it is known how the body moves.
+  Eigen::Vector2d readout_per_px = Eigen::Vector2d::Zero();
+  double exposure_fraction = 0.0;  ///< shutter time over frame interval: how far it smears
+  cv::Mat chroma{};                ///< CV_8UC2 of half the size, or empty: Frame::chroma
+  cv::Mat background_chroma{};     ///< what it would be without the body, or empty
   /// Where samples of chroma lie, from the middle of the four pixels they belong to.
   Eigen::Vector2d chroma_site_px = Eigen::Vector2d::Zero();
   /// PoseMeasurement::blur_px of the frame before; without, it is found by looking repeatedly.
