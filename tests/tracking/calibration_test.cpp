@@ -99,6 +99,16 @@ TEST(Calibration, FindsTheCameraThatDrewTheBoards) {
   EXPECT_NEAR(result.camera.position_m().head<2>().norm(), 0.0, kHeight_m);
 }
 
+// Shrunk to a quick look, boards of a sixth of the picture's width lose corners at their far side,
+// and the others make a board of fewer columns.
+TEST(Calibration, FindsABoardThatLooksLikeASmallerOneAtAQuickLook) {
+  for (const auto& [distance, about_x, about_y] :
+       {std::array{1.4, 0.0, -0.5}, {1.7, 0.0, 0.3}, {1.7, 0.4, 0.0}})
+    EXPECT_TRUE(find_board(draw_chessboard(looking(distance, about_x, about_y)),
+                           {kColumns, kRows, kSquare_m, {}, {}}, "drawn"))
+        << distance << " m, " << about_x << ", " << about_y;
+}
+
 TEST(Calibration, PlacesTheFloorByFourPoints) {
   const data::Camera truth = looking(0.6, 0.3, -0.2);
   FloorPoints points;

@@ -68,18 +68,22 @@ void sharpen(const cv::Mat& luma, std::vector<cv::Point2f>& corners) {
 }  // namespace
 
 std::optional<cv::Size> chessboard_in(const cv::Mat& luma, const BoardPattern& pattern) {
-  constexpr double kEnough_px = 320.0;
+  constexpr double kEnough_px = 320.0, kMore_px = 480.0;
   constexpr int kFewest = 3;
-  const double shrink = std::min(1.0, kEnough_px / std::max(luma.cols, luma.rows));
-  cv::Mat small;
-  cv::resize(luma, small, {}, shrink, shrink, cv::INTER_AREA);
+  const auto seen_at = [&luma](double longest_px, const cv::Size& size) {
+    const double shrink = std::min(1.0, longest_px / std::max(luma.cols, luma.rows));
+    cv::Mat small;
+    cv::resize(luma, small, {}, shrink, shrink, cv::INTER_AREA);
+    std::vector<cv::Point2f> corners;
+    return cv::findChessboardCorners(small, size, corners);
+  };
+  const cv::Size wanted(pattern.columns, pattern.rows);
   for (const int more_columns : {0, -1, 1})
     for (const int more_rows : {0, -1, 1}) {
-      const cv::Size size(pattern.columns + more_columns, pattern.rows + more_rows);
-      std::vector<cv::Point2f> corners;
-      if (std::min(size.width, size.height) >= kFewest &&
-          cv::findChessboardCorners(small, size, corners))
-        return size;
+      const cv::Size size(wanted.width + more_columns, wanted.height + more_rows);
+      if (std::min(size.width, size.height) < kFewest || !seen_at(kEnough_px, size)) continue;
+      // Corners lost at a side for their smallness leave a board that seems to have fewer.
+      return size.area() < wanted.area() && seen_at(kMore_px, wanted) ? wanted : size;
     }
   return std::nullopt;
 }
