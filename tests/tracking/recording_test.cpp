@@ -26,6 +26,21 @@ TEST(Recording, LooksAheadAsFarAsItCan) {
   EXPECT_GE(recording.samples().luma.size(), Background::kSamples);
 }
 
+// Of pictures that all decode alone a look over the recording decodes some, from all of it: it
+// would cost as much as the tracking.
+TEST(Recording, LooksOverALongSeriesAtAFewPicturesOfIt) {
+  constexpr int kPictures = 240, kMost = 60, kLate = 200;
+  const ScratchFolder folder("long_series");
+  for (int i = 0; i < kPictures; ++i)
+    cv::imwrite(folder / fmt::format("{:03}.png", i), cv::Mat(48, 64, CV_8U, cv::Scalar(i)));
+  const auto keys = open_video(folder / "", {.frame_rate_hz = 100.0, .key_frames_only = true});
+  int count = 0;
+  double latest = 0.0;
+  while (const auto frame = keys->next()) ++count, latest = cv::mean(frame->luma)[0];
+  EXPECT_LT(count, kMost);
+  EXPECT_GT(latest, kLate);
+}
+
 TEST(Recording, LooksBeyondAPartThatFitsIntoOneWindow) {
   constexpr int kPictures = 100, kLast = 45;
   const ScratchFolder folder("short_part");

@@ -260,16 +260,29 @@ class LibavSource final : public FrameSource {
         return true;
       }
       const bool ours = packet_->stream_index == stream_->index;
-      const bool wanted = ours && (!options_.key_frames_only || (packet_->flags & AV_PKT_FLAG_KEY));
+      const bool wanted = ours && (!options_.key_frames_only ||
+                                   ((packet_->flags & AV_PKT_FLAG_KEY) != 0 && is_its_turn()));
       if (wanted) avcodec_send_packet(decoder_.get(), packet_.get());
       av_packet_unref(packet_.get());
       if (wanted) return true;
     }
   }
 
-  /// The next picture of a series, stamped with its place in it.
+  /// Of frames that decode alone, lest a recording of nothing else be decoded twice: sixteen, then
+  /// every second until there are eight more, every fourth until there are eight more, ... Who
+  /// drops every second one whenever he has sixteen keeps them evenly spread.
+  bool is_its_turn() {
+    constexpr std::int64_t kEach = 8;
+    if (keys_++ % key_stride_ != 0) return false;
+    if (++keys_taken_ > kEach && keys_taken_ % kEach == 0) key_stride_ *= 2;
+    return true;
+  }
+
+  /// The next picture of a series, stamped with its place among those that are read.
   bool feed_picture() {
     constexpr std::streamoff kMostBytes = 1 << 30;
+    while (options_.key_frames_only && next_picture_ < series_->pictures.size() && !is_its_turn())
+      ++next_picture_;
     if (next_picture_ == series_->pictures.size()) {
       flushing_ = true;
       avcodec_send_packet(decoder_.get(), nullptr);
@@ -281,7 +294,8 @@ class LibavSource final : public FrameSource {
     if (av_new_packet(packet_.get(), static_cast<int>(bytes)) < 0) throw std::bad_alloc();
     if (!file.seekg(0).read(reinterpret_cast<char*>(packet_->data), bytes))
       fail(undecodable(next_picture_));
-    packet_->pts = packet_->dts = static_cast<std::int64_t>(next_picture_++);
+    packet_->pts = packet_->dts = pictures_fed_++;
+    ++next_picture_;
     packet_->flags |= AV_PKT_FLAG_KEY;
     avcodec_send_packet(decoder_.get(), packet_.get());
     av_packet_unref(packet_.get());
@@ -485,6 +499,9 @@ class LibavSource final : public FrameSource {
   VideoInfo info_;
   std::optional<ImageSequence> series_;
   std::size_t next_picture_ = 0;  ///< of the series, to be decoded
+  std::int64_t pictures_fed_ = 0;
+  /// Frames that decode alone, and those of them that were decoded.
+  std::int64_t keys_ = 0, keys_taken_ = 0, key_stride_ = 1;
   Turn turn_;
   bool photographs_ = false;
   bool first_is_decoded_ = false;  ///< ahead of its turn, for what it says of itself

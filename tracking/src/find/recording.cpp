@@ -73,8 +73,8 @@ void Recording::remember_window() {
     elsewhere_ = spread(elsewhere_, kBackgroundSamples / 2);
 }
 
-/// A long recording has many frames that decode alone; keeps every n-th, doubling n when full. What
-/// cannot be read is told when it is its turn, and may lie beyond the end that was asked for.
+/// A long recording has many frames that decode alone; keeps some of those that a quick look shows.
+/// What cannot be read is told when it is its turn, and may lie beyond the end that was asked for.
 void Recording::read_ahead() try {
   if (std::exchange(looked_ahead_, true)) return;
   SourceOptions options = options_;
@@ -82,13 +82,10 @@ void Recording::read_ahead() try {
   options.from.clear();
   options.to.clear();
   const auto keys = open_video(path_, options);
-  std::size_t stride = 1, count = 0;
   while (auto frame = next_of(*keys)) {
-    if (count++ % stride != 0) continue;
     elsewhere_.push_back(std::move(*frame));
-    if (elsewhere_.size() < kBackgroundSamples) continue;
-    elsewhere_ = spread(elsewhere_, kBackgroundSamples / 2);
-    stride *= 2;
+    if (elsewhere_.size() >= kBackgroundSamples)
+      elsewhere_ = spread(elsewhere_, kBackgroundSamples / 2);
   }
 } catch (const InputError&) {
 }

@@ -59,7 +59,8 @@ struct SourceOptions {
       untimed_rate_hz{};     ///< of an image sequence where frame_rate_hz is not given
   std::string from{}, to{};  ///< "1.5" seconds or "f120" frames, inclusive; empty = all
   int decoder_threads = 0;   ///< 0 = the decoder's choice
-  /// Only frames that decode alone: a quick look over a long recording. Indices then count these.
+  /// Only frames that decode alone, ever fewer of them the more there are, so that the others cost
+  /// no decoding: a quick look over a long recording. Indices then count those handed out.
   bool key_frames_only = false;
   bool chroma = false;         ///< fill Frame::chroma where the coding has it
   bool apart_in_time = false;  ///< refuse a picture of the same time as the one before, or earlier
