@@ -105,12 +105,46 @@ TEST_F(SmearedDisc, IsFoundAgainAfterAKnock) {
     ASSERT_TRUE(one && two);
     Follower follower(*finder_, background_, nullptr);
     follower.start(first, *one);
-    follower.resume({{first.t_s, *one}, {second.t_s, *two}});
+    follower.resume({{first.t_s, *one}, {second.t_s, *two}}, {first.t_s, second.t_s});
     const auto again = follower.follow(third);
     if (again && (again->centre_px - knocked_to).norm() < 0.5) ++found;
   }
   // By looks that take it for still, three.
   EXPECT_GE(found, kKnocks - 2);
+}
+
+// A disc that had been lost, and was then found in those frames by what those around them say, is
+// looked for as one seen in the frame before: its smear is known.
+TEST_F(SmearedDisc, GoesOnAsIfItHadNeverBeenLostWhereItsFramesWereMended) {
+  constexpr int kLost = 3;
+  const Eigen::Vector2d at(95.0, 80.0);
+  const auto phi = [](int i) { return 0.3 + kPerFrame_rad * i; };
+  std::vector<Frame> frames;
+  for (int i = 0; i <= kLost + 2; ++i) frames.push_back(frame(i, phi(i), at));
+  std::vector<std::pair<double, Sighting>> seen;
+  std::vector<double> frames_s;
+  for (int i = 0; i <= kLost + 1; ++i) {
+    const Frame& frame = frames[static_cast<std::size_t>(i)];
+    const auto sighting = seen_in(frame, phi(i), at);
+    ASSERT_TRUE(sighting);
+    seen.emplace_back(frame.t_s, *sighting);
+    frames_s.push_back(frame.t_s);
+  }
+  const auto found_after = [&](int hidden) {
+    Follower follower(*finder_, background_, nullptr);
+    follower.start(frames[0], seen[0].second);
+    for (int i = 1; i <= kLost + 1; ++i) {
+      Frame shown = frames[static_cast<std::size_t>(i)];
+      if (i > kLost + 1 - hidden) shown.luma = background_.plate().luma;
+      EXPECT_EQ(follower.follow(shown).has_value(), i <= kLost + 1 - hidden) << i;
+    }
+    follower.resume(seen, frames_s);
+    return follower.follow(frames.back());
+  };
+  const auto never_lost = found_after(0), lost = found_after(kLost);
+  ASSERT_TRUE(never_lost && lost);
+  EXPECT_LT((lost->centre_px - never_lost->centre_px).norm(), 0.02);
+  EXPECT_LT((lost->centre_px - at).norm(), 0.3);
 }
 
 // Hidden for 40 ms, in which it goes three times its radius. Thirty frames of a slower recording

@@ -510,7 +510,9 @@ class Tracking {
     auto at = path.frames.end();
     for (int k = 0; k < kLast && at != path.frames.begin(); ++k) --at;
     for (; at != path.frames.end(); ++at) last.emplace_back(at->second.t_s, at->second.seen);
-    ahead.resume(last);
+    std::vector<double> frames_s;
+    for (const Frame& frame : frames) frames_s.push_back(frame.t_s);
+    ahead.resume(last, frames_s);
   }
 
   [[nodiscard]] std::shared_ptr<const SpinProfile> marks_of(const Frame& frame,

@@ -69,10 +69,21 @@ void Follower::start(const Frame& frame, const Sighting& seen) {
   away_ = off_colour_ = weak_ = 0.0;
 }
 
-void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen) {
+void Follower::resume(const std::vector<std::pair<double, Sighting>>& seen,
+                      const std::vector<double>& frames_s) {
   if (seen.empty()) return;
   forecast_.start(seen.front().first, seen.front().second);
   for (std::size_t i = 1; i < seen.size(); ++i) forecast_.add(seen[i].first, seen[i].second, true);
+  int lost = 0;
+  double away = 0.0;
+  for (std::size_t i = frames_s.size(); i-- > 0 && frames_s[i] > seen.back().first;) {
+    ++lost;
+    away += i > 0 ? usual_frames(frames_s[i] - frames_s[i - 1]) : 0.0;
+  }
+  // Seen before all of these: what it knows of that stands.
+  const bool beyond = lost > 0 && static_cast<std::size_t>(lost) == frames_s.size();
+  lost_ = beyond ? std::max(lost_, lost) : lost;
+  away_ = beyond ? std::max(away_, away) : away;
 }
 
 /// Contrast of a sighting over what is usual for this body here, of face or outline, whichever is

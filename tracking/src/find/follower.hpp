@@ -23,7 +23,10 @@ class Follower {
 
   /// What it has followed is known better now: goes on from the last sightings of these.
   /// @param seen by time, from the oldest.
-  void resume(const std::vector<std::pair<double, Sighting>>& seen);
+  /// @param frames_s times of the frames in which that is known, the last one it has followed last:
+  /// in those after the last sighting the body was not seen.
+  void resume(const std::vector<std::pair<double, Sighting>>& seen,
+              const std::vector<double>& frames_s);
   /// Starts from a measured sighting.
   void start(const Frame& frame, const Sighting& seen);
   /// The body in the next frame (earlier or later than the last), if it is seen there.
