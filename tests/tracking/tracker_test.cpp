@@ -392,6 +392,38 @@ TEST(TrackVideo, ABodyThatPrecessesInPlaceIsSeenThroughout) {
   EXPECT_LT(largest_error_px(result.file.tracks[0], [&](int) { return centre_px; }), 0.5);
 }
 
+// What is held in memory at once ends somewhere: of the frames there those that come later know
+// better, and of the first ones of the next stretch those before.
+TEST(TrackVideo, NoFrameIsDoubtedForWantOfThoseBesideItThatWereHeldAtAnotherTime) {
+  const ScratchFolder folder("joins");
+  constexpr int kSide = 160, kLength = 55;
+  constexpr double kScale_px_m = 1000.0, kRadius_px = 25.0, kOff_px = 30.0;
+  const double middle_px = 0.5 * (kSide - 1);
+  write_clip(folder / "clip.mkv", drawn_floor(kSide, kSide, 140.0), kLength, 2.0,
+             [&](cv::Mat& picture, int i) {
+               const double theta = 0.8 + 0.1 * std::sin(0.7 * i), sine = std::sin(theta);
+               const double phi = 0.3 * i + 0.5 * std::sin(0.7 * i);
+               draw_disc(picture, middle_px + kOff_px * sine * std::cos(phi),
+                         middle_px - kOff_px * sine * std::sin(phi), kRadius_px,
+                         kRadius_px * std::cos(theta), 0.5 * std::numbers::pi - phi, 60.0);
+             });
+  data::Scene scene;
+  data::Body& body = scene.body.emplace();
+  body.radius_m = kRadius_px / kScale_px_m;
+  body.thickness_m = 0.0005;
+  scene.support.kind = data::SupportKind::pivot;
+  scene.support.pivot_m = Eigen::Vector3d::Zero();
+  TrackOptions options;
+  options.held_bytes = 1;  // 32 pictures, of which 12 are held once more
+  const TrackResult result = track_video(
+      folder / "clip.mkv", scene, data::Camera::from_scale(kSide, kSide, kScale_px_m), options);
+  const auto& samples = result.file.tracks.at(0).samples;
+  EXPECT_EQ(samples.size(), static_cast<std::size_t>(kLength));
+  for (const data::TrackSample& sample : samples)
+    if (sample.frame > 0 && sample.frame < kLength - 1)
+      EXPECT_FALSE(sample.doubtful()) << "frame " << sample.frame;
+}
+
 /// A disc that wobbles about on its rim, seen from above, 16 px in radius.
 data::Scene write_wobbling(const std::filesystem::path& clip, double radius_m) {
   write_clip(clip, drawn_floor(220, 130, 150.0), 60, 2.0, [](cv::Mat& picture, int i) {

@@ -483,29 +483,44 @@ class Tracking {
     return {std::move(path), std::move(ahead)};
   }
 
-  /// What consecutive frames say together.
+  /// What consecutive frames say together. At the front of a window, where they tell of frames on
+  /// one side only, what was settled before stands; behind that they begin anew.
   /// @param settled see Linking.
   void decide(BodyPath& path, const std::vector<Frame>& frames, std::size_t settled,
               Follower& ahead) const {
     std::vector<Glimpse> glimpses;
+    std::vector<std::optional<Sighting>> settled_before;
+    const auto undoubted_before = std::exchange(path.undoubted, {});
     for (const Frame& frame : frames) {
-      glimpses.push_back({&frame, {}});
+      Glimpse& g = glimpses.emplace_back(Glimpse{&frame, {}});
       if (const auto at = path.frames.find(frame.index); at != path.frames.end())
-        glimpses.back().seen = std::move(at->second.seen);
+        g.seen = std::move(at->second.seen);
+      if (settled_before.size() < settled)
+        settled_before.push_back(g.seen);
+      else if (const auto at = undoubted_before.find(frame.index); at != undoubted_before.end())
+        g.seen = at->second;
     }
     // Where there are other bodies, what is dark beside one need not be its shadow.
     const Linking link{background_, *finder_, objects_ == 1, options_.effort};
-    link(settled, path, glimpses);
+    auto undoubted = link(settled, path, glimpses);
+    for (std::size_t i = 0; i < settled_before.size(); ++i)
+      if (settled_before[i]) glimpses[i].seen = std::move(settled_before[i]);
     for (std::size_t i = 0; i < glimpses.size(); ++i) {
       Glimpse& g = glimpses[i];
       path.frames.erase(g.frame->index);
-      if (!g.seen) continue;
       const bool begins_next_window = i + kOverlap >= glimpses.size();
+      if (undoubted[i] && begins_next_window)
+        path.undoubted[g.frame->index] = trimmed(std::move(*undoubted[i]));
+      if (!g.seen) continue;
       if (g.seen->pose && !begins_next_window) g.seen->pose->shading.reset();
       path.frames[g.frame->index] = {g.frame->t_s, trimmed(std::move(*g.seen))};
     }
-    // Enough for the forecast to learn how the body moves.
-    constexpr int kLast = 6;
+    go_on(path, frames, ahead);
+  }
+
+  /// Lets a follower know what the window's frames have decided on.
+  static void go_on(const BodyPath& path, const std::vector<Frame>& frames, Follower& ahead) {
+    constexpr int kLast = 6;  // enough for the forecast to learn how the body moves
     std::vector<std::pair<double, Sighting>> last;
     auto at = path.frames.end();
     for (int k = 0; k < kLast && at != path.frames.begin(); ++k) --at;

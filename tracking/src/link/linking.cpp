@@ -13,8 +13,8 @@
 
 namespace trochoid::tracking {
 
-void Linking::operator()(std::size_t settled, BodyPath& path,
-                         std::vector<Glimpse>& glimpses) const {
+std::vector<std::optional<Sighting>> Linking::operator()(std::size_t settled, BodyPath& path,
+                                                         std::vector<Glimpse>& glimpses) const {
   forget_what_the_path_jumps_to(glimpses);
   forget_weak_support_beside_gaps(glimpses);
   if (alone)
@@ -34,6 +34,8 @@ void Linking::operator()(std::size_t settled, BodyPath& path,
     measure_again(lit, finder, settled, glimpses);
     mend_from_neighbours(lit, finder, glimpses, true);
   }
+  std::vector<std::optional<Sighting>> undoubted;
+  for (const Glimpse& g : glimpses) undoubted.push_back(g.seen);
   doubt_attitudes(doubts, glimpses);
   measure_what_lies(lit, finder, glimpses);
   doubt_what_is_contradicted(finder, glimpses);
@@ -44,6 +46,7 @@ void Linking::operator()(std::size_t settled, BodyPath& path,
   place_other_readings(finder, settled, glimpses);
   for (std::size_t which = 0; which < path.readings.size(); ++which)
     path.readings[which].add(reading.tallies[which]);
+  return undoubted;
 }
 
 }  // namespace trochoid::tracking

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "link/glimpse.hpp"
@@ -19,7 +20,10 @@ struct Linking {
   Effort effort;
 
   /// @param settled so many glimpses at the front have been through this with all their neighbours.
-  void operator()(std::size_t settled, BodyPath& path, std::vector<Glimpse>& glimpses) const;
+  /// @return what was seen in each glimpse before it was doubted, or forgotten, for what those
+  /// around it say.
+  std::vector<std::optional<Sighting>> operator()(std::size_t settled, BodyPath& path,
+                                                  std::vector<Glimpse>& glimpses) const;
 };
 
 }  // namespace trochoid::tracking

@@ -28,6 +28,9 @@ struct BodyPath {
   /// Plate::chroma_site_px as its edges show it, where they do.
   std::optional<Eigen::Vector2d> chroma_site_px{};
   ReadingTallies readings{};  ///< of all its frames
+  /// The last ones, by frame index, as they were before those around them doubted them: the next
+  /// frames may know better.
+  std::map<std::int64_t, Sighting> undoubted{};
 };
 
 struct AssemblyOptions {
