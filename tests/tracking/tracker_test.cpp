@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <atomic>
 #include <limits>
@@ -60,6 +61,31 @@ TEST(TrackVideo, FindsADiscThatComesIntoViewLate) {
   EXPECT_GT(samples.front().frame, kEnters);
   EXPECT_LT(samples.front().frame, kEnters + 25) << "wholly in view from 17 on";
   EXPECT_EQ(samples.back().frame, kLength - 1);
+}
+
+// Of a frame that is done its sighting remains, without the edges that led to it: a kilobyte, where
+// those of this disc would be six.
+TEST(TrackVideo, RemembersLittleOfEveryFrame) {
+  const ScratchFolder folder("memory");
+  constexpr int kLength = 600, kEarly = 200, kLate = 500;
+  write_clip(folder / "clip.mkv", drawn_floor(96, 64, 150.0), kLength, 2.0,
+             [&](cv::Mat& picture, int i) {
+               draw_disc(picture, 48.0 + 25.0 * std::sin(0.05 * i), 32.0 + 8.0 * std::cos(0.07 * i),
+                         16.0, 16.0, 0.0, 50.0);
+             });
+  constexpr int kWindow = 50;  // frames over which what is held goes up and down
+  std::size_t early_bytes = 0, late_bytes = 0;
+  TrackOptions options;
+  options.held_bytes = 1;
+  options.progress = [&](std::int64_t done, std::int64_t) {
+    const std::size_t bytes = ::mallinfo2().uordblks;
+    if (done >= kEarly && done < kEarly + kWindow) early_bytes = std::max(early_bytes, bytes);
+    if (done >= kLate && done < kLate + kWindow) late_bytes = std::max(late_bytes, bytes);
+  };
+  const TrackResult result = track_video(folder / "clip.mkv", {}, std::nullopt, options);
+  EXPECT_EQ(result.summary.found, kLength);
+  constexpr std::size_t kMost_bytes = 3000;  // a frame
+  EXPECT_LT(late_bytes, early_bytes + (kLate - kEarly) * kMost_bytes);
 }
 
 // Equal discs meet head on and exchange their motion; the one that stood must not inherit the

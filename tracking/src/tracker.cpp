@@ -538,7 +538,7 @@ class Tracking {
 
   /// Edge points are kept only when they are wanted: they would outweigh everything else.
   [[nodiscard]] Sighting trimmed(Sighting seen) const {
-    if (!options_.edges) seen.edges = {};
+    if (!options_.edges) seen.edges = std::vector<EdgePoint>();  // {} would keep their room
     return seen;
   }
 
