@@ -15,7 +15,7 @@
 
 namespace trochoid::tracking {
 
-static_assert(Profile::kMost <= stretch::kMostSamples);
+static_assert(Profile::kMost == stretch::kMostSamples);
 namespace {
 
 using stretch::Block;
@@ -174,37 +174,30 @@ Fitting::Fitting(std::vector<StretchProfile>& profiles, const ShadingMemory& kno
 // Puts the samples of eight looks side by side.
 void Fitting::fill(size_t block) {
   Block& b = blocks_[block];
-  stretch::Sample* samples = samples_ + first_sample_[block];
+  static const Profile kNone{};
+  stretch::Lanes lanes;
   for (size_t l = 0; l < kLanes; ++l) {
     const size_t i = block * kLanes + l;
+    const Profile& profile = i < profiles_.size() ? profiles_[i].profile : kNone;
+    lanes.s_px[l] = profile.s_px.data(), lanes.light[l] = profile.light.data();
+    lanes.ground[l] = profile.background.data();
+    lanes.count[l] = profile.count;
     b.sharp_px[l] = 1.0f;
-    int count = 0;
-    if (i < profiles_.size()) {
-      const StretchProfile& p = profiles_[i];
-      const Profile& profile = p.profile;
-      count = profile.count;
-      b.sharp_px[l] = static_cast<float>(p.steps > 0 ? p.sharp_px : p.blur_px);
-      b.strip_px[l] = static_cast<float>(p.strip_px);
-      b.curved[l] = p.curved ? 1.0f : 0.0f;
-      b.own_share[l] = static_cast<float>(1.0 / profile.shared);
-      b.reach_px[l] = static_cast<float>(p.reach_px);
-      for (int j = 0; j < steps_of(p); ++j) {
-        b.step_at_px[j][l] = p.steps > 0 ? p.step_at_px[static_cast<size_t>(j)] : 0.0f;
-        b.step_part[j][l] = 1.0f / static_cast<float>(steps_of(p));
-      }
-      // Of mean one, so that levels and slopes compare with those of neighbours without a plate.
-      const auto scale = static_cast<float>(1.0 / light_of_plate(profile));
-      for (int j = 0; j < count; ++j) {
-        const auto k = static_cast<size_t>(j);
-        samples[j].s_px[l] = profile.s_px[k];
-        samples[j].light[l] = profile.light[k];
-        samples[j].ground[l] = p.plate ? scale * profile.background[k] : 1.0f;
-        samples[j].valid[l] = 1.0f;
-      }
+    if (i >= profiles_.size()) continue;
+    const StretchProfile& p = profiles_[i];
+    b.sharp_px[l] = static_cast<float>(p.steps > 0 ? p.sharp_px : p.blur_px);
+    b.strip_px[l] = static_cast<float>(p.strip_px);
+    b.curved[l] = p.curved ? 1.0f : 0.0f;
+    b.own_share[l] = static_cast<float>(1.0 / profile.shared);
+    b.reach_px[l] = static_cast<float>(p.reach_px);
+    for (int j = 0; j < steps_of(p); ++j) {
+      b.step_at_px[j][l] = p.steps > 0 ? p.step_at_px[static_cast<size_t>(j)] : 0.0f;
+      b.step_part[j][l] = 1.0f / static_cast<float>(steps_of(p));
     }
-    for (int j = count; j < b.samples; ++j)
-      samples[j].s_px[l] = samples[j].light[l] = samples[j].ground[l] = samples[j].valid[l] = 0.0f;
+    // Of mean one, so that levels and slopes compare with those of neighbours without a plate.
+    if (p.plate) lanes.per_ground[l] = static_cast<float>(1.0 / light_of_plate(profile));
   }
+  stretch::kernel().put_side_by_side(lanes, b.samples, samples_ + first_sample_[block]);
 }
 
 stretch::Variances Fitting::variances(const std::vector<Noise>& noise, size_t block) const {

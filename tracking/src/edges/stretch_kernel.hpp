@@ -22,6 +22,8 @@ constexpr int at(int i, int j) {
   return i * (i + 1) / 2 + j;
 }
 
+static_assert(kMostSamples % 4 == 0);  // they are read by fours
+
 /// Tables the kernels read.
 struct Tables {
   const float* normal;  ///< NormalTable: share and density in turns
@@ -82,6 +84,13 @@ struct alignas(kAlign) Block {
   Floats strip_share;  ///< of the offset, that the strip's inner edge tells
 };
 
+/// Eight looks as they were taken, each in arrays of its own, of kMostSamples.
+struct alignas(kAlign) Lanes {
+  const float *s_px[kLanes], *light[kLanes], *ground[kLanes];
+  Masks count = {};        ///< of samples
+  Floats per_ground = {};  ///< by which `ground` is multiplied; 0: it is 1
+};
+
 /// Variances of a sample inside, outside and on the edge.
 struct alignas(kAlign) Variances {
   Floats part[3];
@@ -96,6 +105,8 @@ struct CurveLooks {
 };
 
 struct Kernel {
+  /// What is given of so many samples, from one look after the other.
+  void (*put_side_by_side)(const Lanes&, int samples, Sample*);
   /// Columns of the model, levels of the plain step, gains.
   void (*find_columns)(Block&, Sample*, const Tables&);
   /// Sums of all columns, samples weighed by their noise, with what is expected of the levels;

@@ -54,6 +54,59 @@ TROCHOID_INLINE Floats variance_of(const Variances& noise, const Floats parts[3]
          (parts[0] * noise.part[0] + parts[1] * noise.part[1] + parts[2] * noise.part[2]);
 }
 
+// Four values, which memory may hold anywhere.
+using Quad = double __attribute__((vector_size(32)));
+using FloatQuad = float __attribute__((vector_size(16)));
+template <class Four, class Value>
+TROCHOID_INLINE Four loaded(const Value* from) {
+  Four q;
+  __builtin_memcpy(&q, from, sizeof q);
+  return q;
+}
+
+template <class Four>
+TROCHOID_INLINE void transpose(Four* q) {
+  const Four a = __builtin_shufflevector(q[0], q[1], 0, 4, 2, 6),
+             b = __builtin_shufflevector(q[0], q[1], 1, 5, 3, 7),
+             c = __builtin_shufflevector(q[2], q[3], 0, 4, 2, 6),
+             d = __builtin_shufflevector(q[2], q[3], 1, 5, 3, 7);
+  q[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  q[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  q[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  q[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+// Samples k .. k + 3 of every look.
+TROCHOID_INLINE void four_samples(const float* const* looks, int k, Floats* out) {
+  FloatQuad low[4], high[4];
+  for (int l = 0; l < 4; ++l) {
+    low[l] = loaded<FloatQuad>(looks[l] + k);
+    high[l] = loaded<FloatQuad>(looks[4 + l] + k);
+  }
+  transpose(low), transpose(high);
+  for (int i = 0; i < 4; ++i)
+    out[i] = __builtin_shufflevector(low[i], high[i], 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+void put_side_by_side(const Lanes& lanes, int samples, Sample* out) {
+  const Floats zero = {}, one = zero + 1.0f;
+  for (int k = 0; k < samples; k += 4) {
+    Floats s_px[4], light[4], ground[4];
+    four_samples(lanes.s_px, k, s_px);
+    four_samples(lanes.light, k, light);
+    four_samples(lanes.ground, k, ground);
+    for (int i = 0; i < (samples - k < 4 ? samples - k : 4); ++i) {
+      const Masks there = lanes.count > k + i;
+      Sample& sample = out[k + i];
+      sample.s_px = there ? s_px[i] : zero;
+      sample.light = there ? light[i] : zero;
+      const Floats scaled = lanes.per_ground > zero ? lanes.per_ground * ground[i] : one;
+      sample.ground = there ? scaled : zero;
+      sample.valid = there ? one : zero;
+    }
+  }
+}
+
 void find_columns(Block& b, Sample* samples, const Tables& tables) {
   const Floats zero = {}, inverse = 1.0f / b.sharp_px;
   bool strips = false, curved = false;
@@ -376,24 +429,54 @@ void find_variances(const CurveLooks& looks, int reach, double* variances, doubl
   }
 }
 
+// Calls use(k) for groups of four of N values; the last may begin within the one before.
+template <int N, class Use>
+TROCHOID_INLINE void by_fours(const Use& use) {
+#pragma GCC unroll 8
+  for (int k = 0; k < N; k += 4) use(k + 4 <= N ? k : N - 4);
+}
+
+// N values of each of so many looks, `stride` doubles apart, side by side; of what lanes are left
+// over, those of the last. (Lane by lane they would be stored in parts and read as a whole.)
+template <int N>
+TROCHOID_INLINE void gather(const double* first, int stride, int lanes, Doubles* out) {
+  const auto of_look = [&](int l) { return first + (l < lanes ? l : lanes - 1) * stride; };
+  by_fours<N>([&](int k) __attribute__((always_inline)) {
+    Quad low[4], high[4];
+    for (int l = 0; l < 4; ++l)
+      low[l] = loaded<Quad>(of_look(l) + k), high[l] = loaded<Quad>(of_look(4 + l) + k);
+    transpose(low), transpose(high);
+    for (int i = 0; i < 4; ++i)
+      out[k + i] = __builtin_shufflevector(low[i], high[i], 0, 1, 2, 3, 4, 5, 6, 7);
+  });
+}
+
+// The other way round.
+template <int N>
+TROCHOID_INLINE void scatter(const Doubles* values, double* first, int stride, int lanes) {
+  by_fours<N>([&](int k) __attribute__((always_inline)) {
+    Quad q[kLanes];
+    for (int i = 0; i < 4; ++i) {
+      q[i] = __builtin_shufflevector(values[k + i], values[k + i], 0, 1, 2, 3);
+      q[4 + i] = __builtin_shufflevector(values[k + i], values[k + i], 4, 5, 6, 7);
+    }
+    transpose(q), transpose(q + 4);
+    for (int l = 0; l < lanes; ++l) __builtin_memcpy(first + l * stride + k, &q[l], sizeof q[l]);
+  });
+}
+
 void estimate(const CurveLooks& looks, const double* variances, double* covariance,
               int covariance_stride, double* shading, int shading_stride) {
+  constexpr int kWhole = kShading * kShading;
   const int count = looks.count;
   for (int first = 0; first < count; first += kLanes) {
     const int lanes = count - first < kLanes ? count - first : kLanes;
-    Doubles m[at(kShading, 0)] = {}, r[kShading] = {}, variance[kShading];
-    for (int k = 0; k < kShading; ++k) {
-      const Doubles zero = {};
-      variance[k] = zero + 1.0;
-    }
-    for (int l = 0; l < lanes; ++l) {
-      const double* normal = looks.normal + (first + l) * looks.normal_stride;
-      for (int i = 0; i < kShading; ++i) {
-        for (int j = 0; j <= i; ++j) m[at(i, j)][l] = normal[i * kShading + j];
-        r[i][l] = looks.rest[(first + l) * looks.rest_stride + i];
-        variance[i][l] = variances[(first + l) * kShading + i];
-      }
-    }
+    Doubles whole[kWhole], m[at(kShading, 0)], r[kShading], variance[kShading];
+    gather<kWhole>(looks.normal + first * looks.normal_stride, looks.normal_stride, lanes, whole);
+    gather<kShading>(looks.rest + first * looks.rest_stride, looks.rest_stride, lanes, r);
+    gather<kShading>(variances + first * kShading, kShading, lanes, variance);
+    for (int i = 0; i < kShading; ++i)
+      for (int j = 0; j <= i; ++j) m[at(i, j)] = whole[i * kShading + j];
     for (int k = 0; k < kShading; ++k) m[at(k, k)] += 1.0 / variance[k];
     // Gauss-Jordan, one pivot after the other; leaves minus the inverse.
     const auto element = [](int i, int j) { return i >= j ? at(i, j) : at(j, i); };
@@ -413,24 +496,23 @@ void estimate(const CurveLooks& looks, const double* variances, double* covarian
       }
       m[at(k, k)] = -inverse;
     }
-    for (int l = 0; l < lanes; ++l) {
-      double* out = covariance + (first + l) * covariance_stride;
-      for (int i = 0; i < kShading; ++i)
-        for (int j = 0; j <= i; ++j)
-          out[i * kShading + j] = out[j * kShading + i] = -m[at(i, j)][l];
-    }
+    Doubles sums[kShading];
     for (int i = 0; i < kShading; ++i) {
-      Doubles sum = {};
-      for (int j = 0; j < kShading; ++j) sum -= m[element(i, j)] * r[j];
-      for (int l = 0; l < lanes; ++l) shading[(first + l) * shading_stride + i] = sum[l];
+      sums[i] = Doubles{};
+      for (int j = 0; j < kShading; ++j) {
+        sums[i] -= m[element(i, j)] * r[j];
+        whole[i * kShading + j] = -m[element(i, j)];
+      }
     }
+    scatter<kWhole>(whole, covariance + first * covariance_stride, covariance_stride, lanes);
+    scatter<kShading>(sums, shading + first * shading_stride, shading_stride, lanes);
   }
 }
 
 }  // namespace
 
 extern const Kernel TROCHOID_STRETCH_ISA;
-const Kernel TROCHOID_STRETCH_ISA{find_columns, sum_columns,    find_noise,
-                                  find_offsets, find_variances, estimate};
+const Kernel TROCHOID_STRETCH_ISA{put_side_by_side, find_columns,   sum_columns, find_noise,
+                                  find_offsets,     find_variances, estimate};
 
 }  // namespace trochoid::tracking::stretch
