@@ -85,6 +85,11 @@ struct Pixel {
   [[nodiscard]] EdgeSide side() const { return covered > 0.5 ? kInside : kOutside; }
 };
 
+// What the levels are found by: of a pixel that is clear of the border.
+struct ClearPixel {
+  double value, covered, wall;
+};
+
 // The same before it is known how body and surroundings mix.
 struct RawPixel {
   double value, luma;
@@ -96,8 +101,10 @@ struct RawPixel {
 struct ColourStretch {
   std::size_t sample;
   Harmonics harmonics;
-  std::size_t first = 0, end = 0;   // its pixels
-  double shade = 1.0;               // luma of the surroundings here over that of all around
+  std::size_t first = 0, end = 0;                         // its pixels
+  std::array<std::size_t, 2> first_clear{}, end_clear{};  // those of either side that are clear
+  double shade = 1.0;  // luma of the surroundings here over that of all around
+  const ColourMixing* mixing = nullptr;
   std::array<double, 2> levels{};   // by those of the whole outline
   double wall = 0.0;                // by how much its wall differs from the face
   std::array<double, 2> uneven2{};  // variance about these
@@ -115,8 +122,7 @@ class ColourFit {
     Contour::Place place;
   };
 
-  [[nodiscard]] std::vector<RawPixel> collect(const ColourWindow& colour, double blur_px,
-                                              int every);
+  void collect(const ColourWindow& colour, double blur_px, int every, std::vector<RawPixel>& raw);
   [[nodiscard]] std::optional<Nearest> nearest(const Eigen::Vector2d& at_px, double far_px) const;
   [[nodiscard]] Cover cover_at(const Eigen::Vector2d& at_px, const Nearest& nearest) const;
   void add_moment(const MomentOutline& moment, const Eigen::Vector2d& at_px, const Nearest& nearest,
@@ -128,7 +134,9 @@ class ColourFit {
   void over_neighbours(std::size_t reach, const Use& use);
   void mix(const ColourWindow& colour, const std::vector<RawPixel>& raw);
 
-  [[nodiscard]] static double off_level(const ColourStretch& stretch, const Pixel& pixel);
+  void gather_clear();
+  template <class AnyPixel>
+  [[nodiscard]] static double off_level(const ColourStretch& stretch, const AnyPixel& pixel);
   void fit_levels(EdgeSide side);
   bool find_noise(EdgeSide side);
   bool find_levels();
@@ -143,8 +151,9 @@ class ColourFit {
   std::vector<MomentOutline> moments_;
   double body_;  // colour of the body, about
   std::vector<ColourStretch> stretches_;
-  std::vector<Pixel> pixels_;      // stretch by stretch
-  std::array<double, 2> noise_{};  // sd of a pixel
+  std::vector<Pixel> pixels_;                     // stretch by stretch
+  std::array<std::vector<ClearPixel>, 2> clear_;  // likewise, of either side
+  std::array<double, 2> noise_{};                 // sd of a pixel
 };
 
 ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, double blur_px,
@@ -158,7 +167,9 @@ ColourFit::ColourFit(const ColourWindow& colour, const ExposedOutline& outline, 
   moments_.reserve(outline.moments.size());
   for (const auto& moment : outline.moments)
     moments_.emplace_back(moment, blur2_px2_, smear_, part_);
-  const std::vector<RawPixel> raw = collect(colour, blur_px, every);
+  // A quarter of a megabyte: kept, not had and given back with every look at a picture.
+  thread_local std::vector<RawPixel> raw;
+  collect(colour, blur_px, every, raw);
   find_shades(raw, colour.ground_luma);
   mix(colour, raw);
 }
@@ -171,7 +182,8 @@ double ColourFit::longest_sweep_px() const {
   return longest;
 }
 
-std::vector<RawPixel> ColourFit::collect(const ColourWindow& colour, double blur_px, int every) {
+void ColourFit::collect(const ColourWindow& colour, double blur_px, int every,
+                        std::vector<RawPixel>& raw) {
   // What turns fast shows no level near its ends: farther in and out it does.
   constexpr double kPerSweep = 0.3;
   const double sweep_px = longest_sweep_px();
@@ -179,7 +191,7 @@ std::vector<RawPixel> ColourFit::collect(const ColourWindow& colour, double blur
   for (const Contour& border : middle_.borders)
     for (std::size_t k = 0; k < border.size(); ++k)
       stretches_.push_back({border.sample_of(k), harmonics_of(border[k].normal_px)});
-  std::vector<RawPixel> raw;
+  raw.clear();
   for (int y = 0; y < colour.planes.rows; y += every)
     for (int x = 0; x < colour.planes.cols; ++x) {
       const Eigen::Vector2d at_px = colour.place_of(x, y);
@@ -193,7 +205,6 @@ std::vector<RawPixel> ColourFit::collect(const ColourWindow& colour, double blur
                      static_cast<double>(colour.luma.at<float>(y, x)), first + at->place.at,
                      cover});
     }
-  return raw;
 }
 
 std::optional<ColourFit::Nearest> ColourFit::nearest(const Eigen::Vector2d& at_px,
@@ -299,21 +310,21 @@ void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw
   for (ColourStretch& stretch : stretches_) {
     first += stretch.end;
     stretch.first = stretch.end = first - stretch.end;
+    stretch.mixing = &colour.mixing_in(stretch.shade);
   }
   pixels_.resize(raw.size());
   const Eigen::Index parameters = outline_.front().motion.size();
   for (const RawPixel& from : raw) {
     ColourStretch& stretch = stretches_[from.stretch];
-    const ColourMixing& mixing = colour.mixing_in(stretch.shade);
     Pixel& pixel = pixels_[stretch.end++];
     pixel.value = from.value;
     pixel.change = data::PoseMotion::Step::Zero(parameters);
     for (Eigen::Index k = 0; k < from.cover.covered.size(); ++k) {
       const double covered = from.cover.covered[k];
-      const double slope = mixing.slope(covered) / kTapsPx.size();
-      const double shown = mixing.shown(covered) / kTapsPx.size();
+      const double slope = stretch.mixing->slope(covered) / kTapsPx.size();
+      const double shown = stretch.mixing->shown(covered) / kTapsPx.size();
       pixel.covered += shown;
-      if (covered > 0.0) pixel.wall += shown * from.cover.wall[k] / covered;
+      if (from.cover.wall[k] > 0.0) pixel.wall += shown * from.cover.wall[k] / covered;
       pixel.density += slope * from.cover.density[k];
       for (Eigen::Index i = 0; i < parameters; ++i)
         pixel.change[i] += slope * from.cover.change(k, i);
@@ -321,7 +332,19 @@ void ColourFit::mix(const ColourWindow& colour, const std::vector<RawPixel>& raw
   }
 }
 
-double ColourFit::off_level(const ColourStretch& stretch, const Pixel& pixel) {
+// They are gone over a dozen times.
+void ColourFit::gather_clear() {
+  for (ColourStretch& stretch : stretches_) {
+    for (const EdgeSide side : {kInside, kOutside}) stretch.first_clear[side] = clear_[side].size();
+    for (std::size_t i = stretch.first; i < stretch.end; ++i)
+      if (const Pixel& pixel = pixels_[i]; pixel.is_clear())
+        clear_[pixel.side()].push_back({pixel.value, pixel.covered, pixel.wall});
+    for (const EdgeSide side : {kInside, kOutside}) stretch.end_clear[side] = clear_[side].size();
+  }
+}
+
+template <class AnyPixel>
+double ColourFit::off_level(const ColourStretch& stretch, const AnyPixel& pixel) {
   return pixel.value - pixel.covered * stretch.levels[kInside] - pixel.wall * stretch.wall -
          (1.0 - pixel.covered) * stretch.levels[kOutside];
 }
@@ -337,32 +360,31 @@ void ColourFit::fit_levels(EdgeSide side) {
   for (int k = kWall; k < kUnknowns; ++k) normal(k, k) = 1.0 / std::pow(kWallShare * body_, 2);
   Unknowns right = Unknowns::Zero();
   for (const ColourStretch& stretch : stretches_) {
-    // Columns of what a pixel shows of the face or the floor, and of its wall.
-    Eigen::Matrix<double, kUnknowns, 2> columns = Eigen::Matrix<double, kUnknowns, 2>::Zero();
-    columns.col(0).head<kHarmonics>() =
-        (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics;
-    columns.col(1).tail<kWallHarmonics>() = stretch.harmonics.head<kWallHarmonics>();
-    Eigen::Matrix2d weights = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
-    for (std::size_t i = stretch.first; i < stretch.end; ++i) {
-      const Pixel& pixel = pixels_[i];
-      if (!pixel.is_clear() || pixel.side() != side) continue;
+    // Sums over them, and with the share of the wall.
+    double once = 0.0, with_wall = 0.0, with_walls = 0.0, value = 0.0, value_with_wall = 0.0;
+    for (std::size_t i = stretch.first_clear[side]; i < stretch.end_clear[side]; ++i) {
+      const ClearPixel& pixel = clear_[side][i];
       const double t = off_level(stretch, pixel) / (kTukey * noise_[side]);
       if (std::abs(t) >= 1.0) continue;
       const double weight = std::pow((1.0 - t * t) / noise_[side], 2);
-      const Eigen::Vector2d shares(1.0, side == kInside ? pixel.wall : 0.0);
-      weights += weight * shares * shares.transpose();
-      weighted += weight * pixel.value * shares;
+      once += weight, value += weight * pixel.value;
+      if (side == kOutside) continue;
+      with_wall += weight * pixel.wall, with_walls += weight * pixel.wall * pixel.wall;
+      value_with_wall += weight * pixel.value * pixel.wall;
     }
-    if (weights(0, 0) == 0.0) continue;
-    if (weights(1, 0) != 0.0) {
+    if (once == 0.0) continue;
+    const Harmonics own = (side == kOutside ? stretch.shade : 1.0) * stretch.harmonics;
+    if (with_wall != 0.0) {
+      // Of what a pixel shows of the face, and of its wall.
+      Eigen::Matrix<double, kUnknowns, 2> columns = Eigen::Matrix<double, kUnknowns, 2>::Zero();
+      columns.col(0).head<kHarmonics>() = own;
+      columns.col(1).tail<kWallHarmonics>() = stretch.harmonics.head<kWallHarmonics>();
+      const Eigen::Matrix2d weights{{once, with_wall}, {with_wall, with_walls}};
       normal.noalias() += columns * weights * columns.transpose();
-      right += columns * weighted;
+      right += columns * Eigen::Vector2d(value, value_with_wall);
     } else {  // no wall is seen there
-      const Harmonics column = columns.col(0).head<kHarmonics>();
-      normal.topLeftCorner<kHarmonics, kHarmonics>().noalias() +=
-          (weights(0, 0) * column) * column.transpose();
-      right.head<kHarmonics>() += weighted[0] * column;
+      normal.topLeftCorner<kHarmonics, kHarmonics>().noalias() += (once * own) * own.transpose();
+      right.head<kHarmonics>() += value * own;
     }
   }
   const Unknowns found = normal.ldlt().solve(right);
@@ -379,10 +401,10 @@ bool ColourFit::find_noise(EdgeSide side) {
   constexpr std::size_t kFewest = 2 * kHarmonics;
   constexpr double kLeastNoise = 0.3;
   std::vector<double> off;
+  off.reserve(clear_[side].size());
   for (const ColourStretch& stretch : stretches_)
-    for (std::size_t i = stretch.first; i < stretch.end; ++i)
-      if (pixels_[i].is_clear() && pixels_[i].side() == side)
-        off.push_back(std::abs(off_level(stretch, pixels_[i])));
+    for (std::size_t i = stretch.first_clear[side]; i < stretch.end_clear[side]; ++i)
+      off.push_back(std::abs(off_level(stretch, clear_[side][i])));
   if (off.size() < kFewest) return false;
   noise_[side] =
       std::max(kLeastNoise, data::kSdOverMedianDistance * data::upper_median(std::move(off)));
@@ -409,9 +431,8 @@ void ColourFit::find_unevenness() {
     std::vector<double> beyond2(stretches_.size(), 0.0), counted(stretches_.size(), 0.0);
     for (std::size_t k = 0; k < stretches_.size(); ++k) {
       double sum = 0.0, count = 0.0;
-      for (std::size_t i = stretches_[k].first; i < stretches_[k].end; ++i)
-        if (pixels_[i].is_clear() && pixels_[i].side() == side)
-          sum += off_level(stretches_[k], pixels_[i]), count += 1.0;
+      for (std::size_t i = stretches_[k].first_clear[side]; i < stretches_[k].end_clear[side]; ++i)
+        sum += off_level(stretches_[k], clear_[side][i]), count += 1.0;
       if (count == 0.0) continue;
       beyond2[k] = std::pow(sum / count, 2) - std::pow(noise_[side], 2) / count;
       counted[k] = 1.0;
@@ -485,7 +506,9 @@ std::optional<ColourEdge> ColourFit::edge_of(const ColourStretch& stretch) const
 std::vector<ColourEdge> ColourFit::edges(double reach_px) {
   constexpr std::size_t kFewest = 8 * kHarmonics;
   std::vector<ColourEdge> found;
-  if (pixels_.size() < kFewest || !find_levels()) return found;
+  if (pixels_.size() < kFewest) return found;
+  gather_clear();
+  if (!find_levels()) return found;
   find_unevenness();
   for (const ColourStretch& stretch : stretches_)
     if (auto edge = edge_of(stretch); edge && std::abs(edge->edge.offset_px) < reach_px)

@@ -139,21 +139,6 @@ ColourMixing::ColourMixing() : shown_{} {
   for (int k = 0; k <= kParts; ++k) shown_[static_cast<size_t>(k)] = 1.0 / kParts * k;
 }
 
-int ColourMixing::part_of(double covered) {
-  return std::clamp(static_cast<int>(covered * kParts), 0, kParts - 1);
-}
-
-double ColourMixing::shown(double covered) const {
-  const int part = part_of(covered);
-  const auto k = static_cast<size_t>(part);
-  return shown_[k] + (covered * kParts - part) * (shown_[k + 1] - shown_[k]);
-}
-
-double ColourMixing::slope(double covered) const {
-  const auto k = static_cast<size_t>(part_of(covered));
-  return kParts * (shown_[k + 1] - shown_[k]);
-}
-
 const ColourMixing& ColourWindow::mixing_in(double shade) const {
   const auto* nearest = std::min_element(kShades.begin(), kShades.end(), [&](double a, double b) {
     return std::abs(a - shade) < std::abs(b - shade);

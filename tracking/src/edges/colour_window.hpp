@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include "edges/edge_profile.hpp"
@@ -25,12 +27,22 @@ class ColourMixing {
   ColourMixing();
   /// @param shown at shares 0, 1 / kParts .. 1 of the body; grows from 0 to 1.
   explicit ColourMixing(const std::array<double, kParts + 1>& shown) : shown_(shown) {}
-  [[nodiscard]] double shown(double covered) const;
+  // Here, as they are asked for four times for each pixel.
+  [[nodiscard]] double shown(double covered) const {
+    const int part = part_of(covered);
+    const auto k = static_cast<std::size_t>(part);
+    return shown_[k] + (covered * kParts - part) * (shown_[k + 1] - shown_[k]);
+  }
   /// Derivative of that.
-  [[nodiscard]] double slope(double covered) const;
+  [[nodiscard]] double slope(double covered) const {
+    const auto k = static_cast<std::size_t>(part_of(covered));
+    return kParts * (shown_[k + 1] - shown_[k]);
+  }
 
  private:
-  [[nodiscard]] static int part_of(double covered);
+  [[nodiscard]] static int part_of(double covered) {
+    return std::clamp(static_cast<int>(covered * kParts), 0, kParts - 1);
+  }
   std::array<double, kParts + 1> shown_;
 };
 
