@@ -11,6 +11,7 @@
 #include "find/usual_frames.hpp"
 #include "geometry/pose_change.hpp"
 #include "trochoid/data/angle.hpp"
+#include "trochoid/data/parallel.hpp"
 
 namespace trochoid::tracking {
 namespace {
@@ -144,15 +145,16 @@ void Follower::set_shape_knowledge(Look& look, Sighting& guess) const {
   }
 }
 
+/// @param plate room for the background near the body.
 std::optional<Sighting> Follower::look_at(const Frame& frame, const Sighting& expected,
-                                          double reach_px) {
+                                          double reach_px, Plate& plate) const {
   Sighting guess = expected;
   const double size = guess.rim.semi_major_px();
   const cv::Rect box = box_around(guess.centre_px, 1.6 * finder_.reach_px(guess) + reach_px + 12.0,
                                   frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
-  background_.scaled_into(plate_, gain_, box);
-  Look look{.frame = frame, .background = plate_};
+  background_.scaled_into(plate, gain_, box);
+  Look look{.frame = frame, .background = plate};
   look.predicted = &guess;
   look.reach_px = reach_px;
   set_shape_knowledge(look, guess);
@@ -180,7 +182,7 @@ std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& 
   constexpr double kFull = 0.85;
   const double largest = std::max(4.0, 0.6 * predicted.rim.semi_minor_px());
   const double reach = std::clamp(2.0 + 3.0 * forecast_.surprise_px() + away_, 2.5, largest);
-  std::optional<Sighting> best = look_at(frame, predicted, reach);
+  std::optional<Sighting> best = look_at(frame, predicted, reach, plate_);
   if (best && is_other(best->centre_px, others)) best.reset();
   if (best && relative_contrast(*best) > kFull && best->accepted > 0.8 * usual_accepted_)
     return best;
@@ -195,11 +197,16 @@ std::optional<Sighting> Follower::look_near(const Frame& frame, const Sighting& 
   const auto score = [&](const Sighting& s) {
     return s.accepted * std::min(1.0, relative_contrast(s));
   };
-  for (const Sighting& guess : guesses) {
-    auto seen = look_at(frame, guess, std::max(reach, 0.3 * guess.rim.semi_minor_px()));
+  // Frames come one after the other: what there is to do at once is within one.
+  std::vector<std::optional<Sighting>> found(guesses.size());
+  guessed_plates_.resize(std::max(guessed_plates_.size(), guesses.size()));
+  data::in_parallel(guesses.size(), 0, [&](std::size_t k) {
+    found[k] = look_at(frame, guesses[k], std::max(reach, 0.3 * guesses[k].rim.semi_minor_px()),
+                       guessed_plates_[k]);
+  });
+  for (auto& seen : found)
     if (seen && !is_other(seen->centre_px, others) && (!best || score(*seen) > score(*best) + 0.05))
       best = std::move(seen);
-  }
   return best;
 }
 
@@ -278,12 +285,16 @@ std::optional<Sighting> Follower::look_about(const Frame& frame, const Sighting&
                                         frame.luma.size());
   if (box.width < 8 || box.height < 8) return std::nullopt;
   background_.scaled_into(plate_, gain_, box);
-  Look look{.frame = frame, .background = plate_};
+  const std::vector<Detection> regions = regions_about(frame, predicted, farthest, box, others);
+  std::vector<std::optional<Sighting>> found(regions.size());
+  data::in_parallel(regions.size(), 0, [&](std::size_t k) {
+    Look look{.frame = frame, .background = plate_};
+    look.detection = regions[k];
+    found[k] = finder_.find(look);
+    if (found[k]) found[k] = as_it_moves(frame, *found[k]);
+  });
   std::optional<Sighting> best;
-  for (const Detection& region : regions_about(frame, predicted, farthest, box, others)) {
-    look.detection = region;
-    auto seen = finder_.find(look);
-    if (seen) seen = as_it_moves(frame, *seen);
+  for (auto& seen : found) {
     if (!seen || !seen_well(*seen) || !plausible(*seen, predicted, farthest) ||
         is_other(seen->centre_px, others))
       continue;

@@ -1,6 +1,7 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "find/background.hpp"
 #include "find/body_finder.hpp"
@@ -36,7 +37,7 @@ class Follower {
   [[nodiscard]] std::optional<Sighting> look_near(const Frame& frame, const Sighting& predicted,
                                                   const Others& others);
   [[nodiscard]] std::optional<Sighting> look_at(const Frame& frame, const Sighting& expected,
-                                                double reach_px);
+                                                double reach_px, Plate& plate) const;
   [[nodiscard]] std::optional<Sighting> look_about(const Frame& frame, const Sighting& predicted,
                                                    const Others& others);
   [[nodiscard]] double farthest_px(const Sighting& predicted) const;
@@ -62,6 +63,7 @@ class Follower {
   std::shared_ptr<const SpinProfile> marks_;
   Forecast forecast_;
   Plate plate_;  ///< background at the brightness of the frame, valid near the body
+  std::vector<Plate> guessed_plates_;  ///< the same for guesses that are looked at side by side
   double gain_ = 1.0;
   double shape_surprise_px_ = 0.3;
   // What is usual: running means over sightings of the body in full view.
