@@ -359,6 +359,18 @@ TEST(Compare, SaysWhatTurnsARingRetrograde) {
   EXPECT_THAT(found.fit.recommendation, testing::HasSubstr("pivoting friction explains it"));
 }
 
+// Contour friction slows the body, but leaves its mean path prograde.
+TEST(Compare, SaysWhichOfTheLossesTurnsARingRetrograde) {
+  data::Scene truth = ring();
+  truth.model.pivoting_friction_m = 5e-4;
+  truth.model.contour_friction_m = 1e-4;
+  const Values start{{"theta_rad", 1.2}, {"w1_rad_s", 0.0}, {"w2_rad_s", 24.0}, {"w3_rad_s", 4.4}};
+  const Comparison found = compare_one(track_of(truth, start, 2.5, 200, 2e-4, 6), ring());
+  EXPECT_THAT(found.fit.recommendation,
+              testing::HasSubstr("; pivoting friction explains it, without contour friction it "
+                                 "would turn all the same"));
+}
+
 // A scene made for one model may be compared with others.
 TEST(Compare, HeedsWhatIsSaidOfParametersThatOnlySomeOfTheModelsHave) {
   data::Scene scene = spin_down();

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <span>
+#include <utility>
 
 #include "choose/contest.hpp"
 #include "choose/retrograde.hpp"
+#include "choose/terms.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -30,13 +33,41 @@ std::string listed(std::vector<const Rung*> rungs, double bic) {
   return words;
 }
 
+// Chosen losses whose absence would leave the mean path as it began, and those it would turn round
+// without all the same.
+struct Turning {
+  Terms needed, idle;
+};
+
+Turning what_turns(const Rung& chosen, const Ladder& ladder) {
+  Turning found;
+  for (const int index : chosen.terms) {
+    const Term& term = ladder.terms[static_cast<std::size_t>(index)];
+    if (term.last_resort || term.smooth || term.slope || term.of) continue;
+    Terms fewer = chosen.terms;
+    fewer.erase(index);
+    const std::set<std::string> own = parameters_without(ladder, chosen.terms, fewer);
+    data::Fit without = chosen.fit;
+    for (data::FitParameter& parameter : without.parameters)
+      if (own.contains(parameter.name)) parameter.value = 0.0;
+    (retrograde_from_s(without, chosen.scene) ? found.idle : found.needed).insert(index);
+  }
+  // Where any one may go, they only do it together.
+  if (found.needed.empty()) std::swap(found.needed, found.idle);
+  return found;
+}
+
 // Which losses turn the mean path round, and whether others alone would do it as well.
 std::string retrograde_sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder) {
   const std::optional<double> from_s = retrograde_from_s(chosen.fit, chosen.scene);
   if (!from_s) return "";
   const auto term = [&](int index) { return ladder.terms[static_cast<std::size_t>(index)].name; };
-  std::string acting, alike, out, nowhere;
-  for (const int index : chosen.terms) acting += (acting.empty() ? "" : " and ") + term(index);
+  const auto joined = [&](const Terms& terms) {
+    std::string words;
+    for (const int index : terms) words += (words.empty() ? "" : " and ") + term(index);
+    return words;
+  };
+  std::string alike, out, nowhere;
   for (const Rung& rung : rungs) {
     if (rung.terms.size() != 1 || &rung == &chosen || rung.fit.model == "smooth") continue;
     if (!rung.fitted) {
@@ -47,9 +78,13 @@ std::string retrograde_sentence(const Rungs& rungs, const Rung& chosen, const La
     list += fmt::format("{}{} (BIC {:+.0f})", list.empty() ? "" : ", ", term(*rung.terms.begin()),
                         rung.bic - chosen.bic);
   }
+  const Turning turning = what_turns(chosen, ladder);
   std::string words =
-      fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explains it", *from_s,
-                  acting.empty() ? chosen.name + " without losses" : acting);
+      fmt::format(" The mean path turns retrograde at t = {:.3g} s; {} explain{} it", *from_s,
+                  turning.needed.empty() ? chosen.name + " without losses" : joined(turning.needed),
+                  turning.needed.size() > 1 ? "" : "s");
+  if (!turning.idle.empty())
+    words += fmt::format(", without {} it would turn all the same", joined(turning.idle));
   if (!alike.empty()) words += ", but this track cannot tell that from " + alike;
   if (!out.empty()) words += "; ruled out as the only loss: " + out;
   if (!nowhere.empty()) words += "; no fit at all with nothing but " + nowhere;
