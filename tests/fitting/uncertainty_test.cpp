@@ -342,6 +342,23 @@ TEST(Prior, OnAnAngleIsAsNearByWholeTurns) {
   EXPECT_THAT(result.warnings, testing::Not(testing::Contains(testing::HasSubstr("prior"))));
 }
 
+// Left where it was, with the prior idle; named under free it was not looked for as by free_pivot.
+TEST(Pivot, ThatIsKnownToAnErrorOnlyIsFitted) {
+  data::Track track = thesis_track(25.0, 1e-3, 11);
+  const Eigen::Vector2d off_m{0.03, -0.02};
+  for (data::TrackSample& sample : track.samples) sample.centre_m += off_m;
+  data::Scene by_prior, by_name;
+  by_prior.model.name = by_name.model.name = "top";
+  by_prior.fit.prior = {{"pivot_x_m", {0.0, 0.03}}, {"pivot_y_m", {0.0, 0.03}}};
+  by_name.fit.free = {"pivot_x_m", "pivot_y_m"};
+  for (const data::Scene& scene : {by_prior, by_name}) {
+    const data::Fit found = fit_of(track, scene);
+    EXPECT_EQ(found.verdict, data::FitVerdict::good) << found.verdict_words;
+    EXPECT_LT(pull(found, "pivot_x_m", off_m.x()), kFar);
+    EXPECT_LT(pull(found, "l_m", 0.1), kFar);
+  }
+}
+
 // A length fixed at a little too much was taken for true: a and b came out 30 error bars off,
 // "good".
 TEST(FixedValue, ThatContradictsTheTrackMakesTheFitDoubtful) {

@@ -243,6 +243,11 @@ void add_what_was_asked_for(const Problem& problem, const Solution& solution,
         "and does not see what is common to all of it; the error bars count");
 }
 
+bool is_to_be_fitted(const char* name, const data::FitSettings& settings) {
+  const auto& free = settings.free;
+  return std::find(free.begin(), free.end(), name) != free.end() || settings.prior.contains(name);
+}
+
 /// Whether a fit is what is asked for, or one of several from which the comparison chooses and then
 /// has its own doubts.
 enum class Purpose { answer, candidate };
@@ -259,7 +264,9 @@ class OneFit {
         stages_(options_),
         purpose_(purpose) {
     if (tracks.empty()) throw TrackError("no track to fit");
-    scene_.fit.free_pivot = scene_.fit.free_pivot || options.free_pivot;
+    scene_.fit.free_pivot =
+        scene_.fit.free_pivot || options.free_pivot ||
+        (is_to_be_fitted("pivot_x_m", scene_.fit) && is_to_be_fitted("pivot_y_m", scene_.fit));
     wrapped_ = observed(plain, scene_, frame_time_s(tracks));
     problem_ = prepare(tracks, wrapped_ ? *wrapped_ : plain, scene_, options);
     if (stages_.wanted()) problem_.log = [this](const std::string& words) { stages_.line(words); };

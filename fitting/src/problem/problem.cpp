@@ -356,7 +356,10 @@ bool is_free(const ParameterInfo& info, const data::FitSettings& settings) {
   if (said_of(info.name, settings.fixed) != nullptr) return false;
   for (const char* asked_for : {kScale, kTimeFactor, kReadout, kAngleDelay})
     if (info.name == asked_for) return true;
-  if (is_pivot(info.name)) return settings.free_pivot || listed(settings.free, info.name);
+  if (is_pivot(info.name) && settings.free_pivot) return true;
+  // What is known to some error only is to be fitted.
+  if (is_pivot(info.name))
+    return listed(settings.free, info.name) || settings.prior.contains(info.name);
   if ((info.name == kSlipScale || is_slope(info.name)) && settings.prior.contains(info.name))
     return true;
   const bool chosen = !std::all_of(settings.free.begin(), settings.free.end(), leaves_choice);
