@@ -155,6 +155,17 @@ TEST(PuckFit, SaysWhetherOneFrictionExplainsAllArcs) {
     EXPECT_LT(std::abs(common->value - own), 4.0 * common->sigma);
 }
 
+// "object 0" had been said of each.
+TEST(PuckFit, NamesTheTracksWhoseFrictionsAreCompared) {
+  Throw first(5), second(6);
+  first.slide({1.0, 0.3}, 0.3);
+  second.slide({0.7, -0.4}, 0.3);
+  const std::vector<data::Track> tracks{first.track(), second.track()};
+  EXPECT_THAT(fitting::fit(tracks, puck_scene()).warnings,
+              testing::Contains(testing::AllOf(testing::HasSubstr("(track 1, 0 to"),
+                                               testing::HasSubstr("(track 2, 0 to"))));
+}
+
 // Alone, an arc counted a sample that the fit had given up in full, and leaned on what was known of
 // the friction as much as all of them together did.
 TEST(PuckFit, AsksTheArcsAloneWhetherOneFrictionExplainsThem) {

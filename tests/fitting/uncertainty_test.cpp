@@ -313,6 +313,59 @@ TEST(SeveralRecordings, ThatDoNotShareWhatTheyShouldAreDoubtfulAndToldApart) {
   EXPECT_THAT(all.verdict_words, testing::HasSubstr("above all track 3: for l_m = 0.10"));
 }
 
+// A tenth more of one length: no common one follows either, and the residuals were all that was
+// told; by derivatives from there the tracks asked for what neither has.
+TEST(SeveralRecordings, ThatAreExplainedByThemselvesAloneAreToldWhatEachSays) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  for (data::TrackSample& sample : tracks[1].samples) sample.centre_m *= 1.1;
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::Fit both = fit(tracks, scene);
+  EXPECT_FALSE(both.verdict == data::FitVerdict::good) << both.verdict_words;
+  EXPECT_THAT(both.verdict_words, testing::HasSubstr("explains each of the tracks by itself"));
+  EXPECT_THAT(both.verdict_words, testing::ContainsRegex("l_m = 0.0.* .track 1., 0.1.* .track 2."));
+  EXPECT_THAT(both.warnings, testing::Not(testing::Contains(testing::HasSubstr("rather than"))));
+}
+
+// The second one's pivot is pushed along.
+TEST(SeveralRecordings, OfWhichOneIsNotExplainedByItselfAreToldWhich) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  for (data::TrackSample& sample : tracks[1].samples) sample.centre_m.x() += 0.01 * sample.t_s;
+  data::Scene scene;
+  scene.model.name = "top";
+  EXPECT_THAT(fit(tracks, scene).verdict_words,
+              testing::HasSubstr("by itself the model explains track 1, but not 2"));
+}
+
+// Their times alone do not tell, all begin at 0.
+TEST(SeveralRecordings, AreNamedWherePositionsOfOneAreGivenUp) {
+  std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),
+                                  thesis_track(25.0, 1e-3, 13)};
+  for (data::TrackSample& sample : tracks[1].samples)
+    if (sample.t_s > 23.0) sample.centre_m.x() += 0.02;
+  data::Scene scene;
+  scene.model.name = "top";
+  EXPECT_THAT(
+      fit(tracks, scene).warnings,
+      testing::Contains(testing::HasSubstr("hardly count, the first, of track 2, at t = 23")));
+}
+
+// What they share the long one tells, whichever comes first.
+TEST(SeveralRecordings, AreShortWhereAllOfThemAre) {
+  const data::Track brief = thesis_track(7.0, 1e-3, 12), whole = thesis_track(25.0, 1e-3, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  const auto warnings_of = [&](const data::Track& first, const data::Track& second) {
+    const std::vector<data::Track> tracks{first, second};
+    return fit(tracks, scene).warnings;
+  };
+  const auto warned = testing::Contains(testing::HasSubstr("nutation periods long"));
+  EXPECT_THAT(warnings_of(brief, whole), testing::Not(warned));
+  EXPECT_THAT(warnings_of(whole, brief), testing::Not(warned));
+  EXPECT_THAT(warnings_of(brief, thesis_track(7.0, 1e-3, 13)),
+              testing::Contains(testing::HasSubstr("the longest of the tracks is about 0.")));
+}
+
 TEST(Prior, ThatContradictsTheTrackMakesTheFitDoubtful) {
   const data::Track track = thesis_track(25.0, 1e-3, 11);
   data::Scene scene;

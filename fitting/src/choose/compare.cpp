@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "choose/climb.hpp"
 #include "choose/exchange.hpp"
@@ -16,8 +17,10 @@
 #include "choose/slide.hpp"
 #include "choose/softness.hpp"
 #include "choose/terms.hpp"
+#include "judge/adequacy.hpp"
 #include "judge/first_guess.hpp"
 #include "judge/straying.hpp"
+#include "judge/tracks_apart.hpp"
 #include "problem/problem.hpp"
 #include "trochoid/data/error.hpp"
 
@@ -181,8 +184,16 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
     doubt_as_a_whole(tracks, *chosen, contest.options, result.fit);
     std::rotate(told.begin() + of_itself, told.begin() + of_rivals, told.end());
   }
+  FitOptions by_itself = contest.options;
+  by_itself.start.clear();
+  std::optional<TracksApart> apart;
+  if (!says_explained(chosen->fit))
+    apart = tracks_apart(tracks, chosen->scene, by_itself, result.fit);
+  if (apart) tell_tracks_apart(*apart, result.fit);
   result.fit.comparison = table_of(rungs, chosen);
-  result.fit.recommendation = sentence(rungs, *chosen, ladder, result.fit.verdict);
+  // What explains each of the tracks by itself lacks nothing.
+  result.fit.recommendation =
+      sentence(rungs, *chosen, ladder, result.fit.verdict, !apart || !apart->differ);
   return result;
 }
 

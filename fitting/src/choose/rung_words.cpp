@@ -107,11 +107,11 @@ std::vector<const Rung*> told(const Rungs& rungs, const Rung* chosen) {
 }
 
 std::string sentence(const Rungs& rungs, const Rung& chosen, const Ladder& ladder,
-                     data::FitVerdict verdict) {
+                     data::FitVerdict verdict, bool lacks_something) {
   std::string not_tried;
   for (const std::string& term : ladder.left_out) not_tried += "; not tried: " + term;
   const bool explained = chosen.fit.converged && verdict != data::FitVerdict::doubtful;
-  const std::string in_vain = !explained && searched_in_vain(rungs)
+  const std::string in_vain = !explained && lacks_something && searched_in_vain(rungs)
                                   ? " Not even all that usually acts together explains it: are "
                                     "the body's dimensions, the scale and the frame rate right?"
                                   : "";

@@ -151,21 +151,32 @@ int positions_in(const Problem& problem) {
   return count;
 }
 
+bool several_tracks(const Problem& problem) {
+  return problem.arcs.front().track != problem.arcs.back().track;
+}
+
 // Positions the fit has given up although they lie on one path with the others: not the tracker's
 // glitches, but motion that the model does not have.
 struct GivenUp {
   int samples = 0, of = 0;
   double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
+  std::set<int> tracks;  // of several
   // One or two may be glitches that happen to lie near the path.
   [[nodiscard]] bool more_than(double share) const {
     constexpr int kFewest = 3;
     return samples >= kFewest && samples > share * of;
   }
   [[nodiscard]] std::string words() const {
+    std::vector<int> numbers;
+    for (const int track : tracks) numbers.push_back(track + 1);
+    const std::string whose = numbers.empty()
+                                  ? ""
+                                  : fmt::format(" of track{} {}", numbers.size() > 1 ? "s" : "",
+                                                fmt::join(numbers, ", "));
     return fmt::format(
-        "{} of its {} positions, between {:.4g} and {:.4g} s, lie on one path with the others, but "
-        "so far from the model's that they were left out of the fit",
-        samples, of, first_s, last_s);
+        "{} of its {} positions,{} between {:.4g} and {:.4g} s, lie on one path with the others, "
+        "but so far from the model's that they were left out of the fit",
+        samples, of, whose, first_s, last_s);
   }
 };
 
@@ -176,6 +187,7 @@ GivenUp given_up(const Problem& problem, const Solution& solution) {
     for (const Counting& position : counting(problem, arc, solution.u)) {
       if (position.glitch || position.weight > kHardlyCounts) continue;
       ++all.samples;
+      if (several_tracks(problem)) all.tracks.insert(problem.arcs[arc].track);
       all.first_s = std::min(all.first_s, position.t_s);
       all.last_s = std::max(all.last_s, position.t_s);
     }

@@ -319,19 +319,22 @@ void tell_slope(data::Fit& fit) {
 
 void tell_given_up(const Problem& problem, data::Fit& fit) {
   constexpr double kLittle = 0.1;
-  int given_up = 0, all = 0;
+  int given_up = 0, all = 0, first_track = 0;
   double first_s = std::numeric_limits<double>::infinity();
   for (std::size_t arc = 0; arc < problem.arcs.size(); ++arc)
     for (const Reading& reading : problem.arcs[arc].readings) {
       ++all;
       if (robust_weight(problem, static_cast<int>(arc), reading) > kLittle) continue;
       ++given_up;
-      first_s = std::min(first_s, problem.arcs[arc].t_s[reading.sample]);
+      const double t_s = problem.arcs[arc].t_s[reading.sample];
+      if (t_s < first_s) first_s = t_s, first_track = problem.arcs[arc].track;
     }
   if (given_up > 0)
     fit.warnings.push_back(fmt::format(
-        "{} of {} positions and angles lie far off and hardly count, the first at t = {:.4g} s",
-        given_up, all, first_s));
+        "{} of {} positions and angles lie far off and hardly count, the first{} at t = {:.4g} s",
+        given_up, all,
+        problem.arcs.back().track > 0 ? fmt::format(", of track {},", first_track + 1) : "",
+        first_s));
 }
 
 namespace {

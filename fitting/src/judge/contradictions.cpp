@@ -111,10 +111,9 @@ std::string wish_of(const Problem& problem, const Eigen::VectorXd& u, const Dema
   return fmt::format("{} = {:.4g} ± {:.2g}", name, value, widened * demand.sigma);
 }
 
-// To where the tracks together lead, by the derivatives, if no prior pulled.
-void leave_out_priors(const Problem& problem, Linearised& all) {
+// To where the tracks together lead, by the derivatives, if neither a prior nor a bound pulled.
+void let_go(const Problem& problem, Linearised& all) {
   const Eigen::Index rows = problem.rows();
-  if (all.jacobian.rows() == rows) return;
   const Eigen::VectorXd size = all.jacobian.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd seen = all.jacobian.topRows(rows) * size.cwiseInverse().asDiagonal();
   all.residuals.head(rows) -= seen * NearestLeastSquares(seen).solve(all.residuals.head(rows));
@@ -219,8 +218,10 @@ void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
   for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
   if (tracks.size() < 2 || problem.shared_count() == 0 || problem.predictor->model_name() == "puck")
     return;
+  // Far from where a track is explained its derivatives do not lead there (tracks_apart.hpp).
+  if (!says_explained(fit)) return;
   Linearised all = linearise(problem, u);
-  leave_out_priors(problem, all);
+  let_go(problem, all);
   double gain = 0.0;
   int dof = -problem.shared_count();
   Demand odd;
@@ -236,7 +237,8 @@ void doubt_if_tracks_differ(const Problem& problem, const Eigen::VectorXd& u,
   if (dof < 1 || chi2_upper_tail(gain, dof) > kByChance) return;
   const std::string words = fmt::format(
       "the tracks ask for different values of what they share (chi-square would fall by {:.3g} "
-      "times its noise for {} parameters more), above all track {}: for {} rather than {:.4g}",
+      "times its noise for {} parameters more), above all track {}: for {} rather than {:.4g}, the "
+      "others as they are",
       gain, dof, odd.track + 1, wish_of(problem, u, odd, error.widened),
       problem.value(odd.parameter, u));
   tell(words, "; fit each alone to see which does not belong",

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "judge/degeneracies.hpp"
@@ -98,10 +99,10 @@ void warn(const Problem& problem, const Uncertainty& error, data::Fit& fit) {
 }
 
 // From the first frame to the last as predicted, whatever gaps the record has.
-Eigen::VectorXd seen_in_first_arc(const Problem& problem, const Eigen::VectorXd& u,
-                                  model::Observable what) {
+Eigen::VectorXd seen_in_arc(const Problem& problem, int index, const Eigen::VectorXd& u,
+                            model::Observable what) {
   constexpr int kTimes = 1000;
-  const ArcData& arc = problem.arcs[0];
+  const ArcData& arc = problem.arcs[index];
   std::vector<double> t_s;
   for (int i = 0; i <= kTimes; ++i) t_s.push_back(arc.t_s.front() + arc.duration_s() * i / kTimes);
   model::PredictRequest request;
@@ -110,7 +111,7 @@ Eigen::VectorXd seen_in_first_arc(const Problem& problem, const Eigen::VectorXd&
   request.observables = {what};
   request.tolerance = problem.tolerance;
   request.rolls_at_first = problem.rolls_at_first;
-  return problem.predictor->predict(problem.values(0, u), request).values;
+  return problem.predictor->predict(problem.values(index, u), request).values;
 }
 
 // Half the number of times that the tilt turns back, by more than a tenth of all it does.
@@ -131,39 +132,61 @@ double nutations_of(const Eigen::VectorXd& theta) {
 
 // Nutation of the axis: its frequency is near |b - 2 dphi cos(theta)| for small amplitudes; large
 // ones, as of a top that nearly sleeps or hangs, are counted.
-void warn_short_top(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
-  const auto* b = fit.find("b_1_s");
-  const auto* rate = fit.find("dphi_rad_s");
-  const auto* theta = fit.find("theta_rad");
-  if (b == nullptr || rate == nullptr || theta == nullptr) return;
+double nutations_in(const Problem& problem, int arc, const Eigen::VectorXd& u,
+                    const data::Fit& fit) {
+  const auto at = static_cast<std::size_t>(arc);
+  const auto* b = fit.find("b_1_s", at);
+  const auto* rate = fit.find_state("dphi_rad_s", at);
+  const auto* theta = fit.find_state("theta_rad", at);
+  if (b == nullptr || rate == nullptr || theta == nullptr)
+    return std::numeric_limits<double>::infinity();
   const double frequency = std::abs(b->value - 2.0 * rate->value * std::cos(theta->value));
-  const Eigen::VectorXd tilt = seen_in_first_arc(problem, u, model::Observable::theta_rad);
-  const double periods = std::max(problem.arcs[0].duration_s() * frequency / data::kTurn,
-                                  tilt.allFinite() ? nutations_of(tilt) : 0.0);
-  if (periods >= 1.0) return;
-  fit.warnings.push_back(fmt::format(
-      "the track is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
-      periods));
+  const Eigen::VectorXd tilt = seen_in_arc(problem, arc, u, model::Observable::theta_rad);
+  return std::max(problem.arcs[arc].duration_s() * frequency / data::kTurn,
+                  tilt.allFinite() ? nutations_of(tilt) : 0.0);
 }
 
 // The rate at the first frame says little of a body that nutates widely or speeds up as it falls.
-double turns_of_node_line(const Problem& problem, const Eigen::VectorXd& u) {
-  const Eigen::VectorXd phi = seen_in_first_arc(problem, u, model::Observable::phi_rad);
+double turns_of_node_line(const Problem& problem, int arc, const Eigen::VectorXd& u) {
+  const Eigen::VectorXd phi = seen_in_arc(problem, arc, u, model::Observable::phi_rad);
   double turned = 0.0;
   for (Eigen::Index i = 1; i < phi.size() && std::isfinite(phi[i]); ++i)
     turned += std::abs(data::wrapped(phi[i] - phi[i - 1]));
   return turned / data::kTurn;
 }
 
+// What the arcs share is told by the longest of them, which leaves a short one its own state.
+template <typename Length>
+double longest_of(const Problem& problem, const Length& length) {
+  double most = 0.0;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()) && most < 1.0; ++arc)
+    most = std::max(most, length(arc));
+  return most;
+}
+
+const char* track_or_longest(const Problem& problem) {
+  return problem.arcs.size() > 1 ? "the longest of the tracks" : "the track";
+}
+
+void warn_short_top(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
+  const double periods =
+      longest_of(problem, [&](int arc) { return nutations_in(problem, arc, u, fit); });
+  if (periods >= 1.0) return;
+  fit.warnings.push_back(fmt::format(
+      "{} is about {:.2g} nutation periods long; below one, a, b and l are hardly separable",
+      track_or_longest(problem), periods));
+}
+
 // A rolling body's nutation is about as fast as its node line turns.
 void warn_short_rim(const Problem& problem, const Eigen::VectorXd& u, data::Fit& fit) {
   if (problem.predictor->index_of("w2_rad_s") < 0) return;
-  const double turns = turns_of_node_line(problem, u);
+  const double turns =
+      longest_of(problem, [&](int arc) { return turns_of_node_line(problem, arc, u); });
   if (turns >= 1.0) return;
   fit.warnings.push_back(fmt::format(
-      "the track is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and "
-      "losses are hardly separable, and error bars may be too small",
-      turns));
+      "{} is about {:.2g} turns of the node line long, less than a nutation: tilt, spin and losses "
+      "are hardly separable, and error bars may be too small",
+      track_or_longest(problem), turns));
 }
 
 void warn_thick_air(const data::Scene& scene, data::Fit& fit) {

@@ -22,6 +22,7 @@
 #include "judge/second_thoughts.hpp"
 #include "judge/statistics.hpp"
 #include "judge/straying.hpp"
+#include "judge/tracks_apart.hpp"
 #include "observe/observed.hpp"
 #include "problem/linearise.hpp"
 #include "problem/prepare.hpp"
@@ -288,6 +289,9 @@ class OneFit {
   }
   /// @pre find()
   [[nodiscard]] data::Fit described(Bars bars);
+  /// Whether what was found leaves more than noise, whatever else there is to doubt.
+  /// @pre described()
+  [[nodiscard]] bool misses() const { return misses_; }
 
  private:
   void look_at_longer_tops();
@@ -303,7 +307,7 @@ class OneFit {
   Uncertainty by_curvature_;
   std::optional<UprightTop> upright_;
   data::Fit fit_;
-  bool refused_ = false, cut_short_ = false;
+  bool refused_ = false, cut_short_ = false, misses_ = true;
 };
 
 void OneFit::start_as(const Settled& near) {
@@ -398,6 +402,7 @@ data::Fit OneFit::described(Bars bars) {
   tell_unlikely_friction(fit);
   tell_slope(fit);
   judge(problem_, solution_, error, cut_short_, fit);
+  misses_ = !says_explained(fit);
   if (fit.verdict == data::FitVerdict::unexplained || fit.verdict == data::FitVerdict::doubtful)
     tell_held(scene_, fit);
   if (fit.verdict == data::FitVerdict::unexplained) tell_steps_of_path(problem_, fit);
@@ -442,6 +447,7 @@ class CompletedFit {
   }
   void start_as(const Settled& near) { one_.start_as(near); }
   [[nodiscard]] Settled settled() const { return one_.settled(); }
+  [[nodiscard]] bool misses() const { return one_.misses(); }
   [[nodiscard]] data::Fit described(Bars bars) {
     data::Fit fit = one_.described(bars);
     tell_idle_terms(scene_, fit);
@@ -470,7 +476,11 @@ data::Fit fit(std::span<const data::Track> tracks, const data::Scene& given,
   check_given_start(options, *model::make_predictor(scene), scene);
   CompletedFit one(tracks, scene, options, Purpose::answer);
   one.find();
-  return one.described(Bars::full);
+  data::Fit found = one.described(Bars::full);
+  if (!one.misses()) return found;
+  if (const auto apart = tracks_apart(tracks, given, options, found))
+    tell_tracks_apart(*apart, found);
+  return found;
 }
 
 void check_scene(const data::Scene& given, const FitOptions& options) {

@@ -69,6 +69,11 @@ void doubt_if_frictions_differ(const Problem& problem, data::Fit& fit) {
     if (const Estimate one = friction_of(problem, arc, friction); one.sigma > 0.0)
       estimates.push_back(one);
   if (estimates.size() < 2) return;
+  // Those of files of their own all have the same object.
+  const bool of_several_files =
+      std::all_of(problem.arcs.begin(), problem.arcs.end(),
+                  [&](const ArcData& arc) { return arc.object == problem.arcs[0].object; }) &&
+      problem.arcs.back().track != problem.arcs.front().track;
   double weights = 0.0, sum = 0.0, chi2 = 0.0;
   std::string list;
   for (const Estimate& one : estimates) {
@@ -77,9 +82,11 @@ void doubt_if_frictions_differ(const Problem& problem, data::Fit& fit) {
     const ArcData& arc = problem.arcs[static_cast<std::size_t>(one.arc)];
     // Two digits of the error bar and as many places of the value.
     const int places = std::clamp(1 - static_cast<int>(std::floor(std::log10(one.sigma))), 0, 12);
-    list += fmt::format("{}{:.{}f} ± {:.{}f} (object {}, {:.3g} to {:.3g} s)",
-                        list.empty() ? "" : ", ", one.value, places, one.sigma, places, arc.object,
-                        arc.t_s.front(), arc.t_s.back());
+    const std::string whose = of_several_files ? fmt::format("track {}", arc.track + 1)
+                                               : fmt::format("object {}", arc.object);
+    list +=
+        fmt::format("{}{:.{}f} ± {:.{}f} ({}, {:.3g} to {:.3g} s)", list.empty() ? "" : ", ",
+                    one.value, places, one.sigma, places, whose, arc.t_s.front(), arc.t_s.back());
   }
   for (const Estimate& one : estimates)
     chi2 += std::pow((one.value - sum / weights) / one.sigma, 2);
