@@ -430,6 +430,35 @@ TEST(FixedValue, ThatContradictsTheTrackMakesTheFitDoubtful) {
               testing::HasSubstr("l_m = 0.105 is fixed, and the track alone says"));
 }
 
+// At the bound a and b came out 6 and more error bars off, "good".
+TEST(Bound, ThatContradictsTheTrackMakesTheFitDoubtful) {
+  const data::Track track = thesis_track(25.0, 1e-3, 11);
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::FitParameter l = *fit_of(track, scene).find("l_m");
+  scene.fit.bounds["l_m"] = {l.value + l.sigma, 1.0};
+  const data::Fit agreed = fit_of(track, scene);
+  EXPECT_EQ(agreed.verdict, data::FitVerdict::good) << agreed.verdict_words;
+
+  scene.fit.bounds["l_m"] = {l.value + 8.0 * l.sigma, 1.0};
+  const data::Fit torn = fit_of(track, scene);
+  EXPECT_EQ(torn.verdict, data::FitVerdict::doubtful) << torn.verdict_words;
+  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("l_m is bounded to at least 0.1"));
+  EXPECT_THAT(torn.verdict_words, testing::HasSubstr("and the track alone says 0.09"));
+}
+
+// They agree with each other, not with the bound.
+TEST(SeveralRecordings, ThatABoundHoldsBackDoNotDiffer) {
+  const std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
+  data::Scene scene;
+  scene.model.name = "top";
+  const data::FitParameter l = *fit(tracks, scene).find("l_m");
+  scene.fit.bounds["l_m"] = {l.value + 12.0 * l.sigma, 1.0};
+  const data::Fit both = fit(tracks, scene);
+  EXPECT_THAT(both.verdict_words, testing::HasSubstr("l_m is bounded to at least"));
+  EXPECT_THAT(both.warnings, testing::Not(testing::Contains(testing::HasSubstr("tracks ask"))));
+}
+
 TEST(SeveralRecordings, AreNamedWhereOneIsTooShortOrComesTwice) {
   std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};
   data::Scene scene;

@@ -357,27 +357,32 @@ bool stands_at(double value, double bound, double size, double sigma) {
 
 }  // namespace
 
+std::optional<BoundStoodAt> bound_stood_at(const Problem& problem, const Eigen::VectorXd& u,
+                                           const Uncertainty& error,
+                                           const data::FitSettings& settings, int index) {
+  const FreeParameter& free = problem.free[index];
+  const auto* bounds = said_of(problem.predictor->parameters()[free.index].name, settings.bounds);
+  if (bounds == nullptr) return std::nullopt;
+  const double value = free.transform.value(u[index]);
+  const double sigma = std::sqrt(error.covariance(index, index));
+  const auto [lower, upper] = *bounds;
+  const double width = upper - lower;
+  const auto size = [&](double bound) {
+    return std::isfinite(width) ? width : std::max(std::abs(bound), std::abs(free.given));
+  };
+  if (stands_at(value, lower, size(lower), sigma)) return BoundStoodAt{lower, true};
+  if (stands_at(value, upper, size(upper), sigma)) return BoundStoodAt{upper, false};
+  return std::nullopt;
+}
+
 void tell_bounds(const Problem& problem, const Solution& solution, const Uncertainty& error,
                  const data::Scene& scene, data::Fit& fit) {
-  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
-    const FreeParameter& free = problem.free[i];
-    const auto* bounds =
-        said_of(problem.predictor->parameters()[free.index].name, scene.fit.bounds);
-    if (bounds == nullptr) continue;
-    const double value = free.transform.value(solution.u[i]);
-    const double sigma = std::sqrt(error.covariance(i, i));
-    const auto [lower, upper] = *bounds;
-    const double width = upper - lower;
-    const auto size = [&](double bound) {
-      return std::isfinite(width) ? width : std::max(std::abs(bound), std::abs(free.given));
-    };
-    const bool low = stands_at(value, lower, size(lower), sigma);
-    if (low || stands_at(value, upper, size(upper), sigma))
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
+    if (const auto at = bound_stood_at(problem, solution.u, error, scene.fit, i))
       fit.warnings.push_back(fmt::format(
           "{} stands at the {} bound, {:g}, that [fit] bounds give it: the track may say that it "
           "is {}, and its error bar knows nothing of that",
-          problem.name(i), low ? "lower" : "upper", low ? lower : upper, low ? "less" : "more"));
-  }
+          problem.name(i), at->lower ? "lower" : "upper", at->value, at->lower ? "less" : "more"));
 }
 
 void tell_held(const data::Scene& scene, data::Fit& fit) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <span>
 
 #include "judge/statistics.hpp"
@@ -70,6 +71,19 @@ void tell_slope(data::Fit& fit);
 /// Positions and angles that were all but given up (reweight): their number is no longer what the
 /// fit stands on.
 void tell_given_up(const Problem& problem, data::Fit& fit);
+
+/// A bound under [fit] that a value has come to.
+struct BoundStoodAt {
+  double value = 0.0;
+  bool lower = true;
+};
+
+/// That of a free parameter; nothing where it has none, or stands off it.
+[[nodiscard]] std::optional<BoundStoodAt> bound_stood_at(const Problem& problem,
+                                                         const Eigen::VectorXd& u,
+                                                         const Uncertainty& error,
+                                                         const data::FitSettings& settings,
+                                                         int index);
 
 /// Values that stand at a bound under [fit].
 void tell_bounds(const Problem& problem, const Solution& solution, const Uncertainty& error,

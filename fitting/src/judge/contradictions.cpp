@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "judge/adequacy.hpp"
+#include "judge/caveats.hpp"
 #include "judge/counting.hpp"
 #include "judge/whiteness.hpp"
 #include "observe/decompositions.hpp"
@@ -173,16 +174,31 @@ std::optional<Freed> freed(const Problem& problem, const Eigen::VectorXd& u, int
   return out;
 }
 
-// What the tracks say of it.
+// A parameter that [fit] bounds, without the bound.
+Freed let_go_of_bound(const Problem& problem, const Eigen::VectorXd& u, int at) {
+  Freed out{problem, u, at};
+  Transform& transform = out.problem.free[at].transform;
+  const double value = transform.value(u[at]);
+  const bool logarithmic = problem.predictor->parameters()[problem.free[at].index].logarithmic;
+  transform = {logarithmic && value > 0.0 ? Transform::Kind::log : Transform::Kind::identity};
+  out.u[at] = transform.inverse(value);
+  return out;
+}
+
+// What the tracks say of it, where that is known to its own size or to a third of how far it is
+// off: of a loss that is not there the former is nothing.
 std::optional<Contrast> contrast_of(Freed one, double fixed) {
+  constexpr double kOfDistance = 1.0 / 3.0;
   const Solution solution = minimise(one.problem, one.u);
   if (!solution.usable || !solution.converged) return std::nullopt;
   try {
     const Uncertainty error = uncertainty(one.problem, solution.u);
     const double value = one.problem.value(one.at, solution.u);
     const double sigma = std::sqrt(error.covariance(one.at, one.at));
-    if (!error.identifiable[static_cast<std::size_t>(one.at)]) return std::nullopt;
-    return Contrast{std::abs(value - fixed) / sigma, value, sigma};
+    const double off = std::abs(value - fixed);
+    if (!error.identifiable[static_cast<std::size_t>(one.at)] && !(sigma < kOfDistance * off))
+      return std::nullopt;
+    return Contrast{off / sigma, value, sigma};
   } catch (const NumericalError&) {
     return std::nullopt;
   }
@@ -206,6 +222,25 @@ void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
     tell(fmt::format("{} = {:.6g} is fixed, and the track alone says {:.6g} ± {:.2g}, {:.2g} "
                      "standard deviations from it",
                      name, value, says->value, says->sigma, says->apart),
+         ": one of them is wrong, or the model, and the error bars are too small",
+         says->apart > kTooFar, fit);
+  }
+}
+
+void doubt_if_bounds_contradict(const Problem& problem, const Eigen::VectorXd& u,
+                                const Uncertainty& error, const data::FitSettings& settings,
+                                data::Fit& fit) {
+  constexpr double kWorthWords = 3.0, kTooFar = 5.0;
+  for (int i = 0; i < static_cast<int>(problem.free.size()); ++i) {
+    const auto bound = bound_stood_at(problem, u, error, settings, i);
+    if (!bound) continue;
+    const auto says = contrast_of(let_go_of_bound(problem, u, i), bound->value);
+    const bool beyond = says && (says->value < bound->value) == bound->lower;
+    if (!beyond || !(says->apart > kWorthWords)) continue;
+    tell(fmt::format("{} is bounded to {} {:.6g}, and the track alone says {:.6g} ± {:.2g}, {:.2g} "
+                     "standard deviations beyond",
+                     problem.name(i), bound->lower ? "at least" : "at most", bound->value,
+                     says->value, says->sigma, says->apart),
          ": one of them is wrong, or the model, and the error bars are too small",
          says->apart > kTooFar, fit);
   }

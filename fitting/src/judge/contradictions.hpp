@@ -17,6 +17,12 @@ void doubt_if_priors_contradict(const Problem& problem, const Eigen::VectorXd& u
 void doubt_if_fixed_contradict(const Problem& problem, const Eigen::VectorXd& u,
                                const data::FitSettings& settings, data::Fit& fit);
 
+/// The same of bounds that a value has come to, by a fit without that bound.
+/// @param error  of that minimum.
+void doubt_if_bounds_contradict(const Problem& problem, const Eigen::VectorXd& u,
+                                const Uncertainty& error, const data::FitSettings& settings,
+                                data::Fit& fit);
+
 /// Tells where several tracks ask for different values of the parameters that they share, by the
 /// derivatives at the minimum: which track, and of which parameter above all. The verdict is
 /// doubtful then, but of filmed tracks only where that says more than trackers err with the motion.

@@ -187,6 +187,7 @@ void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Un
   doubt_if_drifting(problem, error, fit);
   doubt_if_priors_contradict(problem, u, error, fit);
   doubt_if_fixed_contradict(problem, u, settings, fit);
+  doubt_if_bounds_contradict(problem, u, error, settings, fit);
   doubt_if_tracks_differ(problem, u, error, fit);
   doubt_if_frictions_differ(problem, fit);
 }

@@ -18,7 +18,8 @@ namespace trochoid::fitting {
 ///     state at the first sample is the model's path followed back to it. Of three or more a
 ///     tracker may have missed, and a warning tells;
 ///   - a puck's arcs have frictions that differ beyond all chance (one_friction.hpp);
-///   - a prior, a fixed value, or one of several tracks contradicts the rest (contradictions.hpp).
+///   - a prior, a fixed value, a bound, or one of several tracks contradicts the rest
+///   (contradictions.hpp).
 /// @param settings  [fit] of the scene.
 /// @param u  a minimum, by which the problem's weights are set.
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
