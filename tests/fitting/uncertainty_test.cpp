@@ -337,6 +337,29 @@ TEST(SeveralRecordings, OfWhichOneIsNotExplainedByItselfAreToldWhich) {
               testing::HasSubstr("by itself the model explains track 1, but not 2"));
 }
 
+// Another thing was tracked: with 150 times its stated noise it had been "explained".
+TEST(SeveralRecordings, OfWhichOneShowsNothingOfTheBodyAreNotExplained) {
+  constexpr double kOff_m = 0.03;
+  data::Scene scene;
+  scene.model.name = "top";
+  for (const unsigned seed : {5U, 6U, 7U}) {
+    std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),
+                                    thesis_track(25.0, 1e-3, 13)};
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> normal(0.0, kOff_m);
+    for (data::TrackSample& sample : tracks[1].samples)
+      sample.centre_m = {normal(generator), normal(generator)};
+    const data::Fit found = fit(tracks, scene);
+    EXPECT_TRUE(found.verdict == data::FitVerdict::doubtful ||
+                found.verdict == data::FitVerdict::unexplained)
+        << found.verdict_words;
+    // Whether a path that is none ends in a minimum is chance, and so are the words.
+    EXPECT_THAT(found.verdict_words,
+                testing::AnyOf(testing::HasSubstr("explains the path of track 2 as well"),
+                               testing::HasSubstr("nothing asks for it in track 2")));
+  }
+}
+
 // Their times alone do not tell, all begin at 0.
 TEST(SeveralRecordings, AreNamedWherePositionsOfOneAreGivenUp) {
   std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12),

@@ -223,12 +223,16 @@ double polynomial_chi2(const Problem& problem, int arc, int degree) {
 
 // The least degree of polynomials that explain the positions as well as the model does, by BIC; -1
 // if none, or where position is not what carries the model.
-int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u) {
+// @param of_track  alone, whose own parameters count: what it shares the others tell; -1: of all.
+int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u, int of_track = -1) {
   const std::string& model = problem.predictor->model_name();
   if (model == "puck" || model == "pivot" || model == "smooth") return -1;
   constexpr int kHighest = 3;
+  std::vector<int> arcs;
+  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    if (of_track < 0 || problem.arcs[arc].track == of_track) arcs.push_back(arc);
   double rows = 0.0, chi2 = 0.0;
-  for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc) {
+  for (const int arc : arcs) {
     const ArcData& data = problem.arcs[arc];
     // A tilt or an azimuth in the track says more about the motion than the path does.
     if (data.observable_index(model::Observable::x_m) < 0 ||
@@ -245,17 +249,23 @@ int sufficient_polynomial(const Problem& problem, const Eigen::VectorXd& u) {
   }
   // Losses that mean nothing do not count against the model.
   const auto counted =
-      std::count_if(problem.free.begin(), problem.free.end(),
-                    [&](const FreeParameter& parameter) { return !is_loss(problem, parameter); });
+      std::count_if(problem.free.begin(), problem.free.end(), [&](const FreeParameter& parameter) {
+        if (of_track >= 0)
+          return parameter.arc >= 0 && problem.arcs[parameter.arc].track == of_track;
+        return !is_loss(problem, parameter);
+      });
   const double bic = chi2 + static_cast<double>(counted) * std::log(rows);
   for (int degree = 0; degree <= kHighest; ++degree) {
     double sum = 0.0;
-    for (int arc = 0; arc < static_cast<int>(problem.arcs.size()); ++arc)
+    for (const int arc : arcs)
       sum += polynomial_chi2(problem, arc, degree) + 2.0 * (degree + 1) * std::log(rows);
     if (sum <= bic) return degree;
   }
   return -1;
 }
+
+constexpr const char* kPolynomialWords[] = {"a constant", "a straight line", "a parabola",
+                                            "a cubic"};
 
 std::vector<std::string> undetermined(const data::Fit& fit) {
   std::vector<std::string> names;
@@ -340,7 +350,6 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
   const Squares sum = squares(problem, solution);
   warn_unexplained(sum, fit);
   const Misfit worst = misfit(problem, sum);
-  const char* const kPolynomials[] = {"a constant", "a straight line", "a parabola", "a cubic"};
   if (!solution.converged)
     return refuse(FitOutcome::no_convergence, FitVerdict::unexplained, solution.message, fit);
   if (!explains_path(sum))
@@ -369,9 +378,37 @@ void judge(const Problem& problem, const Solution& solution, const Uncertainty& 
     return refuse(FitOutcome::not_identifiable, FitVerdict::no_feature,
                   fmt::format("{} in time explains the path as well: nothing in it asks for the "
                               "model '{}', whose parameters mean nothing here",
-                              kPolynomials[degree], fit.model),
+                              kPolynomialWords[degree], fit.model),
                   fit);
   accept(problem, solution, error, worst, lost, fit);
+}
+
+void doubt_if_a_track_shows_nothing(const Problem& problem, const Eigen::VectorXd& u,
+                                    data::Fit& fit) {
+  std::set<int> tracks;
+  for (const ArcData& arc : problem.arcs) tracks.insert(arc.track);
+  // Of a path that is not followed anything explains as much.
+  if (tracks.size() < 2 || !says_explained(fit)) return;
+  for (const int track : tracks) {
+    const int degree = sufficient_polynomial(problem, u, track);
+    if (degree < 0) continue;
+    const std::string words = fmt::format(
+        "{} in time explains the path of track {} as well: nothing in it asks for the "
+        "model",
+        kPolynomialWords[degree], track + 1);
+    double times = 0.0;
+    for (const ArcData& arc : problem.arcs)
+      if (arc.track == track && !arc.sigma_unknown) times = std::max(times, main_noise_scale(arc));
+    if (!(times > kHopeless) || !says_explained(fit)) {
+      fit.warnings.push_back(words);
+      continue;
+    }
+    fit.verdict = FitVerdict::doubtful;
+    fit.verdict_words = fmt::format(
+        "the model follows the track, but does not explain it: {}, and its positions scatter by "
+        "{:.2g} times what they state; is it the body?",
+        words, times);
+  }
 }
 
 bool says_explained(const data::Fit& fit) {

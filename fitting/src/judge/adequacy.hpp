@@ -36,6 +36,14 @@ struct Squares {
 void judge(const Problem& problem, const Solution& solution, const Uncertainty& error,
            bool cut_short, data::Fit& fit);
 
+/// Of tracks that are explained, tells of each of several whose path a polynomial explains as well
+/// as the model does with what the others tell of it, as that of a short one. Where such a track's
+/// residuals are beyond 4 times its sigmas, a verdict of what is explained becomes doubtful: it
+/// need not be the body's.
+/// @param u  a minimum, by which the problem's weights are set.
+void doubt_if_a_track_shows_nothing(const Problem& problem, const Eigen::VectorXd& u,
+                                    data::Fit& fit);
+
 /// Whether a fit's verdict is one of a track that is explained: good, good_correlated or weak.
 [[nodiscard]] bool says_explained(const data::Fit& fit);
 

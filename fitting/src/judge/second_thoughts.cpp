@@ -181,6 +181,7 @@ void doubt_if_an_end_is_missed(const Problem& problem, const Eigen::VectorXd& u,
 
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,
                       const data::FitSettings& settings, data::Fit& fit) {
+  doubt_if_a_track_shows_nothing(problem, u, fit);
   doubt_if_pictures_are_lost(problem, u, error, fit);
   // A body that slips at first makes the halves differ, too: that it slips says more.
   doubt_if_an_end_is_missed(problem, u, error, fit);

@@ -8,6 +8,8 @@ namespace trochoid::fitting {
 /// Second thoughts about a fit that is what was asked for; models are compared without them, since
 /// further terms may take their reason away. Lowers a verdict of what is explained to doubtful
 /// where
+///   - one of several tracks shows nothing of the motion and scatters far more than it states
+///     (adequacy.hpp);
 ///   - times are off by whole frames from some sample on (lost_pictures.hpp);
 ///   - the second half of the record asks for other parameters than the first, its noise allowed
 ///     for: the model then lacks something that the parameters stand in for, and their error bars

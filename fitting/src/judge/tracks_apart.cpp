@@ -27,9 +27,9 @@ data::Scene scene_of_track(const data::Scene& scene, std::size_t track) {
   return alone;
 }
 
-// A path so short that a polynomial does as well is followed, too.
-bool is_followed(const data::Fit& fit) {
-  return says_explained(fit) || fit.verdict == data::FitVerdict::no_feature;
+// Their numbers, as in "track 2" and "tracks 2, 3".
+std::string with_numbers(const std::vector<std::size_t>& tracks) {
+  return fmt::format("track{} {}", tracks.size() > 1 ? "s" : "", fmt::join(tracks, ", "));
 }
 
 std::optional<data::Fit> fit_alone(const data::Track& track, const data::Scene& scene,
@@ -101,20 +101,24 @@ std::optional<TracksApart> tracks_apart(std::span<const data::Track> tracks,
   plain.profile = false;
   plain.bootstrap = 0;
   std::vector<std::optional<data::Fit>> fits;
-  std::vector<std::size_t> followed, others;
+  std::vector<std::size_t> explained, featureless, others;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     fits.push_back(fit_alone(tracks[i], scene_of_track(scene, i), plain));
-    (fits.back() && is_followed(*fits.back()) ? followed : others).push_back(i + 1);
+    const bool follows = fits.back() && says_explained(*fits.back());
+    const bool shows = !fits.back() || fits.back()->verdict != data::FitVerdict::no_feature;
+    (follows ? explained : shows ? others : featureless).push_back(i + 1);
   }
-  if (followed.empty()) return {};
+  if (explained.empty()) return {};
   const Opinions most = widest(together, fits);
   const bool differ = !most.name.empty();
   const std::string asks = "ask for different values of what they share, above all " + most.words();
-  if (!others.empty())
-    return TracksApart{false, fmt::format("by itself the model explains track{} {}, but not {}{}",
-                                          followed.size() > 1 ? "s" : "", fmt::join(followed, ", "),
-                                          fmt::join(others, ", "),
-                                          differ ? "; those that it explains " + asks : "")};
+  if (!others.empty() || !featureless.empty()) {
+    std::string words = "by itself the model explains " + with_numbers(explained);
+    if (!others.empty()) words += fmt::format(", but not {}", fmt::join(others, ", "));
+    if (!featureless.empty()) words += "; nothing asks for it in " + with_numbers(featureless);
+    if (differ) words += "; those that it explains " + asks;
+    return TracksApart{differ && others.empty(), words};
+  }
   if (!differ)
     return TracksApart{false,
                        "the model explains each of the tracks by itself, and they agree in what "
