@@ -131,19 +131,6 @@ OutlinePoint outline_point(const Camera& camera, Edge edge, const Eigen::Vector3
   return {edge, at, camera.image_from_table(at), normal, 0.0, true, J};
 }
 
-// A unit vector across an axis, turned about it by an angle of less than 0.14: the series are exact
-// to rounding there, and cost a fraction of what sine and cosine do.
-Eigen::Vector3d turned_a_little(const Eigen::Vector3d& n, const Eigen::Vector3d& axis,
-                                double angle) {
-  const double a2 = angle * angle;
-  const double cosine =
-      1.0 -
-      a2 / 2.0 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0 * (1.0 - a2 / 90.0))));
-  const double sine =
-      angle * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0))));
-  return cosine * n + sine * axis.cross(n);
-}
-
 // Samples [from, to] of a circle evenly along its image.
 void sample_arc(const View& view, const Camera& camera, const Circle& circle, double from,
                 double to, bool silhouette, double step_px, std::vector<OutlinePoint>& out) {
@@ -152,25 +139,24 @@ void sample_arc(const View& view, const Camera& camera, const Circle& circle, do
   const int chords = std::clamp(static_cast<int>(std::ceil((to - from) / kChord)), 1, kMost - 1);
   const Eigen::Vector3d middle = view.centre + circle.height * view.axis;
   std::array<double, kMost> length{};
-  std::array<Eigen::Vector3d, kMost> radial;  // where each chord begins
-  Eigen::Vector3d n = radial[0] = view.radial(from);
+  Eigen::Vector3d n = view.radial(from);
   Eigen::Vector2d before = camera.image_from_table<double>(middle + circle.radius * n);
   const double turn = (to - from) / chords, cosine = std::cos(turn), sine = std::sin(turn);
   for (int i = 1; i <= chords; ++i) {
-    n = radial[i] = cosine * n + sine * view.axis.cross(n);
+    n = cosine * n + sine * view.axis.cross(n);
     const Eigen::Vector2d here = camera.image_from_table<double>(middle + circle.radius * n);
     length[i] = length[i - 1] + (here - before).norm();
     before = here;
   }
   const double total = length[chords];
   const int points = static_cast<int>(std::lround(total / step_px));
-  out.reserve(out.size() + static_cast<std::size_t>(points));
   int chord = 1;
   for (int i = 0; i < points; ++i) {
     const double target = total * (i + 0.5) / points;
     while (chord < chords && length[chord] < target) ++chord;
     const double part = (target - length[chord - 1]) / (length[chord] - length[chord - 1]);
-    n = turned_a_little(radial[chord - 1], view.axis, part * turn);
+    const double angle = from + (to - from) * (chord - 1 + part) / chords;
+    n = view.radial(angle);
     out.push_back(outline_point(camera, circle.edge, middle + circle.radius * n, view.axis.cross(n),
                                 outwards(view, circle.edge, n)));
     out.back().arc_px = total / points;

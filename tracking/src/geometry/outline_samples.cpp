@@ -138,8 +138,6 @@ std::vector<OutlineSample> cross_pixels(const std::vector<OutlineSample>& outlin
   std::vector<OutlineSample> samples;
   std::vector<Crossing> met;
   crossings.clear();
-  // About as many as there are when one row or column is crossed for each.
-  samples.reserve(outline.size()), crossings.reserve(outline.size());
   constexpr double kNeighbourPx = 1.5;
   // Neighbours that are looked at together, then none until the next.
   const int period = Crossings::kMost * every;
