@@ -61,6 +61,8 @@ TEST(TrackAssembly, TellsNoSpinWhereTheNodeLineItIsCountedFromIsNotKnown) {
   EXPECT_FALSE(rolls.samples[7].phi || rolls.samples[7].psi);
   // Seen face on, it is the turn about the vertical that is told.
   EXPECT_TRUE(assemble_track(path, 0, {}, {.on_pin = true}).samples[7].psi);
+  // Of one that always lies on its face it does not move.
+  EXPECT_TRUE(assemble_track(path, 0, {}, {.flat = true}).samples[7].psi);
 }
 
 // Frames that scatter twice as far as they claim and may all be off by ten times that.

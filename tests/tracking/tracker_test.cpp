@@ -385,10 +385,17 @@ TEST(TrackVideo, ADiscThatTurnsInPlaceIsFoundByBodyAndCamera) {
   data::Body& body = scene.body.emplace();
   body.radius_m = TurningInPlace::kRadius_px / kScale_px_m;
   body.thickness_m = 0.001;
+  body.marks = {{.distance_m = TurningInPlace::kMark_px / kScale_px_m, .size_m = 0.005}};
   scene.support.kind = data::SupportKind::flat;
   const TrackResult result =
       track_video(folder / "clip.mkv", scene, data::Camera::from_scale(240, 130, kScale_px_m));
-  EXPECT_EQ(result.file.tracks.at(0).samples.size(), static_cast<std::size_t>(kDrawnFrames));
+  const auto& samples = result.file.tracks.at(0).samples;
+  ASSERT_EQ(samples.size(), static_cast<std::size_t>(kDrawnFrames));
+  for (const data::TrackSample& sample : samples) {
+    ASSERT_TRUE(sample.psi);
+    EXPECT_NEAR(sample.psi->value_rad, TurningInPlace::psi_rad(static_cast<int>(sample.frame)),
+                0.05);
+  }
   EXPECT_LT(largest_error_px(
                 result.file.tracks[0],
                 [](int) { return Eigen::Vector2d(TurningInPlace::kX_px, TurningInPlace::kY_px); }),

@@ -660,6 +660,7 @@ class Tracking {
       std::optional<data::Camera> floor;
       if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
       how.on_pin = stays_on_a_pin(path);
+      how.flat = scene_.support.kind == data::SupportKind::flat;
       // A pivot tells the ends of an axis apart, unless the body turns about it in place.
       how.fold = has_shape(scene_) && camera_ && scene_.body->faces_look_alike() &&
                  (scene_.support.kind != data::SupportKind::pivot || how.on_pin);

@@ -36,6 +36,7 @@ struct BodyPath {
 struct AssemblyOptions {
   bool fold = false;       ///< faces look alike: report min(theta, pi - theta)
   bool on_pin = false;     ///< held at its own middle: turns about the vertical where seen face on
+  bool flat = false;       ///< always lies on its face: its node line stays where it is
   double mark_rad = 0.0;   ///< angle of the spin mark in the body, for the folded spin
   double readout_s = 0.0;  ///< rolling shutter: time from the first to the last row
   VideoInfo video{};       ///< whose rows these are
