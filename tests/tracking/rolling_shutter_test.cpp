@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "drawn_clip.hpp"
+#include "link/rolling_shutter.hpp"
 #include "trochoid/data/pose_motion.hpp"
 #include "trochoid/tracking/tracker.hpp"
 
@@ -93,6 +94,59 @@ TEST(RollingShutter, LeavesCentreTiltAndPrecessionThoseOfTheMomentATrackTells) {
   EXPECT_LT(in_turn.precession_rad, 0.003);
   EXPECT_GT(at_once.tilt_rad, 0.02);
   EXPECT_GT(at_once.precession_rad, 0.04);
+}
+
+// Between the row of its centre and that of its mark a puck goes on, which turns the line from one
+// to the other as its spin does: here by up to 0.03 rad.
+TEST(RollingShutter, LeavesSpinThatOfTheMomentATrackTells) {
+  constexpr double kGoes_m_s = 0.8, kSpin_rad_s = 10.0, kMark_m = 0.015;
+  constexpr int kPictures = 20;
+  data::Body body;
+  body.radius_m = kDisc_m;
+  body.thickness_m = 1e-5;
+  body.marks = {{.distance_m = kMark_m, .size_m = 0.002}};
+  const data::Support flat{data::SupportKind::flat, {}};
+  const data::Camera camera = data::Camera::from_scale(kRowLength_px, kRowsInTurn, 2000.0);
+  const int motions = data::PoseMotion(body, flat, camera).count();
+  RollingShutter shutter{.readout_s = kReadInTurn_s, .video = {}, .camera = camera};
+  shutter.video.width_px = kRowLength_px;
+  shutter.video.height_px = kRowsInTurn;
+  const auto centre_m = [&](double t_s) {
+    return Eigen::Vector3d(kGoes_m_s * (t_s - 0.1), 0.0, body.half_thickness_m());
+  };
+  const auto mark_m = [&](double t_s) {
+    const double psi_rad = kSpin_rad_s * t_s;
+    return Eigen::Vector3d(centre_m(t_s) +
+                           kMark_m * Eigen::Vector3d(std::cos(psi_rad), std::sin(psi_rad), 0.0));
+  };
+  const auto read_s = [&](const Eigen::Vector3d& at_m) {
+    return kReadInTurn_s * readout_share(shutter.video, camera.image_from_table<double>(at_m));
+  };
+  BodyPath path;
+  std::vector<double> spins_rad;
+  for (int i = 0; i < kPictures; ++i) {
+    const double first_row_s = i / kPicturesPerS, here_s = first_row_s + read_s(centre_m(0.0));
+    double of_mark_s = here_s;
+    for (int round = 0; round < 20; ++round) of_mark_s = first_row_s + read_s(mark_m(of_mark_s));
+    const Eigen::Vector3d out = mark_m(of_mark_s) - centre_m(here_s);
+    PoseMeasurement seen;
+    seen.pose.centre_m = centre_m(here_s);
+    seen.pose.psi_rad = std::atan2(out.y(), out.x());
+    seen.sigma_psi_rad = 0.01;
+    seen.rows_in_turn = true;
+    for (auto& sheared : seen.sheared) sheared.setZero(motions, motions);
+    BodyPath::At& at = path.frames[i];
+    at.t_s = first_row_s;
+    at.seen.centre_px = camera.image_from_table<double>(seen.pose.centre_m);
+    at.seen.pose = seen;
+    spins_rad.push_back(kSpin_rad_s * here_s);
+  }
+  undo_rolling_shutter(shutter, body, flat, path);
+  for (const auto& [index, at] : path.frames)
+    EXPECT_NEAR(std::remainder(at.seen.pose->pose.psi_rad - spins_rad[static_cast<size_t>(index)],
+                               2.0 * std::numbers::pi),
+                0.0, 0.002)
+        << index;
 }
 
 }  // namespace

@@ -17,6 +17,8 @@ namespace {
 
 using Pose = data::Pose<>;
 using Step = data::PoseMotion::Step;
+/// Velocity of the centre, then the rotation vector.
+using Twist = Eigen::Matrix<double, 6, 1>;
 
 class Undoing {
  public:
@@ -91,13 +93,16 @@ class Undoing {
                      share_per_px_.y() * (here.sheared[1] * in_readout);
     Pose pose = here.rows_in_turn ? here.pose : motion->moved(here.pose, -off);
     pose.phi_rad = here.pose.phi_rad + data::wrapped(pose.phi_rad - here.pose.phi_rad);
-    if (here.sigma_psi_rad) pose.psi_rad = spin_of_centre(k, near, pose.phi_rad);
+    if (here.sigma_psi_rad)
+      pose.psi_rad =
+          spin_of_centre(k, near, motion->velocities(here.pose) * in_readout, pose.phi_rad);
     return pose;
   }
 
   /// Marks are read in rows of their own.
+  /// @param in_readout how it moves until all rows are read, but for its spin.
   [[nodiscard]] double spin_of_centre(std::size_t k, const std::vector<std::size_t>& near,
-                                      double phi_rad) const {
+                                      Twist in_readout, double phi_rad) const {
     const Pose& here = at(k).pose;
     const double cosine = std::cos(here.theta_rad);
     // Spin is counted from the node line: what that is moved by, it takes back.
@@ -113,27 +118,35 @@ class Undoing {
                            cosine * data::wrapped(here.phi_rad - other.phi_rad)) /
              (time_s(k) - time_s(i));
     });
-    return psi_rad - turns_rad_s * shutter_.readout_s * share_per_px_.dot(marks_px(here));
+    in_readout.tail<3>() += shutter_.readout_s * turns_rad_s * data::axis_of(here);
+    return psi_rad - marks_turned_rad(here, in_readout);
   }
 
-  /// The middle of the marks that face the camera, from the body's own.
-  [[nodiscard]] Eigen::Vector2d marks_px(const Pose& pose) const {
+  /// By how much the marks that face the camera seem to have turned about the centre: from when its
+  /// row is read to when theirs are, the body turns, goes on, and tilts.
+  [[nodiscard]] double marks_turned_rad(const Pose& pose, const Twist& in_readout) const {
     const Eigen::Vector3d node = data::node_line(pose), axis = data::axis_of(pose),
                           ascent = axis.cross(node), towards = axis_towards(shutter_.camera, pose);
     const bool upper = axis.dot(towards) > 0.0;
     const Eigen::Vector2d centre = shutter_.camera.image_from_table<double>(pose.centre_m);
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double sum_rad = 0.0;
     int count = 0;
     for (const data::SpinMark& mark : body_.marks) {
-      if (!(upper ? mark.on_upper_face : mark.on_lower_face)) continue;
+      if (!(upper ? mark.on_upper_face : mark.on_lower_face) || !(mark.distance_m > 0.0)) continue;
       const double angle = pose.psi_rad + mark.angle_rad;
-      sum += shutter_.camera.image_from_table<double>(
-                 pose.centre_m + body_.half_thickness_m() * towards +
-                 mark.distance_m * (std::cos(angle) * node + std::sin(angle) * ascent)) -
-             centre;
+      const Eigen::Vector3d outwards = std::cos(angle) * node + std::sin(angle) * ascent,
+                            at = body_.half_thickness_m() * towards + mark.distance_m * outwards;
+      const Eigen::Vector3d at_m = pose.centre_m + at;
+      const double share =
+          share_per_px_.dot(shutter_.camera.image_from_table<double>(at_m) - centre);
+      const Eigen::Vector3d goes = in_readout.head<3>() + in_readout.tail<3>().cross(at),
+                            ray = direction_to(shutter_.camera, at_m);
+      // It is looked for on the face as that is when the centre is read.
+      const Eigen::Vector3d on_face = goes - axis.dot(goes) / axis.dot(ray) * ray;
+      sum_rad += share * on_face.dot(axis.cross(outwards)) / mark.distance_m;
       ++count;
     }
-    return count > 0 ? Eigen::Vector2d(sum / count) : sum;
+    return count > 0 ? sum_rad / count : 0.0;
   }
 
   void place(const Pose& pose, Sighting& seen) const {
