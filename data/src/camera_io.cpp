@@ -222,7 +222,12 @@ Camera read_camera(const std::filesystem::path& path) {
       json.fail(fmt::format("\"shutter_fraction_of_frame\" = {} must lie in 0..1",
                             *camera.exposure_fraction));
   }
-  if (json.has("readout_s")) camera.readout_s = positive(json, "readout_s");
+  if (json.has("readout_s")) {
+    const double readout_s = json.number("readout_s");
+    if (!(readout_s >= 0.0))
+      json.fail(fmt::format("\"readout_s\" = {} must be 0 or greater", readout_s));
+    if (readout_s > 0.0) camera.readout_s = readout_s;
+  }
   camera.transfer = transfer_of(json);
   camera.metres_by_radius = metres_by_radius(json);
   if (json.has("covariance")) camera.covariance = covariance_of(json, "covariance");

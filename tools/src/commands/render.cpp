@@ -293,12 +293,16 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
 }
 
 // Rows read for longer than a frame lasts would still be read when the next one begins.
-void check_readout(const std::string& scene, const data::Camera& camera) {
-  if (camera.readout_s.value_or(0.0) * *camera.frame_rate_hz > 1.0)
+void check_readout(const std::string& file, const data::Camera& camera, const Motion& motion) {
+  const double readout_s = camera.readout_s.value_or(0.0);
+  if (readout_s * *camera.frame_rate_hz > 1.0)
     throw InputError(
-        fmt::format("{}: camera.readout_s = {:g} is longer than a frame at {:g} frames "
-                    "per second",
-                    scene, *camera.readout_s, *camera.frame_rate_hz));
+        fmt::format("{}: readout_s = {:g} is longer than a frame at {:g} frames per second", file,
+                    readout_s, *camera.frame_rate_hz));
+  if (readout_s > motion.end_s())
+    throw InputError(
+        fmt::format("{}: readout_s = {:g} is longer than the motion, which ends at {:.3g} s", file,
+                    readout_s, motion.end_s()));
 }
 
 data::Camera recording_camera(const RenderOptions& options, const data::Scene& scene,
@@ -309,8 +313,9 @@ data::Camera recording_camera(const RenderOptions& options, const data::Scene& s
                                  camera.width_px, camera.height_px));
   camera.frame_rate_hz = scene.run.rate_hz;
   camera.exposure_fraction = exposure_of(options, scene, camera);
-  if (scene.camera.readout_s > 0.0) camera.readout_s = scene.camera.readout_s;
-  check_readout(options.scene, camera);
+  const bool of_scene = scene.camera.readout_s > 0.0;
+  if (of_scene) camera.readout_s = scene.camera.readout_s;
+  check_readout(of_scene ? options.scene : camera.file, camera, motion);
   if (scene.camera.transfer) camera.transfer = *scene.camera.transfer;
   return camera;
 }

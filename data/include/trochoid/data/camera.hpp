@@ -37,7 +37,8 @@ struct Camera {
   /// from the recording or CameraSettings::frame_rate_hz.
   std::optional<double> frame_rate_hz;
   std::optional<double> exposure_fraction;  ///< shutter time as a fraction of the frame interval
-  std::optional<double> readout_s;  ///< rolling shutter: first to last row; CameraSettings' counts
+  /// Rolling shutter: first to last row, > 0; that of CameraSettings counts instead, if there is.
+  std::optional<double> readout_s;
   Transfer transfer = Transfer::srgb;
   bool metres_by_radius = false;  ///< as large as the known radius of the body filmed has them
   std::string file;               ///< where it was read from, for messages; empty if it was made
