@@ -21,7 +21,7 @@ namespace trochoid::fitting {
 ///     tracker may have missed, and a warning tells;
 ///   - a puck's arcs have frictions that differ beyond all chance (one_friction.hpp);
 ///   - a prior, a fixed value, a bound, or one of several tracks contradicts the rest
-///   (contradictions.hpp).
+///     (contradictions.hpp).
 /// @param settings  [fit] of the scene.
 /// @param u  a minimum, by which the problem's weights are set.
 void doubt_as_a_whole(const Problem& problem, const Eigen::VectorXd& u, const Uncertainty& error,

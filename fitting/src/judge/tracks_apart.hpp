@@ -21,8 +21,7 @@ struct TracksApart {
 /// @param together  the fit of all tracks, which leaves more than their noise.
 /// @param scene, options  by which that was made.
 /// @returns nothing for a single track, for pucks (one_friction.hpp) and where no track is
-/// explained
-///          by itself either.
+///          explained by itself either.
 [[nodiscard]] std::optional<TracksApart> tracks_apart(std::span<const data::Track> tracks,
                                                       const data::Scene& scene,
                                                       const FitOptions& options,

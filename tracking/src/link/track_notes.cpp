@@ -211,8 +211,7 @@ std::optional<std::string> note_about_lost(const BodyPath& path, const FramesRea
       gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.frames() < b.frames(); });
   return fmt::format(
       "not seen in frames {} (of {} to {}): {}; if it is to be seen there, point at it: at x,y, "
-      "from "
-      "a frame in which it is",
+      "from a frame in which it is",
       fmt::join(where, ", "), read.first, read.last,
       why_lost(longest, read, usual_radius_px(path), video));
 }
