@@ -97,7 +97,7 @@ TEST(RollingShutter, LeavesCentreTiltAndPrecessionThoseOfTheMomentATrackTells) {
 }
 
 // Between the row of its centre and that of its mark a puck goes on, which turns the line from one
-// to the other as its spin does: here by up to 0.03 rad.
+// to the other as its spin does: here by up to 0.1 rad.
 TEST(RollingShutter, LeavesSpinThatOfTheMomentATrackTells) {
   constexpr double kGoes_m_s = 0.8, kSpin_rad_s = 10.0, kMark_m = 0.015;
   constexpr int kPictures = 20;

@@ -35,13 +35,12 @@ bool is_same(const fs::path& a, const fs::path& b) {
   return fs::equivalent(a, b, ignored) || plain(a) == plain(b);
 }
 
-// Elsewhere it stands for standard output, where no result goes: each has others beside it.
+}  // namespace
+
 void refuse_dash(const fs::path& output) {
   if (output == "-")
     throw InputError("-: results are files; give a name (./- for a file called so)");
 }
-
-}  // namespace
 
 void check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   if (output.empty()) return;

@@ -5,6 +5,10 @@
 
 namespace trochoid::tools {
 
+/// @throws InputError for "-", which elsewhere stands for standard output: no result goes there, as
+/// each has others beside it.
+void refuse_dash(const std::filesystem::path& output);
+
 /// Called before the work, so that a wrong name costs no time and no recording: `output` must lie
 /// in a folder that exists and be none of the files the command reads, nor another output among
 /// them; a scene (.toml) is read with the camera file it names. Empty paths are skipped.

@@ -7,6 +7,7 @@
 
 #include "common/fitted_scene.hpp"
 #include "common/json_object.hpp"
+#include "common/outputs.hpp"
 #include "common/provenance.hpp"
 #include "common/recording_name.hpp"
 #include "trochoid/data/error.hpp"
@@ -108,6 +109,7 @@ void check_holds_none_of(const std::vector<fs::path>& inputs, const fs::path& fo
 }  // namespace
 
 void check_replaceable(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  refuse_dash(folder);
   std::error_code code;
   if (fs::exists(folder, code) && !fs::exists(folder / kRunFile, code) &&
       !(fs::is_directory(folder, code) && fs::is_empty(folder, code)))
