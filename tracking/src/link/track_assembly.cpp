@@ -267,7 +267,8 @@ data::Track assemble_track(const BodyPath& path, int object,
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
       if (face_on) join_turns(*seen.pose, sample);
       // Counted from the node line, spin means nothing where that is not known.
-      else if (!sample.phi && !options.flat) sample.psi.reset();
+      else if (!sample.phi && !options.flat)
+        sample.psi.reset();
     } else {
       metres_from_rim(sample, seen, shift, floor);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
