@@ -641,6 +641,38 @@ class Tracking {
     return border ? std::optional(note_about_likely_border(seen, *border)) : std::nullopt;
   }
 
+  /// @param how all but what is the body's own.  @param words how metres were obtained.
+  void add_track(std::size_t k, AssemblyOptions how, std::string& words, TrackResult& result) {
+    BodyPath& path = paths_[k];
+    if (has_shape(scene_) && camera_)
+      undo_rolling_shutter({how.readout_s, how.video, *camera_}, *scene_.body, scene_.support,
+                           path);
+    std::optional<data::Camera> floor;
+    if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
+    how.on_pin = stays_on_a_pin(path);
+    how.flat = scene_.support.kind == data::SupportKind::flat;
+    // A pivot tells the ends of an axis apart, unless the body turns about it in place.
+    how.fold = has_shape(scene_) && camera_ && scene_.body->faces_look_alike() &&
+               (scene_.support.kind != data::SupportKind::pivot || how.on_pin);
+    result.file.angles_folded = result.file.angles_folded || how.fold;
+    if (scene_.support.kind == data::SupportKind::pivot && scene_.support.pivot_m && !how.on_pin)
+      how.pivot_m = scene_.support.pivot_m->head<2>();
+    result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), floor, how));
+    const auto& samples = result.file.tracks.back().samples;
+    const auto found = static_cast<std::int64_t>(samples.size());
+    result.summary.found += found;
+    result.summary.lost += frames_ - found;
+    result.summary.doubtful +=
+        std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
+    const auto add = [&](const std::optional<std::string>& note) {
+      if (!note) return;
+      result.file.notes.push_back(paths_.size() == 1 ? *note
+                                                     : fmt::format("object {}: {}", k, *note));
+    };
+    add(note_about_lost(path, read_, recording_.info()));
+    add(note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames));
+  }
+
   TrackResult result() {
     TrackResult result;
     result.file.source = video_.filename().string();
@@ -652,37 +684,7 @@ class Tracking {
     if (camera_motion_) how.shifts = camera_motion_->shifts();
     if (scene_.body && !scene_.body->marks.empty())
       how.mark_rad = scene_.body->marks.front().angle_rad;
-    for (std::size_t k = 0; k < paths_.size(); ++k) {
-      BodyPath& path = paths_[k];
-      if (has_shape(scene_) && camera_)
-        undo_rolling_shutter({how.readout_s, how.video, *camera_}, *scene_.body, scene_.support,
-                             path);
-      std::optional<data::Camera> floor;
-      if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
-      how.on_pin = stays_on_a_pin(path);
-      how.flat = scene_.support.kind == data::SupportKind::flat;
-      // A pivot tells the ends of an axis apart, unless the body turns about it in place.
-      how.fold = has_shape(scene_) && camera_ && scene_.body->faces_look_alike() &&
-                 (scene_.support.kind != data::SupportKind::pivot || how.on_pin);
-      result.file.angles_folded = result.file.angles_folded || how.fold;
-      how.pivot_m.reset();
-      if (scene_.support.kind == data::SupportKind::pivot && scene_.support.pivot_m && !how.on_pin)
-        how.pivot_m = scene_.support.pivot_m->head<2>();
-      result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), floor, how));
-      const auto& samples = result.file.tracks.back().samples;
-      const auto found = static_cast<std::int64_t>(samples.size());
-      result.summary.found += found;
-      result.summary.lost += frames_ - found;
-      result.summary.doubtful +=
-          std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
-      const auto add = [&](const std::optional<std::string>& note) {
-        if (!note) return;
-        result.file.notes.push_back(paths_.size() == 1 ? *note
-                                                       : fmt::format("object {}: {}", k, *note));
-      };
-      add(note_about_lost(path, read_, recording_.info()));
-      add(note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames));
-    }
+    for (std::size_t k = 0; k < paths_.size(); ++k) add_track(k, how, words, result);
     if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))
       result.file.notes.push_back(std::move(*note));
     if (camera_)

@@ -295,7 +295,8 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
 // Rows read for longer than a frame lasts would still be read when the next one begins.
 void check_readout(const std::string& file, const data::Camera& camera, const Motion& motion) {
   const double readout_s = camera.readout_s.value_or(0.0);
-  if (readout_s * *camera.frame_rate_hz > 1.0)
+  constexpr double kRounding = 1e-2;
+  if (readout_s * *camera.frame_rate_hz > 1.0 + kRounding)
     throw InputError(
         fmt::format("{}: readout_s = {:g} is longer than a frame at {:g} frames per second", file,
                     readout_s, *camera.frame_rate_hz));

@@ -202,7 +202,9 @@ void read_in_turn(const MotionPerPx& per_px, const Eigen::Vector2d& centre_px,
   for (OutlineSample& sample : outline) {
     const Eigen::Vector2d speed(sample.motion.dot(per_px[0]), sample.motion.dot(per_px[1]));
     // It is read where it has gone to, not where it was.
-    const double by = speed.dot(sample.image_px - centre_px) / (1.0 - speed.dot(sample.normal_px));
+    constexpr double kSlowest = 0.5;  // who keeps up with the rows is not seen for what it is
+    const double by = speed.dot(sample.image_px - centre_px) /
+                      std::max(kSlowest, 1.0 - speed.dot(sample.normal_px));
     sample.image_px += by * sample.normal_px;
   }
 }
