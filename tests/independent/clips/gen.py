@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Recordings with truth that the project's renderer, camera and model had no part in.
 
-    gen.py OUT LO HI [--seed N] [--tracer PATH]
+    gen.py OUT LO HI [--seed N] [--readout FRACTION] [--tracer PATH]
 
 writes OUT/LO .. OUT/HI-1, each with video.mp4, truth.csv, camera.json, object.json and scene.json, in the layout that
 `trochoid study tracking OUT/*` reads. What is filmed, how it moves and through which camera is drawn from --seed and the
-clip's number. Light comes from tracer.cpp beside this file (compiled beside OUT when it is newer), motion from ../rig.py, the
+clip's number; --readout has its rows read one after the other, in that part of the time from picture to picture. Light comes from tracer.cpp beside this file (compiled beside OUT when it is newer), motion from ../rig.py, the
 sensor (blur, exposure, transfer curve, noise) and H.264 from here. Needs numpy, scipy, g++, ffmpeg.
 """
 import argparse, json, subprocess, sys
@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import rig
 
-G, STEPS = 9.81, 12     # poses per exposure
+G, STEPS = 9.81, 12     # poses per exposure of a row
 
 
 # --- Motion: (times) -> positions n x 3 [m], attitudes as (phi, theta, psi) n x 3 ------------------------------------
@@ -90,7 +90,7 @@ def place_camera(rng, target, height_m, tilt, f_px, size, distortion):
     return {"width": w, "height": h, "fx": f_px, "fy": f_px, "cx": (w - 1) / 2 + rng.normal(0, 6), "cy": (h - 1) / 2 + rng.normal(0, 6),
             "dist_k1_k2_p1_p2_k3": [*distortion, 0.0, 0.0, 0.0], "R_world_to_cam": R.tolist(),
             "t_world_to_cam_m": (-R @ eye).tolist(), "camera_position_m": eye.tolist(),
-            "exposure": "global shutter; truth.csv is at mid-exposure; t = frame/fps",
+            "exposure": "truth.csv is at mid-exposure of the row that shows the centre; t = frame/fps + readout_s row/(height-1)",
             "pixel_convention": "centre of the top-left pixel is (0,0); x right, y down"}
 
 
@@ -115,26 +115,28 @@ def colour(rng, level, saturation):
     return np.clip(level * tint / tint.mean(), 0.01, 0.93)
 
 
-def draw(rng):
+def draw(rng, readout=0.0):
     """Everything about one clip but its pictures; None where the draw cannot be filmed."""
     kind = rng.choice(["disc", "disc", "ring", "top"])
     R = np.exp(rng.uniform(np.log(0.01), np.log(0.05)))
     body = rig.Body(R, R * rng.uniform(0.08, 0.4), 0.0, R * rng.uniform(0.55, 0.88) if kind == "ring" else 0.0)
     body.mass_kg = rng.uniform(1000, 8000) * np.pi * (R**2 - body.inner_m**2) * body.thickness_m
     fps, frames, shutter = float(rng.choice([60, 100, 120, 200, 240])), int(rng.integers(90, 131)), rng.uniform(0.08, 0.55)
-    offsets = np.append((np.arange(STEPS) + 0.5) / STEPS - 0.5, 0.0) * shutter / fps
-    order = np.argsort(offsets, kind="stable")
-    t_s = (np.arange(frames)[:, None] / fps + offsets[order] + 0.5 * shutter / fps).ravel()
+    rows = round(STEPS * readout / shutter)                              # poses from the first row's to the last's
+    offsets = ((np.arange(STEPS + rows) + 0.5) / STEPS - 0.5) * shutter / fps
+    of_frame = np.arange(frames)[:, None] / fps + offsets
+    t_s, place = np.unique(of_frame.ravel() + 0.5 * shutter / fps, return_inverse=True)
     l_m, pivot = R * rng.uniform(0.9, 1.6), np.array([0, 0, R * rng.uniform(0.6, 1.2)])
     motion = spin(rng, body, l_m, pivot, t_s) if kind == "top" else roll(rng, body, t_s)
     if motion is None:
         return None
     law, at, angles = motion
-    if kind != "top" and np.abs(np.diff(angles[::STEPS + 1, 0])).max() > 1.1:
+    at, angles = (v[place.ravel()].reshape(*of_frame.shape, 3) for v in (at, angles))  # frame, pose, coordinate
+    if kind != "top" and np.abs(np.diff(angles[:, 0, 0])).max() > 1.1:
         return None                                                      # precession near the Nyquist rate
-    shift = np.append(-(at[:, :2].max(0) + at[:, :2].min(0)) / 2, 0) * (kind != "top")
+    shift = np.append(-(at.max((0, 1)) + at.min((0, 1)))[:2] / 2, 0) * (kind != "top")
     at = at + shift
-    reach = np.hypot(at[:, 0], at[:, 1]).max() + 1.3 * R
+    reach = np.hypot(at[..., 0], at[..., 1]).max() + 1.3 * R
     size = [(640, 480), (720, 540), (800, 600), (960, 720)][rng.integers(4)]
     width_px = min(np.exp(rng.uniform(np.log(40), np.log(200))), 0.46 * size[1] * 2 * R / reach)
     height = max(rng.uniform(0.25, 1.3), 9 * R)
@@ -143,13 +145,13 @@ def draw(rng):
     f_px = width_px * height / (2 * R)
     corner = np.hypot(*size) / 2 / f_px
     k1 = rng.choice([0, rng.uniform(-0.25, 0.1)]) * min(1, 0.25 / corner**2)
-    camera = place_camera(rng, np.array([0, 0, at[:, 2].mean() / 2]), height, rng.choice([0, rng.uniform(0, 0.35)]), f_px, size, [k1, 0.0])
-    camera.update(fps=fps, shutter_fraction_of_frame=shutter, transfer=str(rng.choice(["sRGB", "sRGB", "sRGB", "linear"])))
+    camera = place_camera(rng, np.array([0, 0, at[..., 2].mean() / 2]), height, rng.choice([0, rng.uniform(0, 0.35)]), f_px, size, [k1, 0.0])
+    camera.update({"readout_s": rows / STEPS * shutter / fps} if rows else {}, fps=fps, shutter_fraction_of_frame=shutter, transfer=str(rng.choice(["sRGB", "sRGB", "sRGB", "linear"])))
     marked = rng.random() < 0.5 or kind == "top"
     marks = [{"kind": "dot", "r_m": R * 0.65, "radius_m": R * rng.uniform(0.13, 0.18), "angle_deg": 0,
               "faces": [1] if kind == "top" else [1, -1]}] if marked and kind != "ring" else []
-    return dict(kind=kind, body=body, camera=camera, law=law, t_s=t_s, at=at, angles=angles, marks=marks, frames=frames,
-                middle=int(np.where(order == STEPS)[0][0]), l_m=l_m, pivot=pivot)
+    return dict(kind=kind, body=body, camera=camera, law=law, offsets=offsets, at=at, angles=angles, marks=marks, frames=frames,
+                l_m=l_m, pivot=pivot)
 
 
 def appearance(rng, clip):
@@ -184,7 +186,7 @@ def tracer_scene(clip, look, seed, samples, path):
     body, camera, top = clip["body"], clip["camera"], clip["kind"] == "top"
     mark = clip["marks"][0] if clip["marks"] else {"r_m": 0, "radius_m": 0, "faces": []}
     keys = {k: camera[k] for k in ("width", "height", "fx", "fy", "cx", "cy")}
-    keys |= {"samples": samples, "steps": STEPS, "seed": seed, "k1": camera["dist_k1_k2_p1_p2_k3"][0], "k2": 0,
+    keys |= {"samples": samples, "steps": len(clip["offsets"]), "row_steps": STEPS, "seed": seed, "k1": camera["dist_k1_k2_p1_p2_k3"][0], "k2": 0,
              "R": np.ravel(camera["R_world_to_cam"]), "eye": camera["camera_position_m"], "radius": body.radius_m,
              "inner_radius": body.inner_m, "half_thickness": body.thickness_m / 2, "axle_radius": 0.04 * body.radius_m * top,
              "axle_from": -clip["l_m"] * top, "axle_to": (body.thickness_m / 2 + 0.4 * body.radius_m) * top, "mark_at": mark["r_m"],
@@ -196,13 +198,16 @@ def tracer_scene(clip, look, seed, samples, path):
 
 
 def write_truth(clip, path):
-    camera, step = clip["camera"], STEPS + 1
-    at, angles = clip["at"][clip["middle"]::step], clip["angles"][clip["middle"]::step]
-    px, rows = project(camera, at), ["frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac"]
+    camera, read = clip["camera"], np.zeros(clip["frames"])               # when the row of the centre is
+    moved, rows = np.concatenate([clip["at"], clip["angles"]], axis=2), ["frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac"]
+    for _ in range(8):
+        pose = np.array([[np.interp(t, clip["offsets"], v) for v in m.T] for t, m in zip(read, moved)])
+        at, angles, px = pose[:, :3], pose[:, 3:], project(camera, pose[:, :3])
+        read = camera.get("readout_s", 0.0) * np.clip(px[:, 1] / (camera["height"] - 1), 0, 1)
     for i in range(clip["frames"]):
         q, outline = rig.quaternion(*angles[i]), project(camera, rim(clip["body"], at[i], angles[i]))
         seen = np.all((outline > 0) & (outline < [camera["width"] - 1, camera["height"] - 1]), axis=1).mean()
-        numbers = [i / camera["fps"], *at[i], *px[i], *q, angles[i][1], angles[i][0], angles[i][2], seen]
+        numbers = [i / camera["fps"] + read[i], *at[i], *px[i], *q, angles[i][1], angles[i][0], angles[i][2], seen]
         rows.append(f"{i}," + ",".join(f"{x:.8f}" for x in numbers))
     path.write_text("\n".join(rows) + "\n")
 
@@ -211,8 +216,7 @@ def film(rng, clip, look, tracer, folder, seed, samples):
     camera = clip["camera"]
     w, h, fps = camera["width"], camera["height"], camera["fps"]
     tracer_scene(clip, look, seed, samples, folder / "scene.txt")
-    poses = np.array([[*p, *rig.quaternion(*a)] for p, a in zip(clip["at"], clip["angles"])]).reshape(clip["frames"], STEPS + 1, 7)
-    np.delete(poses, clip["middle"], axis=1).tofile(folder / "poses.f64")
+    np.array([[*p, *rig.quaternion(*a)] for p, a in zip(clip["at"].reshape(-1, 3), clip["angles"].reshape(-1, 3))]).tofile(folder / "poses.f64")
     sensor = {"psf_sigma_px": rng.uniform(0.35, 0.75), "read_noise_8bit": rng.uniform(0.4, 3.5),
               "shot_noise": rng.uniform(0, 0.012), "floor_level": np.clip(look["floor"].mean() * rng.uniform(0.7, 1.4), 0.04, 0.85),
               "gamma": 1.0 if camera["transfer"] == "linear" else 1 / rng.uniform(2.0, 2.4),
@@ -258,6 +262,7 @@ def main():
     options.add_argument("lo", type=int)
     options.add_argument("hi", type=int)
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--readout", type=float, default=0.0, help="rolling shutter: first row to last, of the frame interval")
     options.add_argument("--samples", type=int, default=32, help="rays per pixel")
     options.add_argument("--tracer", type=Path)
     o = options.parse_args()
@@ -268,7 +273,7 @@ def main():
         subprocess.run(["g++", "-std=c++20", "-O3", "-march=native", "-fopenmp", "-o", tracer, source], check=True)
     for number in range(o.lo, o.hi):
         rng = np.random.default_rng([o.seed, number])
-        while (clip := draw(rng)) is None:
+        while (clip := draw(rng, o.readout)) is None:
             pass
         look, folder = appearance(rng, clip), o.out / f"{number:02d}"
         folder.mkdir(exist_ok=True)

@@ -4,7 +4,8 @@
 //   tracer SCENE POSES > frames.f32
 //
 // SCENE: lines "key number...", see read_scene(). POSES: doubles, per frame `steps` poses spread over the
-// exposure, each x y z qw qx qy qz (body to world, m). Out: per frame height x width x 3 linear floats.
+// exposure, each x y z qw qx qy qz (body to world, m); of these the first row is exposed to the first `row_steps`,
+// the last row to the last, those between in proportion. Out: per frame height x width x 3 linear floats.
 //
 // Light: two rectangular lamps and a sky, sampled by R_d sequences (shifted golden ratios); body: diffuse
 // with a glossy lobe, lit by lamps, sky and one bounce off floor or body; floor: Lambertian (x, y, 0) with a
@@ -100,7 +101,7 @@ struct Pose {
   V to_world(V b) const { return b.x * axis[0] + b.y * axis[1] + b.z * axis[2]; }
 };
 struct Scene {
-  int width, height, samples, steps, floor_kind;
+  int width, height, samples, steps, row_steps, floor_kind;
   double fx, fy, cx, cy, k1, k2;
   std::array<V, 3> rows;  // world to camera
   V eye;
@@ -135,6 +136,7 @@ Scene read_scene(const char* path) {
   const auto whole = [&](const std::string& key) { return static_cast<int>(one(key)); };
   Scene s;
   s.width = whole("width"), s.height = whole("height"), s.samples = whole("samples"), s.steps = whole("steps");
+  s.row_steps = whole("row_steps");
   s.fx = one("fx"), s.fy = one("fy"), s.cx = one("cx"), s.cy = one("cy"), s.k1 = one("k1"), s.k2 = one("k2");
   for (std::size_t i = 0; i < 3; ++i) s.rows[i] = vec("R", 3 * i);
   s.eye = vec("eye");
@@ -515,8 +517,8 @@ class Camera {
       Draw u;
       for (int d = 0; d < Stratified::kDimensions; ++d) u[d] = kSequence.at(d, k, shifts[d]);
       const V d = ray(x, row, u[kPixelX], u[kPixelY]);
-      const Pose* pose =
-          poses ? &(*poses)[static_cast<std::size_t>(u[kTime] * static_cast<double>(poses->size()))] : nullptr;
+      const double step = u[kTime] * s_.row_steps + (s_.steps - s_.row_steps) * (row / (s_.height - 1.0));
+      const Pose* pose = poses ? &(*poses)[static_cast<std::size_t>(step)] : nullptr;
       const Hit hit = hit_things(s_, pose, s_.eye, d);
       if (hit.part != kNothing)
         sum = sum + light_.thing(pose, hit, s_.eye, d, u, moving, 0);
