@@ -139,12 +139,12 @@ Sweep between(const Sweep& from, const Sweep& to, double part) {
 
 Moments moments_of(const data::Body& body, const data::Camera& camera,
                    const data::PoseMotion& motion, const ExposureMotion& exposure,
-                   const Pose& middle, int parts, const MotionPerPx& per_px) {
+                   const Pose& middle, int parts, const MotionInReadout& in_readout) {
   Moments moments;
   for (int k = 0; k < parts; ++k) {
     const Pose pose = motion.settled(exposure.at(middle, (k + 0.5) / parts - 0.5));
     moments.push_back(outline_samples(body, pose, camera, motion, Moved::kStepPx));
-    read_in_turn(per_px, camera.image_from_table<double>(pose.centre_m), moments.back());
+    read_in_turn(in_readout, camera.image_from_table<double>(pose.centre_m), moments.back());
   }
   return moments;
 }

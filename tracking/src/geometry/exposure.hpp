@@ -45,7 +45,7 @@ using Moments = std::vector<std::vector<OutlineSample>>;
 [[nodiscard]] Moments moments_of(const data::Body& body, const data::Camera& camera,
                                  const data::PoseMotion& motion, const ExposureMotion& exposure,
                                  const data::Pose<>& middle, int parts,
-                                 const MotionPerPx& per_px = {});
+                                 const MotionInReadout& in_readout = {});
 
 /// Sweeps of all samples of the outline in the middle, each within as many parts as there are
 /// moments, at most Sweep::kMost.

@@ -196,16 +196,18 @@ Eigen::Vector3d axis_towards(const data::Camera& camera, const data::Pose<>& pos
   return k.dot(direction_to(camera, pose.centre_m)) < 0.0 ? Eigen::Vector3d(-k) : k;
 }
 
-void read_in_turn(const MotionPerPx& per_px, const Eigen::Vector2d& centre_px,
+void read_in_turn(const MotionInReadout& motion, const Eigen::Vector2d& centre_px,
                   std::vector<OutlineSample>& outline) {
-  if (per_px[0].size() == 0) return;
+  if (motion.per_frame.size() == 0) return;
   for (OutlineSample& sample : outline) {
-    const Eigen::Vector2d speed(sample.motion.dot(per_px[0]), sample.motion.dot(per_px[1]));
+    const double speed_px = sample.motion.dot(motion.per_frame),
+                 gain_px = sample.motion.dot(motion.per_frame2);
     // It is read where it has gone to, not where it was.
     constexpr double kSlowest = 0.5;  // who keeps up with the rows is not seen for what it is
-    const double by = speed.dot(sample.image_px - centre_px) /
-                      std::max(kSlowest, 1.0 - speed.dot(sample.normal_px));
-    sample.image_px += by * sample.normal_px;
+    const double late =
+        motion.frames_per_px.dot(sample.image_px - centre_px) /
+        std::max(kSlowest, 1.0 - speed_px * motion.frames_per_px.dot(sample.normal_px));
+    sample.image_px += (speed_px + 0.5 * late * gain_px) * late * sample.normal_px;
   }
 }
 

@@ -34,13 +34,16 @@ struct OutlineSample {
   Motion near_motion;  ///< of the near face's rim across the wall, along the same normal; or empty
 };
 
-/// How a body moves from one pixel to the next, along x (first) and y of the picture, where the
-/// rows of that are read one after the other; empty where they are read at once.
-using MotionPerPx = std::array<data::PoseMotion::Step, 2>;
+/// How a body moves while the rows of a picture are read one after the other; empty where they are
+/// read at once.
+struct MotionInReadout {
+  Eigen::Vector2d frames_per_px = Eigen::Vector2d::Zero();  ///< OutlineView::readout_per_px
+  data::PoseMotion::Step per_frame{}, per_frame2{};         ///< speed, acceleration
+};
 
 /// The outline as it is seen: that of the body when the row of its centre is read, each point moved
 /// on, or back, to when its own row is.
-void read_in_turn(const MotionPerPx& per_px, const Eigen::Vector2d& centre_px,
+void read_in_turn(const MotionInReadout& motion, const Eigen::Vector2d& centre_px,
                   std::vector<OutlineSample>& outline);
 
 /// Samples the visible outline about every `step_px`. A smooth body's apparent contour moves along

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "edges/colour_window.hpp"
+#include "geometry/pose_change.hpp"
 #include "pose/outline_refine.hpp"
 #include "pose/pose_start.hpp"
 #include "pose/spin_mark.hpp"
@@ -372,11 +373,21 @@ std::optional<MarkReading> read_marks_of_either_face(const cv::Mat& luma, const 
   return marks;
 }
 
-MotionPerPx motion_per_px(const data::PoseMotion& motion, const OutlineView& view,
-                          const data::Pose<>& now) {
-  const data::PoseMotion::Step in_frame =
-      view.side_of_previous * motion.step_between(*view.previous, now);
-  return {view.readout_per_px.x() * in_frame, view.readout_per_px.y() * in_frame};
+// At the moment itself: the chord from one frame to the next has the direction of half a frame off.
+// From row to row the centre is not seen a whole frame later, but by the row's more or less.
+MotionInReadout motion_in_readout(const data::PoseMotion& motion, const data::Camera& camera,
+                                  const OutlineView& view, const data::Pose<>& now) {
+  constexpr double kShort = 0.05;  // of the way between both
+  const Eigen::Vector2d way_px = camera.image_from_table<double>(now.centre_m) -
+                                 camera.image_from_table<double>(view.previous->centre_m);
+  const double frames =
+      view.side_of_previous *
+      std::max(0.5, 1.0 + view.side_of_previous * view.readout_per_px.dot(way_px));
+  const PoseChange change(*view.previous, now, PoseChange::kWithin);
+  const data::PoseMotion::Step on = -motion.step_between(change.on(now, kShort), now),
+                               back = -motion.step_between(change.on(now, -kShort), now);
+  return {view.readout_per_px, (on - back) / (2.0 * kShort * frames),
+          (on + back) / std::pow(kShort * frames, 2)};
 }
 
 // Spin is counted from the node line: what phi is wrong by, psi takes back. An axis that is off
@@ -462,7 +473,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
                             ExposureMotion(*view.previous, starts.front(), view.exposure_fraction))
                       : std::nullopt,
       .shading = view.shading,
-      .per_px = in_turn ? motion_per_px(motion, view, starts.front()) : MotionPerPx()};
+      .in_readout =
+          in_turn ? motion_in_readout(motion, camera_, view, starts.front()) : MotionInReadout()};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;

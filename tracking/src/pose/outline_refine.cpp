@@ -237,7 +237,7 @@ void find_sweeps(const Scenery& scenery, const data::Pose<>& pose, Round& round)
   if (longest < kLeastPx) return;
   const int parts = std::min(Sweep::kMost, static_cast<int>(std::ceil(longest / kPartPx)));
   round.moments = moments_of(scenery.body, scenery.camera, scenery.motion, *scenery.exposure, pose,
-                             parts, scenery.per_px);
+                             parts, scenery.in_readout);
   round.sweeps = sweeps_of(round.moments, round.outline);
 }
 
@@ -318,7 +318,7 @@ bool collect(const Scenery& scenery, const data::Pose<>& pose, const Search& sea
   const double step_px = last ? search.step_px : search.first_step_px;
   round.outline = outline_samples(scenery.body, pose, scenery.camera, scenery.motion,
                                   search.exact ? kSmoothPx : step_px);
-  read_in_turn(scenery.per_px, scenery.camera.image_from_table<double>(pose.centre_m),
+  read_in_turn(scenery.in_readout, scenery.camera.image_from_table<double>(pose.centre_m),
                round.outline);
   find_sweeps(scenery, pose, round);
   if (search.exact) {

@@ -27,7 +27,7 @@ struct Scenery {
   std::optional<Tints> tints{};    ///< for what luma says wrongly between colours
   std::optional<ExposureMotion> exposure{};  ///< the same, not only to first order
   const ShadingMemory* shading = nullptr;    ///< what other frames show; may be null
-  MotionPerPx per_px{};
+  MotionInReadout in_readout{};
 
   /// The same with both windows blurred.
   [[nodiscard]] Scenery blurred(double sigma_px) const {
@@ -43,7 +43,7 @@ struct Scenery {
             tints,
             exposure,
             shading,
-            per_px};
+            in_readout};
   }
 };
 
