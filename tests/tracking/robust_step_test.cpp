@@ -33,7 +33,7 @@ RobustSolution solved(
     const data::PoseMotion::Step& prior = data::PoseMotion::Step::Constant(2, 30.0)) {
   RobustSolution solution;
   EXPECT_TRUE(solve_robustly(equations, prior, 0.1, true, solution));
-  find_uncertainty(equations, prior, solution);
+  find_uncertainty(equations, prior, false, solution);
   return solution;
 }
 

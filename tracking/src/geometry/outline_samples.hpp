@@ -34,11 +34,12 @@ struct OutlineSample {
   Motion near_motion;  ///< of the near face's rim across the wall, along the same normal; or empty
 };
 
-/// How a body moves while the rows of a picture are read one after the other; empty where they are
-/// read at once.
+/// How a body moves while the rows of a picture are read one after the other.
 struct MotionInReadout {
-  Eigen::Vector2d frames_per_px = Eigen::Vector2d::Zero();  ///< OutlineView::readout_per_px
-  data::PoseMotion::Step per_frame{}, per_frame2{};         ///< speed, acceleration
+  /// OutlineView::readout_per_px; 0 where they are read at once.
+  Eigen::Vector2d frames_per_px = Eigen::Vector2d::Zero();
+  /// Speed and acceleration, in small motions per frame and per frame squared; empty: not known.
+  data::PoseMotion::Step per_frame{}, per_frame2{};
 };
 
 /// The outline as it is seen: that of the body when the row of its centre is read, each point moved

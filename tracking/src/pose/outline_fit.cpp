@@ -473,8 +473,8 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
                             ExposureMotion(*view.previous, starts.front(), view.exposure_fraction))
                       : std::nullopt,
       .shading = view.shading,
-      .in_readout =
-          in_turn ? motion_in_readout(motion, camera_, view, starts.front()) : MotionInReadout()};
+      .in_readout = in_turn ? motion_in_readout(motion, camera_, view, starts.front())
+                            : MotionInReadout{view.readout_per_px, {}, {}}};
   if (scenery.picture.empty()) return std::nullopt;
   // About a pivot the mirrored axis has another centre.
   const bool mirrors = support_.kind != data::SupportKind::pivot && motion.rotation() >= 0;

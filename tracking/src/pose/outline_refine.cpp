@@ -439,7 +439,8 @@ void find_uncertainty(const Scenery& scenery, Refined& refined) {
     e.flank_px = kFlanks * light_px * std::cos(2.0 * (e.direction_rad - narrow_rad));
     e.twist_px = kTwist * e.common_px * std::sin(2.0 * (e.direction_rad - narrow_rad));
   }
-  find_uncertainty(refined.equations, prior_of(scenery.motion), refined.solution);
+  find_uncertainty(refined.equations, prior_of(scenery.motion),
+                   !scenery.in_readout.frames_per_px.isZero(), refined.solution);
 }
 
 double accepted_of(const Refined& refined) {

@@ -250,10 +250,11 @@ Eigen::MatrixXd common_covariance(const std::vector<EdgeEquation>& equations,
   return covariance;
 }
 
-Sheared sheared_by_motion(const std::vector<EdgeEquation>& equations,
-                          const std::vector<EquationRow>& rows, const ArrowSystem& factorised,
-                          double scale, int first, int count) {
-  Sheared sheared;
+// The answer to offsets that grow along x, or y, with one motion of the body.
+std::array<PoseMeasurement::PerMotion, 2> sheared_by_motion(
+    const std::vector<EdgeEquation>& equations, const std::vector<EquationRow>& rows,
+    const ArrowSystem& factorised, double scale, int first, int count) {
+  std::array<PoseMeasurement::PerMotion, 2> sheared;
   for (const int axis : {0, 1}) {
     auto& answers = sheared[static_cast<size_t>(axis)];
     answers.resize(count, count);
@@ -393,7 +394,8 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion
 }
 
 void find_uncertainty(const std::vector<EdgeEquation>& equations,
-                      const data::PoseMotion::Step& prior_sd, RobustSolution& solution) {
+                      const data::PoseMotion::Step& prior_sd, bool rows_in_turn,
+                      RobustSolution& solution) {
   const auto n = static_cast<int>(prior_sd.size());
   const int first = pose_at(true);
   const ArrowSystem prior = prior_information(prior_sd, true);
@@ -434,7 +436,8 @@ void find_uncertainty(const std::vector<EdgeEquation>& equations,
   const double ratio = jackknife_ratio(all, sectors, solution.covariance);
   if (std::isfinite(ratio))
     solution.inflation = std::min(kBelieved * ratio + 1.0 - kBelieved, kMost);
-  solution.sheared = sheared_by_motion(equations, rows, factorised, solution.scale, first, n);
+  if (rows_in_turn)
+    solution.sheared = sheared_by_motion(equations, rows, factorised, solution.scale, first, n);
   solution.common = common_covariance(equations, rows, factorised, solution.scale, first, n);
   solution.covariance = solution.inflation * solution.covariance + solution.common;
 }

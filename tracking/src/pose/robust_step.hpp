@@ -1,10 +1,10 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
 #include <vector>
 
 #include "trochoid/data/pose_motion.hpp"
+#include "trochoid/tracking/outline_fit.hpp"
 
 namespace trochoid::tracking {
 
@@ -48,11 +48,6 @@ struct EdgeEquation {
   double residual_px = 0.0;  ///< out
 };
 
-/// PoseMeasurement::sheared.
-using Sheared = std::array<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0,
-                                         data::PoseMotion::kMost, data::PoseMotion::kMost>,
-                           2>;
-
 struct RobustSolution {
   data::PoseMotion::Step step;
   double scale = 1.0;  ///< of the errors, over what the edges claim; at least 1
@@ -62,7 +57,8 @@ struct RobustSolution {
   // From here on by find_uncertainty.
   Eigen::MatrixXd covariance;  ///< of the step, errors correlated along the outline allowed for
   Eigen::MatrixXd common;      ///< of it, what errors common to whole sides of the outline do
-  Sheared sheared{};
+  /// PoseMeasurement's; empty unless asked for.
+  decltype(PoseMeasurement::sheared) sheared{};
   /// Variance the rest has been multiplied by: how far the answer moves without parts of the
   /// outline, over what was expected. Noisy; frames of one clip have nearly the same.
   double inflation = 1.0;
@@ -80,7 +76,9 @@ bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion
 
 /// How well a solution found with `directions` is known; infinitely badly if its equations do not
 /// determine it. The equations are as solve_robustly left them.
+/// @param rows_in_turn  whether to find RobustSolution::sheared as well.
 void find_uncertainty(const std::vector<EdgeEquation>& equations,
-                      const data::PoseMotion::Step& prior_sd, RobustSolution& solution);
+                      const data::PoseMotion::Step& prior_sd, bool rows_in_turn,
+                      RobustSolution& solution);
 
 }  // namespace trochoid::tracking
