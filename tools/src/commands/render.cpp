@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,13 +13,15 @@
 #include "common/outputs.hpp"
 #include "common/pending_folder.hpp"
 #include "common/progress.hpp"
+#include "common/render_targets.hpp"
 #include "common/scene_library.hpp"
 #include "common/validators.hpp"
 #include "draw/encoded_file.hpp"
+#include "draw/render_motion.hpp"
 #include "draw/render_picture.hpp"
+#include "draw/render_truth.hpp"
 #include "trochoid/data/angle.hpp"
 #include "trochoid/data/error.hpp"
-#include "trochoid/data/interpolate.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/table.hpp"
 #include "trochoid/model/simulate.hpp"
@@ -29,8 +30,6 @@ namespace trochoid::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kPerFrame = 16;  // samples of the motion per frame
 
 struct RenderOptions {
   std::string scene;
@@ -44,79 +43,8 @@ struct RenderOptions {
   RenderStyle style;
 };
 
-// Poses of a run at any time, between samples by cubics through four of them.
-class Motion {
- public:
-  Motion(const model::Trajectory& run, double rate_hz)
-      : model_(run.model), rate_hz_(rate_hz), outcome_(run.outcome) {
-    for (const char* name : {"x_m", "y_m", "z_m", "theta_rad", "phi_rad", "psi_rad"}) {
-      const auto at = std::find(run.columns.begin(), run.columns.end(), name);
-      if (at == run.columns.end())
-        throw InputError(fmt::format(
-            "render: model {} has no column {}; render needs a body that moves in space", run.model,
-            name));
-      columns_.emplace_back(run.values.col(at - run.columns.begin()));
-    }
-  }
-  [[nodiscard]] const std::string& model() const { return model_; }
-  [[nodiscard]] model::Outcome outcome() const { return outcome_; }
-  [[nodiscard]] double end_s() const {
-    return static_cast<double>(columns_.front().size() - 1) / rate_hz_;
-  }
-  [[nodiscard]] data::Pose<> at(double t_s) const {
-    const auto last = columns_.front().size() - 1;
-    const double place = t_s * rate_hz_;
-    const auto i = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(place)) - 1, 0,
-                                            std::max<Eigen::Index>(0, last - 3));
-    // Half of the last picture's exposure lies beyond the end of a run that would have gone on.
-    const double until = static_cast<double>(last) +
-                         (outcome_ == model::Outcome::reached_end ? 0.5 * kPerFrame : 0.0);
-    const double u = std::min(place, until) - static_cast<double>(i);
-    const auto value = [&](std::size_t column) {
-      const Eigen::VectorXd& v = columns_[column];
-      if (last < 3) return v[std::clamp<Eigen::Index>(std::lround(place), 0, last)];
-      constexpr std::array kPlaces{0.0, 1.0, 2.0, 3.0};
-      return data::polynomial_at<double>(kPlaces, {v.data() + i, kPlaces.size()}, u);
-    };
-    data::Pose<> pose;
-    pose.centre_m = {value(0), value(1), value(2)};
-    pose.theta_rad = value(3);
-    pose.phi_rad = value(4);
-    pose.psi_rad = value(5);
-    return pose;
-  }
-
- private:
-  std::string model_;
-  double rate_hz_;
-  model::Outcome outcome_;
-  std::vector<Eigen::VectorXd> columns_;
-};
-
-// A camera straight above that shows the whole path with room for the body.
-data::Camera camera_over(const Motion& motion, const data::Body& body, int width_px,
-                         int height_px) {
-  constexpr double kHeight_radii = 25.0, kMargin_radii = 1.8;
-  constexpr int kLooks = 200;
-  Eigen::Vector2d low = motion.at(0.0).centre_m.head<2>(), high = low;
-  for (int i = 0; i <= kLooks; ++i) {
-    const Eigen::Vector2d p = motion.at(motion.end_s() * i / kLooks).centre_m.head<2>();
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  const Eigen::Vector2d size =
-      high - low + Eigen::Vector2d::Constant(2.0 * kMargin_radii * body.radius_m);
-  const double scale = std::min(width_px / size.x(), height_px / size.y());
-  const Eigen::Vector2d middle = 0.5 * (low + high);
-  const double height = std::max(kHeight_radii * body.radius_m, 2.0 * size.maxCoeff());
-  data::Camera camera = data::Camera::overhead(width_px, height_px, scale, height);
-  camera.camera_from_table_m -=
-      camera.camera_from_table * Eigen::Vector3d(middle.x(), middle.y(), 0.0);
-  return camera;
-}
-
 data::Camera camera_of(const RenderOptions& options, const data::Scene& scene,
-                       const Motion& motion) {
+                       const RenderedMotion& motion) {
   if (!options.camera.empty()) return data::read_camera(options.camera);
   if (!scene.camera.file.empty() && (options.width_px || options.height_px))
     throw InputError(
@@ -128,105 +56,12 @@ data::Camera camera_of(const RenderOptions& options, const data::Scene& scene,
   const int width_px = options.width_px.value_or(kWidth_px),
             height_px = options.height_px.value_or(kHeight_px);
   if (auto camera = data::camera_of(scene, width_px, height_px)) return *camera;
-  return camera_over(motion, *scene.body, width_px, height_px);
+  return camera_over(motion, scene.body->radius_m, width_px, height_px);
 }
 
-bool in_picture(const data::Pose<>& pose, const data::Camera& camera) {
-  const Eigen::Vector2d p = camera.image_from_table<double>(pose.centre_m);
-  return p.x() > 0.0 && p.y() > 0.0 && p.x() < camera.width_px - 1.0 &&
-         p.y() < camera.height_px - 1.0;
-}
-
-std::string truth_row(int frame, double t_s, const data::Pose<>& pose, const data::Camera& camera) {
-  const Eigen::Quaterniond q(Eigen::AngleAxisd(pose.phi_rad, Eigen::Vector3d::UnitZ()) *
-                             Eigen::AngleAxisd(pose.theta_rad, Eigen::Vector3d::UnitX()) *
-                             Eigen::AngleAxisd(pose.psi_rad, Eigen::Vector3d::UnitZ()));
-  const Eigen::Vector2d p = camera.image_from_table<double>(pose.centre_m);
-  const double inside = in_picture(pose, camera) ? 1.0 : 0.0;
-  return fmt::format(
-      "{},{:.9f},{:.9f},{:.9f},{:.9f},{:.5f},{:.5f},{:.9f},{:.9f},{:.9f},{:.9f},{:.8f},{:.8f},"
-      "{:.8f},{:.0f}\n",
-      frame, t_s, pose.centre_m.x(), pose.centre_m.y(), pose.centre_m.z(), p.x(), p.y(), q.w(),
-      q.x(), q.y(), q.z(), pose.theta_rad, pose.phi_rad, pose.psi_rad, inside);
-}
-
-nlohmann::ordered_json object_of(const data::Scene& scene, const std::string& model) {
-  const data::Body& body = *scene.body;
-  nlohmann::ordered_json json;
-  const bool ring = body.inner_radius_m > 0.0;
-  json["type"] = ring ? "ring" : "disc";
-  json[ring ? "R_outer_m" : "R_m"] = body.radius_m;
-  if (ring) json["R_inner_m"] = body.inner_radius_m;
-  if (body.border_radius_m > 0.0) json["R_border_m"] = body.border_radius_m;
-  json[ring ? "height_m" : "thickness_m"] = body.thickness_m;
-  if (body.mass_kg) json["mass_kg"] = *body.mass_kg;
-  if (body.l_m) json["com_to_pivot_m"] = *body.l_m;
-  if (const auto& p = scene.support.pivot_m) json["pivot_m"] = {p->x(), p->y(), p->z()};
-  if (body.axle_radius_m > 0.0) {
-    json["axle_radius_m"] = body.axle_radius_m;
-    json["axle_above_upper_face_m"] = body.axle_above_m;
-  }
-  json["convention"] =
-      "body z = symmetry axis; quaternion w,x,y,z maps body to world; world z up, floor z=0; "
-      "R = Rz(phi) Rx(theta) Rz(psi), theta = angle of axis from vertical";
-  json["markers"] = nlohmann::ordered_json::array();
-  for (const data::SpinMark& mark : body.marks) {
-    std::vector<int> faces;
-    if (mark.on_upper_face) faces.push_back(1);
-    if (mark.on_lower_face) faces.push_back(-1);
-    json["markers"].push_back({{"kind", "dot"},
-                               {"r_m", mark.distance_m},
-                               {"radius_m", mark.size_m},
-                               {"angle_deg", data::degrees(mark.angle_rad)},
-                               {"faces", faces}});
-  }
-  json["dynamics"] = {
-      {"model", model}, {"g", scene.model.gravity_m_s2}, {"scene_toml", data::to_toml(scene)}};
-  return json;
-}
-
-bool is_folder(const fs::path& output) {
-  return output.extension().empty();
-}
-
-// clip.mp4 with clip.truth.csv, clip.camera.json, clip.object.json; or in a folder video.mp4,
-// truth.csv, ...
-struct Targets {
-  fs::path video, truth, camera, object;
-};
-Targets targets_in(const fs::path& folder, bool lossless) {
-  return {folder / (lossless ? "video.mkv" : "video.mp4"), folder / "truth.csv",
-          folder / "camera.json", folder / "object.json"};
-}
-Targets targets_of(const fs::path& output, bool lossless) {
-  const std::string given = output.extension().string();
-  if (!given.empty() && given != ".mkv" && (lossless || given != ".mp4"))
-    throw InputError(fmt::format("{}: name {}; a folder with a dot in its name ends in /",
-                                 output.string(),
-                                 lossless ? "a folder or, as it is to be lossless, a .mkv file"
-                                          : "a folder, an .mp4 or an .mkv file"));
-  if (is_folder(output)) return targets_in(output, lossless);
-  const auto beside = [&](const char* name) {
-    fs::path path = output;
-    return path.replace_extension(name);
-  };
-  return {output, beside(".truth.csv"), beside(".camera.json"), beside(".object.json")};
-}
-
-// What was filmed is not to be had again. What was rendered has its truth beside it.
-void check_not_filmed(const Targets& targets) {
-  std::error_code ignored;
-  if (fs::exists(targets.truth, ignored)) return;
-  for (const fs::path& file : {targets.video, targets.camera, targets.object})
-    if (fs::exists(file, ignored))
-      throw InputError(
-          fmt::format("{}: exists and was not rendered, as there is no {}; name another output",
-                      file.string(), targets.truth.string()));
-}
-
-void check_targets(const RenderOptions& options, const Targets& targets) {
-  if (is_folder(options.output)) check_folder(options.output);
-  if (is_folder(options.output) && !fs::exists(options.output)) return;
+void check_targets(const RenderOptions& options, const RenderTargets& targets) {
+  if (named_as_folder(options.output)) check_folder(options.output);
+  if (named_as_folder(options.output) && !fs::exists(options.output)) return;
   for (const fs::path& file : {targets.video, targets.truth, targets.camera, targets.object})
     check_output(file, {options.scene, options.camera});
   check_not_filmed(targets);
@@ -270,20 +105,21 @@ void check_rate(const std::string& scene, double rate_hz, const fs::path& video)
 }
 
 // The scene with what the options set in it; run.rate_hz is the video's.
-data::Scene scene_to_draw(const RenderOptions& options, const Targets& targets) {
+data::Scene scene_to_draw(const RenderOptions& options, const RenderTargets& targets) {
   data::Scene scene = load_scene(options.scene);
   if (!scene.body || !(scene.body->radius_m > 0.0))
     throw InputError(fmt::format("{}: [body] needs a radius_m to be seen", options.scene));
   if (options.rate_hz > 0.0) scene.run.rate_hz = options.rate_hz;
   if (options.until_s > 0.0) scene.run.until_s = options.until_s;
-  constexpr double kMostFrames = data::Table::kMostRows / kPerFrame;  // hours of drawing
+  constexpr double kMostFrames =
+      data::Table::kMostRows / RenderedMotion::kPerFrame;  // hours of drawing
   check_rate(options.scene, scene.run.rate_hz, targets.video);
   check_length(options.scene, scene.run.until_s, scene.run.rate_hz, kMostFrames, "frames");
   return scene;
 }
 
-Motion simulated(const std::string& scene_name, data::Scene scene) {
-  scene.run.rate_hz *= kPerFrame;
+RenderedMotion simulated(const std::string& scene_name, data::Scene scene) {
+  scene.run.rate_hz *= RenderedMotion::kPerFrame;
   const model::Trajectory run = in_scene(scene_name, [&] { return model::simulate(scene); });
   tell_idle_keys(scene_name, scene);
   if (run.values.rows() == 0)
@@ -293,7 +129,8 @@ Motion simulated(const std::string& scene_name, data::Scene scene) {
 }
 
 // Rows read for longer than a frame lasts would still be read when the next one begins.
-void check_readout(const std::string& file, const data::Camera& camera, const Motion& motion) {
+void check_readout(const std::string& file, const data::Camera& camera,
+                   const RenderedMotion& motion) {
   const double readout_s = camera.readout_s.value_or(0.0);
   constexpr double kRounding = 1e-2;
   if (readout_s * *camera.frame_rate_hz > 1.0 + kRounding)
@@ -307,7 +144,7 @@ void check_readout(const std::string& file, const data::Camera& camera, const Mo
 }
 
 data::Camera recording_camera(const RenderOptions& options, const data::Scene& scene,
-                              const Motion& motion) {
+                              const RenderedMotion& motion) {
   data::Camera camera = camera_of(options, scene, motion);
   if (!options.lossless && (camera.width_px % 2 != 0 || camera.height_px % 2 != 0))
     throw InputError(fmt::format("{} x {} px: H.264 needs even numbers; or --lossless",
@@ -322,7 +159,7 @@ data::Camera recording_camera(const RenderOptions& options, const data::Scene& s
 }
 
 // Poses spread over the time the shutter is open around t_s.
-std::vector<data::Pose<>> exposed_poses(const Motion& motion, double t_s, double rate_hz,
+std::vector<data::Pose<>> exposed_poses(const RenderedMotion& motion, double t_s, double rate_hz,
                                         const RenderStyle& style) {
   std::vector<data::Pose<>> poses;
   for (int i = 0; i < style.times; ++i)
@@ -338,7 +175,7 @@ double read_s(const data::Camera& camera, double row_px) {
 }
 
 // When the row that shows the body's centre is read, of a picture whose first one is read at t_s.
-double centre_read_s(const Motion& motion, const data::Camera& camera, double t_s) {
+double centre_read_s(const RenderedMotion& motion, const data::Camera& camera, double t_s) {
   constexpr int kRounds = 20;  // each leaves of the error what the centre moves by while it is read
   double at_s = t_s;
   for (int round = 0; camera.readout_s && round < kRounds; ++round)
@@ -352,8 +189,8 @@ double brightness_at(double t_s, const RenderStyle& style) {
 }
 
 // Of the picture whose first row is read at t_s, with the flicker of the light.
-cv::Mat light_at(const PictureRenderer& renderer, const Motion& motion, const data::Camera& camera,
-                 double t_s, const RenderStyle& style) {
+cv::Mat light_at(const PictureRenderer& renderer, const RenderedMotion& motion,
+                 const data::Camera& camera, double t_s, const RenderStyle& style) {
   const auto exposed = [&](double at_s) {
     return exposed_poses(motion, at_s, *camera.frame_rate_hz, style);
   };
@@ -376,12 +213,11 @@ void tell_cost(int done, int frames, const data::Camera& camera, double elapsed_
 }
 
 // Draws every frame. @returns the table of the truth.
-std::string draw(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
+std::string draw(const RenderedMotion& motion, const data::Scene& scene, const data::Camera& camera,
                  const RenderStyle& style, int frames, EncodedFile& video) {
   const double rate_hz = scene.run.rate_hz;
   const PictureRenderer renderer(*scene.body, camera, style);
-  std::string truth =
-      "frame,t,x_m,y_m,z_m,x_px,y_px,qw,qx,qy,qz,theta_rad,phi_rad,psi_rad,vis_frac\n";
+  std::string truth = kTruthHeader;
   Progress progress("render");
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
@@ -400,7 +236,7 @@ std::string draw(const Motion& motion, const data::Scene& scene, const data::Cam
 }
 
 // What the scene promises and the recording does not show.
-void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Camera& camera,
+void tell_unseen(const RenderedMotion& motion, const data::Scene& scene, const data::Camera& camera,
                  int frames) {
   const auto seen = [&](int frame) {
     return in_picture(motion.at(frame / scene.run.rate_hz), camera);
@@ -425,7 +261,7 @@ void tell_unseen(const Motion& motion, const data::Scene& scene, const data::Cam
         scene.run.rate_hz, *rate_hz));
 }
 
-void tell(const RenderOptions& options, const Targets& targets, const data::Camera& camera,
+void tell(const RenderOptions& options, const RenderTargets& targets, const data::Camera& camera,
           int frames) {
   if (options.json)
     return print_json({{"video", targets.video.string()},
@@ -441,8 +277,9 @@ void tell(const RenderOptions& options, const Targets& targets, const data::Came
 }
 
 // All files of the recording, whole.
-void write_recording(const RenderOptions& options, const data::Scene& scene, const Motion& motion,
-                     const data::Camera& camera, int frames, const Targets& targets) {
+void write_recording(const RenderOptions& options, const data::Scene& scene,
+                     const RenderedMotion& motion, const data::Camera& camera, int frames,
+                     const RenderTargets& targets) {
   EncodedFile video(targets.video, {camera.width_px, camera.height_px}, scene.run.rate_hz,
                     options.lossless ? coding::kLossless : coding::h264(options.quality));
   const std::string truth = draw(motion, scene, camera, style_of(options, camera), frames, video);
@@ -453,19 +290,10 @@ void write_recording(const RenderOptions& options, const data::Scene& scene, con
   video.commit();
 }
 
-// The outermost folder that is to be made; empty if there is none.
-fs::path folder_to_make(fs::path output) {
-  if (!is_folder(output)) return {};
-  if (!output.has_filename()) output = output.parent_path();
-  if (fs::exists(output)) return {};
-  while (output.has_parent_path() && !fs::exists(output.parent_path()))
-    output = output.parent_path();
-  return output;
-}
-
 // A folder that was not there comes to be with all files in it or not at all.
-void write_with_folder(const RenderOptions& options, const data::Scene& scene, const Motion& motion,
-                       const data::Camera& camera, int frames, const Targets& targets) {
+void write_with_folder(const RenderOptions& options, const data::Scene& scene,
+                       const RenderedMotion& motion, const data::Camera& camera, int frames,
+                       const RenderTargets& targets) {
   const fs::path outermost = folder_to_make(options.output);
   if (outermost.empty()) return write_recording(options, scene, motion, camera, frames, targets);
   PendingFolder pending(outermost);
@@ -479,10 +307,10 @@ void write_with_folder(const RenderOptions& options, const data::Scene& scene, c
 }
 
 void run(const RenderOptions& options) {
-  const Targets targets = targets_of(options.output, options.lossless);
+  const RenderTargets targets = targets_of(options.output, options.lossless);
   check_targets(options, targets);
   const data::Scene scene = scene_to_draw(options, targets);
-  const Motion motion = simulated(options.scene, scene);
+  const RenderedMotion motion = simulated(options.scene, scene);
   const data::Camera camera = recording_camera(options, scene, motion);
   const double last_s = motion.end_s() - camera.readout_s.value_or(0.0);
   const int frames =
