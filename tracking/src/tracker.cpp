@@ -8,15 +8,13 @@
 
 #include "find/body_search.hpp"
 #include "find/camera_motion.hpp"
-#include "find/face_border.hpp"
 #include "find/open_shutter.hpp"
 #include "find/recording.hpp"
 #include "find/stoppable_finder.hpp"
 #include "link/linking.hpp"
 #include "link/path_motion.hpp"
-#include "link/rolling_shutter.hpp"
 #include "link/track_assembly.hpp"
-#include "link/track_notes.hpp"
+#include "link/track_result.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/parallel.hpp"
@@ -34,10 +32,6 @@ std::optional<data::Camera> resolve_camera(const data::Scene& scene,
       given ? given : data::camera_of(scene, video.width_px, video.height_px);
   if (camera) camera->check_size(video.width_px, video.height_px, recording.string());
   return camera;
-}
-
-bool has_shape(const data::Scene& scene) {
-  return scene.body && scene.body->radius_m > 0.0;
 }
 
 /// One tracking run: the state its steps share.
@@ -128,10 +122,10 @@ class Tracking {
   }
 
   [[noreturn]] void nothing_found() {
-    if (!read_.moving_to)
+    if (!span_.moving_to)
       tell_other_size(find_seed(recording_.window(), background_, *rim_finder(), explained_),
                       "moves", ", or point at the body: at x,y");
-    if (read_.moving_to)
+    if (span_.moving_to)
       throw InputError(
           fmt::format("{}: no moving body found: the camera moves, nearly all of the picture "
                       "changes: put it on a stand, or track a "
@@ -183,7 +177,7 @@ class Tracking {
     // Who asks for a part of a recording may do so because the camera moves in the rest.
     if (background_.camera_moves() && recording_.leave_out_the_rest())
       background_ = Background::from_samples(recording_.samples());
-    if (background_.camera_moves()) read_.moving_to = recording_.window().back().index;
+    if (background_.camera_moves()) span_.moving_to = recording_.window().back().index;
     explained_.assign(recording_.window().size(), {});
     for (const Ellipse& rim : in_plate_) background_.clear_of(rim);
     for (const BodyPath& path : paths_) explain(path);
@@ -286,13 +280,13 @@ class Tracking {
       others.emplace_back(seen->centre_px, seen->rim.semi_major_px());
       paths_[k].frames[frame.index] = {frame.t_s, trimmed(std::move(*seen))};
     }
-    if (frames_++ > 0)
-      missing_ += frame.missing_before;
+    if (read_.frames++ > 0)
+      read_.missing += frame.missing_before;
     else
-      read_.first = frame.index;
-    read_.last = frame.index;
-    damaged_ += frame.damaged ? 1 : 0;
-    if (frames_ % 16 == 0) report_progress();
+      span_.first = frame.index;
+    span_.last = frame.index;
+    read_.damaged += frame.damaged ? 1 : 0;
+    if (read_.frames % 16 == 0) report_progress();
   }
 
   /// A body followed through the window, and its follower at the window's end, to go on with.
@@ -558,160 +552,26 @@ class Tracking {
         decide(paths_[k], window, kOverlap / 2, *followers_[k]);
   }
 
-  [[nodiscard]] std::string camera_words() const {
-    if (!camera_ || camera_->file.empty()) return "the scene's camera";
-    return fs::path(camera_->file).filename().string();
-  }
-
   void report_progress() const {
     if (!options_.progress) return;
     // How many frames lie between two moments is not known beforehand.
-    options_.progress(frames_, recording_.is_part() ? 0 : recording_.info().frames);
-  }
-
-  /// Metres for a track measured by rims: a camera over the floor, or the known radius.
-  [[nodiscard]] std::optional<data::Camera> floor_of_rims(const BodyPath& path,
-                                                          std::string& words) const {
-    if (camera_) {
-      words = "rim centre projected to the floor by the camera";
-      return camera_;
-    }
-    if (!has_shape(scene_)) {
-      words = "none: pixels only";
-      return std::nullopt;
-    }
-    const VideoInfo& video = recording_.info();
-    const double scale = usual_radius_px(path) / scene_.body->radius_m;
-    words = fmt::format("scale {:.6g} px/m from the known radius", scale);
-    return data::Camera::from_scale(video.width_px, video.height_px, scale);
-  }
-
-  /// In most of the frames that tell.
-  [[nodiscard]] bool stays_on_a_pin(const BodyPath& path) const {
-    int on = 0, off = 0;
-    for (const auto& [index, at] : path.frames)
-      if (at.seen.pose)
-        ++(is_on_a_pin(*scene_.body, scene_.support, at.seen.pose->pose) ? on : off);
-    return on > off;
-  }
-
-  /// Though it could stand on its rim, it is not seen to lean but by chance.
-  [[nodiscard]] bool lies_throughout(const BodyPath& path) const {
-    constexpr double kClearly = 3.0;  // sigmas
-    constexpr double kByChance = 0.05;
-    if (scene_.support.kind != data::SupportKind::floor || path.frames.empty()) return false;
-    const auto leaning = std::count_if(
-        path.frames.begin(), path.frames.end(), [](const BodyPath::Frames::value_type& frame) {
-          const auto& pose = frame.second.seen.pose;
-          return !pose ||
-                 std::abs(std::sin(pose->pose.theta_rad)) > kClearly * pose->sigma_theta_rad;
-        });
-    return static_cast<double>(leaning) <= kByChance * static_cast<double>(path.frames.size());
-  }
-
-  [[nodiscard]] static std::string note_about_scale(const data::Support& support) {
-    return fmt::format(
-        "without a camera metres go by how large the body looks, with its shadow{}: off by more "
-        "than the error bars say, which a camera file would mend",
-        support.kind == data::SupportKind::flat
-            ? ""
-            : ", and a body that tilts is not where the middle of its rim appears");
-  }
-
-  /// What the outline of a body may have been taken for, where most of its frames show it badly.
-  [[nodiscard]] std::optional<std::string> note_about_border() const {
-    constexpr double kBadly = 0.7;  // of the outline, in the usual frame
-    constexpr std::size_t kLooks = 5;
-    if (paths_.empty() || !has_shape(scene_) || !camera_ || scene_.body->border_radius_m > 0.0)
-      return std::nullopt;
-    const BodyPath& path = paths_.front();
-    const double seen = usual_accepted(path);
-    if (seen > kBadly) return std::nullopt;
-    std::vector<DoubtfulLook> looks;
-    for (const Frame& frame : recording_.window())
-      if (const auto at = path.frames.find(frame.index);
-          at != path.frames.end() && at->second.seen.pose)
-        looks.push_back({&frame, &at->second.seen});
-    if (looks.size() < kLooks) return std::nullopt;
-    std::vector<DoubtfulLook> some;
-    for (std::size_t k = 0; k < kLooks; ++k)
-      some.push_back(looks[(2 * k + 1) * looks.size() / (2 * kLooks)]);
-    const auto border = likely_border(*scene_.body, scene_.support, *camera_, background_, some,
-                                      options_.checkpoint);
-    return border ? std::optional(note_about_likely_border(seen, *border)) : std::nullopt;
-  }
-
-  /// @param how all but what is the body's own.  @param words how metres were obtained.
-  void add_track(std::size_t k, AssemblyOptions how, std::string& words, TrackResult& result) {
-    BodyPath& path = paths_[k];
-    if (has_shape(scene_) && camera_)
-      undo_rolling_shutter({how.readout_s, how.video, *camera_}, *scene_.body, scene_.support,
-                           path);
-    std::optional<data::Camera> floor;
-    if (!(has_shape(scene_) && camera_)) floor = floor_of_rims(path, words);
-    how.on_pin = stays_on_a_pin(path);
-    how.flat = scene_.support.kind == data::SupportKind::flat;
-    // A pivot tells the ends of an axis apart, unless the body turns about it in place.
-    how.fold = has_shape(scene_) && camera_ && scene_.body->faces_look_alike() &&
-               (scene_.support.kind != data::SupportKind::pivot || how.on_pin);
-    result.file.angles_folded = result.file.angles_folded || how.fold;
-    if (scene_.support.kind == data::SupportKind::pivot && scene_.support.pivot_m && !how.on_pin)
-      how.pivot_m = scene_.support.pivot_m->head<2>();
-    result.file.tracks.push_back(assemble_track(path, static_cast<int>(k), floor, how));
-    const auto& samples = result.file.tracks.back().samples;
-    const auto found = static_cast<std::int64_t>(samples.size());
-    result.summary.found += found;
-    result.summary.lost += frames_ - found;
-    result.summary.doubtful +=
-        std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.doubtful(); });
-    const auto add = [&](const std::optional<std::string>& note) {
-      if (!note) return;
-      result.file.notes.push_back(paths_.size() == 1 ? *note
-                                                     : fmt::format("object {}: {}", k, *note));
-    };
-    add(note_about_lost(path, read_, recording_.info()));
-    add(note_about_steps(result.file.tracks.back(), scene_.camera.missing_frames));
+    options_.progress(read_.frames, recording_.is_part() ? 0 : recording_.info().frames);
   }
 
   TrackResult result() {
-    TrackResult result;
-    result.file.source = video_.filename().string();
-    result.summary.frames = frames_;
-    result.summary.damaged = damaged_;
-    std::string words = fmt::format("{}: the CoM of the fitted cylinder", camera_words());
-    AssemblyOptions how{.readout_s = readout_s(), .video = recording_.info()};
-    if (camera_) how.camera = &*camera_;
-    if (camera_motion_) how.shifts = camera_motion_->shifts();
-    if (scene_.body && !scene_.body->marks.empty())
-      how.mark_rad = scene_.body->marks.front().angle_rad;
-    for (std::size_t k = 0; k < paths_.size(); ++k) add_track(k, how, words, result);
-    if (auto note = note_about_camera_motion(how.shifts, frames_, camera_ || has_shape(scene_)))
-      result.file.notes.push_back(std::move(*note));
-    if (camera_)
-      if (auto note = note_about_edges(paths_, *camera_))
-        result.file.notes.push_back(std::move(*note));
-    if (seen_exposure_)
-      result.file.notes.push_back(
-          note_about_seen_exposure(*seen_exposure_, recording_.info().frame_rate_hz));
-    if (auto note = note_about_border()) result.file.notes.push_back(std::move(*note));
-    if (!paths_.empty() && std::all_of(paths_.begin(), paths_.end(),
-                                       [&](const auto& path) { return lies_throughout(path); }))
-      result.file.notes.emplace_back(
-          "it is not seen to lean, as if it lay on its face: with kind = \"flat\" under [support] "
-          "a fit takes it for a body that slides, not for one that rolls on its rim");
-    if (!camera_ && has_shape(scene_))
-      result.file.notes.push_back(note_about_scale(scene_.support));
-    const WhatWasRead read{.frames = frames_,
-                           .missing = missing_,
-                           .repeated = recording_.repeated(),
-                           .damaged = damaged_,
-                           .exposure_fraction = exposure_fraction().value_or(0.0)};
-    for (std::string& note : notes_about_recording(recording_.info(), read))
-      result.file.notes.push_back(std::move(note));
-    result.file.camera = words;
-    result.summary.camera_words = words;
-    if (options_.edges) result.edges = edge_table(paths_);
-    return result;
+    read_.repeated = recording_.repeated();
+    read_.exposure_fraction = exposure_fraction().value_or(0.0);
+    FollowedRecording followed{.video = video_,
+                               .scene = scene_,
+                               .camera = camera_,
+                               .readout_s = readout_s(),
+                               .recording = recording_,
+                               .background = background_,
+                               .read = read_,
+                               .span = span_,
+                               .seen_exposure = seen_exposure_};
+    if (camera_motion_) followed.shifts = camera_motion_->shifts();
+    return make_tracks(followed, paths_, options_);
   }
 
   fs::path video_;
@@ -729,8 +589,8 @@ class Tracking {
   std::vector<BodyPath> paths_;
   std::vector<std::unique_ptr<Follower>> followers_;
   std::optional<CameraMotion> camera_motion_;
-  FramesRead read_;
-  std::int64_t frames_ = 0, damaged_ = 0, missing_ = 0;
+  FramesRead span_;
+  WhatWasRead read_;
   /// The last frames of a window open the next.
   static constexpr std::size_t kOverlap = 12;
 };
