@@ -1006,6 +1006,39 @@ TEST(OutlineFitter, AMarkTellsWhichFaceIsSeen) {
   }
 }
 
+// Of equal faces the one that is named upper is chosen last: what a rolling shutter does along the
+// node line, which has the other way then, is told for the pose that is told.
+TEST(OutlineFitter, SaysTheSameOfARollingShutterWhicheverFaceWasPredicted) {
+  constexpr double kTheta_rad = 0.9;
+  FlatDisc disc;
+  disc.body.thickness_m = 1e-5;
+  const Eigen::Vector2d centre_px(80.2, 69.7);
+  const cv::Mat floor = drawn_floor(160, 140, 150.0);
+  cv::Mat picture = floor.clone(), plate;
+  draw_disc(picture, centre_px.x(), centre_px.y(), 30.0, 30.0 * std::cos(kTheta_rad), 0.0, 60.0);
+  floor.convertTo(plate, CV_8U);
+  std::mt19937 random(8);
+  const cv::Mat luma = developed(picture, 1.0, random);
+  const OutlineFitter fitter(disc.body, {data::SupportKind::floor, {}}, disc.camera);
+  const auto seen_from = [&](const data::Pose<>& predicted) {
+    return fitter.measure({.luma = luma,
+                           .background = plate,
+                           .detection = {},
+                           .predicted = predicted,
+                           .readout_per_px = {0.0, 1e-3}});
+  };
+  const data::Pose<> pose = disc.leaning(centre_px, kTheta_rad);
+  const auto seen = seen_from(pose), over = seen_from(data::turned_over(pose, 0.0));
+  ASSERT_TRUE(seen && over);
+  EXPECT_NEAR(over->pose.theta_rad, seen->pose.theta_rad, 1e-6);
+  constexpr double kOfLargest = 1e-3;
+  for (const std::size_t axis : {0U, 1U}) {
+    const Eigen::MatrixXd one = seen->sheared[axis], other = over->sheared[axis];
+    ASSERT_GT(one.cwiseAbs().maxCoeff(), 0.0);
+    EXPECT_LT((other - one).cwiseAbs().maxCoeff(), kOfLargest * one.cwiseAbs().maxCoeff()) << axis;
+  }
+}
+
 TEST(OutlineFitter, TellsTheBlurForTheNextFrame) {
   const FlatDisc disc;
   std::mt19937 random(7);

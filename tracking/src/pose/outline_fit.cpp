@@ -357,6 +357,21 @@ data::Pose<> faces_exchanged(const data::Pose<>& pose) {
   return over;
 }
 
+// What is told by small motions, of the body turned over meanwhile: some of these lead the other
+// way then, as the node line does.
+// @param from the pose it was found at.
+void turn_sheared_over(const data::PoseMotion& motion, const data::Pose<>& from,
+                       PoseMeasurement& m) {
+  if (m.sheared[0].size() == 0) return;
+  const data::PoseMotion::Step ways = motion.velocities(from)
+                                          .cwiseProduct(motion.velocities(m.pose))
+                                          .colwise()
+                                          .sum()
+                                          .cwiseSign()
+                                          .transpose();
+  for (auto& sheared : m.sheared) sheared = sheared.cwiseProduct(ways * ways.transpose()).eval();
+}
+
 // Equal faces: of the two attitudes that look the same, the one with theta <= pi/2.
 void fold(data::Pose<>& pose) {
   if (pose.theta_rad > 0.5 * data::kPi) pose = faces_exchanged(pose);
@@ -498,6 +513,7 @@ std::optional<PoseMeasurement> OutlineFitter::measure(const OutlineView& view) c
     m.sigma_psi_rad = spin_sigma_rad(m, *marks);
     m.bright_marks = marks->bright;
   }
+  turn_sheared_over(motion, best->refined.pose, m);
   return m;
 }
 
