@@ -69,7 +69,7 @@ struct RobustSolution {
 };
 
 /// Tukey-weighted least squares of offset = motion . step + nuisances, with weak priors:
-/// `prior_sd` per parameter. False if fewer than 8 equations.
+/// `prior_sd` per parameter. False if fewer than 8 equations, or if none of them counts.
 /// @param directions allow for what the edge models may be wrong by in every direction.
 bool solve_robustly(std::vector<EdgeEquation>& equations, const data::PoseMotion::Step& prior_sd,
                     double least_scale_px, bool directions, RobustSolution& out);
