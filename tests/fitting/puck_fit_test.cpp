@@ -127,6 +127,28 @@ TEST(PuckFit, SaysOfWhichStretchItMissesTheEnd) {
               testing::Contains(testing::HasSubstr("last positions of the stretch from 0.2")));
 }
 
+// Each stretch was as noisy as its own few samples made believe: of seven between two impacts most
+// were "left out of the fit", and the model did not explain the track.
+TEST(PuckFit, TakesStretchesOfOneRecordingForEquallyNoisy) {
+  constexpr double kNoise_m = 3e-4;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+    Throw thrown(seed);
+    thrown.slide({0.9, 0.3}, 0.3).slide({-0.2, 0.7}, 0.042).slide({0.6, -0.4}, 0.25);
+    data::Track track = thrown.track();
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal(0.0, kNoise_m);
+    for (data::TrackSample& sample : track.samples) {
+      sample.centre_m += Eigen::Vector2d{normal(generator), normal(generator)};
+      sample.covariance_m2.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    const data::Fit fit = fitting::fit(std::span(&track, 1), puck_scene());
+    EXPECT_EQ(fit.arcs.size(), 3u);
+    EXPECT_THAT(fit.verdict,
+                testing::AnyOf(data::FitVerdict::good, data::FitVerdict::good_correlated))
+        << seed << ": " << fit.verdict_words;
+  }
+}
+
 TEST(PuckFit, SaysWhichTrackCountsForNothing) {
   Throw thrown(6), resting(7);
   thrown.slide({1.0, 0.3}, 0.3);

@@ -202,6 +202,17 @@ ArcData make_arc(const data::Track& track, int first, int last, const ChannelCho
   return arc;
 }
 
+void share_guessed_noise(std::span<ArcData> arcs) {
+  const ArcData* longest = nullptr;
+  for (const ArcData& arc : arcs)
+    if (arc.sigma_unknown && (longest == nullptr || arc.t_s.size() > longest->t_s.size()))
+      longest = &arc;
+  if (longest == nullptr) return;
+  const double sigma_m = 1.0 / longest->readings.front().whitener(0, 0);
+  for (ArcData& arc : arcs)
+    if (arc.sigma_unknown) set_position_noise(arc, sigma_m);
+}
+
 namespace {
 
 // Typical rate of an angle about a reading: the median over the steps near it [rad/s].

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "trochoid/data/track.hpp"
@@ -83,6 +84,10 @@ struct ChannelChoice {
 /// farther than 10 km away.
 [[nodiscard]] ArcData make_arc(const data::Track& track, int first, int last,
                                const ChannelChoice& choice, bool folded);
+
+/// One tracker measured a recording: of its arcs without covariance all are guessed to be as noisy
+/// as the longest tells.
+void share_guessed_noise(std::span<ArcData> arcs);
 
 /// The samples on a path that one body can have taken (consistent_path) and whose angles lie where
 /// their neighbours on both sides let expect them: a tilt taken for its mirror image, or another

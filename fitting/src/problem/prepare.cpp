@@ -64,6 +64,7 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     data::check(tracks[i], fmt::format("track {}", i + 1));
     check_new(tracks, i);
+    const std::size_t before = arcs.size();
     for (const auto& [first, last] : ranges_of(tracks[i], model, options)) {
       ArcData arc = make_arc(tracks[i], first, last, channels_of(model), folded);
       arc.track = static_cast<int>(i);
@@ -78,6 +79,7 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
                                            "file"));
       arcs.push_back(std::move(arc));
     }
+    share_guessed_noise(std::span(arcs).subspan(before));
   }
   if (arcs.empty())
     throw TrackError(
@@ -86,7 +88,8 @@ std::vector<ArcData> arcs_of(std::span<const data::Track> tracks, const std::str
   return arcs;
 }
 
-// 0.02 sigma of a typical sample over the size of the path, within what the integrators do well.
+// A share of a typical sample's sigma over the size of the path, within what the integrators do
+// well.
 double tolerance_for(const std::vector<ArcData>& arcs, double share) {
   double least = 1e-5;
   for (const ArcData& arc : arcs) {
