@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,25 @@ TEST_F(LostPictures, AreToldFromOneThatCameTwice) {
   const data::Fit fit = found();
   EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
   EXPECT_THAT(fit.verdict_words, HasSubstr("1 frame too late from " + time_s(151)));
+}
+
+// What a frame of time does to positions had been weighed as if the coordinates' errors changed
+// places: of two pictures lost none was found, and none was lost there.
+TEST_F(LostPictures, AreToldWherePositionsErrMostlyAlongOneWay) {
+  const Eigen::Vector2d along = Eigen::Vector2d::Ones().normalized();
+  constexpr double kAlong_m = 4.0 * kSigma_m;
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal(0.0, kAlong_m);
+  for (data::TrackSample& sample : motion_.track.samples) {
+    sample.centre_m += normal(generator) * along;
+    sample.covariance_m2 += kAlong_m * kAlong_m * along * along.transpose();
+  }
+  drop(100);
+  drop(180);
+  const data::Fit fit = found();
+  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
+  EXPECT_THAT(fit.verdict_words, AllOf(HasSubstr("1 frame too early from " + time_s(100)),
+                                       HasSubstr("1 frame too early from " + time_s(180))));
 }
 
 // Glitches had turned the parameters, by which frames were told that nothing had happened at.

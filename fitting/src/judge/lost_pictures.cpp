@@ -51,8 +51,8 @@ ArcPlaces places_of(const Problem& problem, int arc, Eigen::Index first_row,
     const int from = std::max(0, reading.sample - 1), to = std::min(last, reading.sample + 1);
     const Eigen::Vector2d velocity_m_s =
         (at_m.row(to) - at_m.row(from)).transpose() / (data.t_s[to] - data.t_s[from]);
-    all.places.push_back(
-        {reading.sample, first_row + reading.row, reading.whitener * velocity_m_s * all.frame_s});
+    all.places.push_back({reading.sample, first_row + reading.row,
+                          reading.whitener.transpose() * velocity_m_s * all.frame_s});
   }
   return all;
 }
