@@ -9,6 +9,7 @@
 #include <string>
 
 #include "common.hpp"
+#include "reference_motion.hpp"
 #include "trochoid/data/error.hpp"
 #include "trochoid/fitting/fit.hpp"
 #include "trochoid/model/predictor.hpp"
@@ -137,6 +138,29 @@ TEST(ProfileLikelihood, OfALossThatIsNotThereIsBoundedWhereChiSquareHasRisenByIt
     EXPECT_NEAR(drag.delta_chi2[static_cast<std::size_t>(upper - drag.values.begin())], kQuantile95,
                 0.05 * kQuantile95);
   }
+}
+
+// The walk began at the millionth of the first value where such a loss is held, and ended long
+// before it did anything: "flat, 95 % 0 .. inf" beside an error bar of 1.8e-6 m.
+TEST(ProfileLikelihood, OfALossThatIsHeldAtNothingReachesToItsErrorBar) {
+  NoisyMotion motion = noisy("s06_roll_disc", 1.0, 1e-4, 4);
+  motion.scene.model.contour_friction_m = 1e-5;
+  FitOptions options;
+  options.profile = true;
+  int held = 0;
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    motion.track = noisy("s06_roll_disc", 1.0, 1e-4, 4, seed).track;
+    const data::Fit result = fit(std::span(&motion.track, 1), motion.scene, options);
+    const data::FitParameter& loss = *result.find("contour_friction_m");
+    if (loss.note.find("not seen: between 0 and") == std::string::npos) continue;
+    ++held;
+    const data::Profile& profile = profile_of(result, "contour_friction_m");
+    EXPECT_EQ(profile.verdict, data::ProfileVerdict::one_sided);
+    EXPECT_EQ(profile.lower_95, 0.0);
+    EXPECT_GT(profile.upper_95, 0.3 * loss.sigma);
+    EXPECT_LT(profile.upper_95, 3.0 * loss.sigma);
+  }
+  EXPECT_GT(held, 0);
 }
 
 TEST(Bootstrap, AgreesWithTheCovarianceOfWhiteNoiseAndRepeatsItself) {

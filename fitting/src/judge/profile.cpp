@@ -54,20 +54,28 @@ void close_in(OneParameter& parameter, OneParameter::Place inside, double thresh
   side.bounded = true;
 }
 
-Side walk(const Problem& problem, const Solution& solution, int index, double first_step,
-          double farthest, double threshold) {
+// How one side is looked at, in u.
+struct WalkPlan {
+  double first = 0.0;                                     // step, with its sign
+  double next = std::numeric_limits<double>::infinity();  // size of the second step at most
+  double farthest = 0.0;                                  // offset
+};
+
+Side walk(const Problem& problem, const Solution& solution, int index, const WalkPlan& plan,
+          double threshold) {
   OneParameter parameter(problem, solution, index);
   Side side;
-  double offset = 0.0, step = first_step;
-  for (int point = 0; point < kMostPoints && std::abs(offset) < farthest; ++point) {
+  double offset = 0.0, step = plan.first;
+  for (int point = 0; point < kMostPoints && std::abs(offset) < plan.farthest; ++point) {
     const OneParameter::Place inside = parameter.place();
     const double rise = parameter.rise(offset + step);
     if (!std::isfinite(rise)) {  // perhaps only too long a step
       step *= 0.25;
-      if (std::abs(step) < 1e-3 * std::abs(first_step)) break;
+      if (std::abs(step) < 1e-3 * std::abs(plan.first)) break;
       continue;
     }
     offset += step;
+    if (side.offsets.empty()) step = std::copysign(std::min(std::abs(step), plan.next), step);
     side.offsets.push_back(offset);
     side.rises.push_back(rise);
     if (rise > threshold) {
@@ -109,6 +117,25 @@ double bound_to_side(const Problem& problem, const Solution& solution, int index
   const Transform& transform = problem.free[index].transform;
   const double u = solution.u[index];
   return std::abs(transform.value(u + offset) - transform.value(u));
+}
+
+WalkPlan plan_walk(const Problem& problem, const Solution& solution, const Uncertainty& error,
+                   int index, bool upwards) {
+  constexpr double kFourDecades = 9.210340371976184, kOfError = 0.7, kErrors = 100.0;
+  const FreeParameter& free = problem.free[index];
+  const double u = solution.u[index], value = free.transform.value(u);
+  const double slope = std::max(std::abs(free.transform.slope(u)), 1e-300);
+  const bool logarithmic = free.transform.is_over_decades();
+  double sd = std::sqrt(error.covariance(index, index)) / slope;
+  // What was held at next to nothing acts from its error bar on, decades away.
+  const bool vanished = logarithmic && free.held && !at_its_limit(free, value);
+  if (vanished && upwards && std::isfinite(sd))
+    return {std::log1p(kOfError * sd), kOfError, std::log1p(kErrors * sd)};
+  // An unidentifiable parameter has no scale of its own: a tenth of its size.
+  const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(u), 1e-3);
+  if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
+  return {.first = (upwards ? kOfError : -kOfError) * sd,
+          .farthest = logarithmic ? kFourDecades : kErrors * sd};
 }
 
 data::Profile assemble(const Problem& problem, const Solution& solution, int index,
@@ -155,21 +182,12 @@ std::vector<data::Profile> profiles(const Problem& problem, const Solution& solu
   for (int i = 0; i < static_cast<int>(problem.free.size()); ++i)
     if (tells_of_the_body(problem, i) && std::find(kept.begin(), kept.end(), i) == kept.end())
       chosen.push_back(i);
-  constexpr double kFourDecades = 9.210340371976184;
   std::vector<Side> sides(2 * chosen.size());
   data::in_parallel(sides.size(), threads, [&](std::size_t i) {
     const int index = chosen[i / 2];
-    const Transform& transform = problem.free[index].transform;
-    const double slope = std::abs(transform.slope(solution.u[index]));
-    const bool logarithmic = transform.is_over_decades();
-    double sd = std::sqrt(error.covariance(index, index)) / std::max(slope, 1e-300);
-    // An unidentifiable parameter has no scale of its own: a tenth of its size.
-    const double most = logarithmic ? 1.0 : std::max(0.1 * std::abs(solution.u[index]), 1e-3);
-    if (!std::isfinite(sd) || (logarithmic && sd > most)) sd = most;
-    const double farthest = logarithmic ? kFourDecades : 100.0 * sd;
-    const double step = (i % 2 == 0 ? -0.7 : 0.7) * sd;
     sides[i] =
-        walk(problem, solution, index, step, farthest, kQuantile95 * error.chi2_inflation[index]);
+        walk(problem, solution, index, plan_walk(problem, solution, error, index, i % 2 == 1),
+             kQuantile95 * error.chi2_inflation[index]);
   });
   std::vector<data::Profile> result;
   for (std::size_t c = 0; c < chosen.size(); ++c)
