@@ -494,6 +494,17 @@ TEST(Bound, ThatContradictsTheTrackMakesTheFitDoubtful) {
   EXPECT_THAT(torn.verdict_words, testing::HasSubstr("and the track alone says 0.09"));
 }
 
+// "It stands at the lower bound, 0, that [fit] bounds give it: the track may say that it is less."
+TEST(Bound, BeyondWhichNothingCanBeIsNotStoodAt) {
+  const data::Track track = thesis_track(25.0, 5e-4, 1);
+  data::Scene scene = top();
+  scene.body.emplace().kind = data::BodyKind::top;
+  scene.model.drag_spin_N_m_s = 1e-3;
+  scene.fit.bounds["gamma3_1_s"] = {0.0, 1.0};
+  EXPECT_THAT(fit_of(track, scene).warnings,
+              testing::Not(testing::Contains(testing::HasSubstr("stands at"))));
+}
+
 // They agree with each other, not with the bound.
 TEST(SeveralRecordings, ThatABoundHoldsBackDoNotDiffer) {
   const std::vector<data::Track> tracks{thesis_track(25.0, 1e-3, 11), thesis_track(25.0, 1e-3, 12)};

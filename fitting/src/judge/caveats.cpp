@@ -361,7 +361,8 @@ std::optional<BoundStoodAt> bound_stood_at(const Problem& problem, const Eigen::
                                            const Uncertainty& error,
                                            const data::FitSettings& settings, int index) {
   const FreeParameter& free = problem.free[index];
-  const auto* bounds = said_of(problem.predictor->parameters()[free.index].name, settings.bounds);
+  const model::ParameterInfo& info = problem.predictor->parameters()[free.index];
+  const auto* bounds = said_of(info.name, settings.bounds);
   if (bounds == nullptr) return std::nullopt;
   const double value = free.transform.value(u[index]);
   const double sigma = std::sqrt(error.covariance(index, index));
@@ -370,8 +371,11 @@ std::optional<BoundStoodAt> bound_stood_at(const Problem& problem, const Eigen::
   const auto size = [&](double bound) {
     return std::isfinite(width) ? width : std::max(std::abs(bound), std::abs(free.given));
   };
-  if (stands_at(value, lower, size(lower), sigma)) return BoundStoodAt{lower, true};
-  if (stands_at(value, upper, size(upper), sigma)) return BoundStoodAt{upper, false};
+  // From what it cannot be anyhow no bound keeps it.
+  if (lower > info.lower && stands_at(value, lower, size(lower), sigma))
+    return BoundStoodAt{lower, true};
+  if (upper < info.upper && stands_at(value, upper, size(upper), sigma))
+    return BoundStoodAt{upper, false};
   return std::nullopt;
 }
 
