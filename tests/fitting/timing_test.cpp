@@ -125,6 +125,14 @@ TEST(Timing, FindsHowMuchLaterAnglesAreThanPositions) {
   }
 }
 
+// "Without the precession seen in the recording, angle_delay_s would not be known."
+TEST(Timing, OfAnglesIsNoDegeneracyThatTheseBreak) {
+  data::Scene with = scene();
+  with.fit.prior["angle_delay_s"] = {0.0, 0.1};
+  for (const auto& broken : fit_of(filmed(0.0, 0.007, true), with).broken_degeneracies)
+    EXPECT_THAT(broken.parameters, testing::Not(testing::Contains("angle_delay_s")));
+}
+
 TEST(Timing, AsksForTheImagesHeight) {
   data::Scene with = scene();
   with.camera.rows.reset();

@@ -11,6 +11,7 @@
 
 #include "judge/directions.hpp"
 #include "judge/statistics.hpp"
+#include "observe/timing.hpp"
 #include "problem/linearise.hpp"
 
 namespace trochoid::fitting {
@@ -97,7 +98,8 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
     const Eigen::VectorXd rest = directions_of(others).sd();
     std::vector<std::string> names;
     for (int i = 0; i < count; ++i) {
-      const bool own = problem.predictor->parameters()[problem.free[i].index].name == "psi_rad";
+      const std::string& plain = problem.predictor->parameters()[problem.free[i].index].name;
+      const bool own = plain == "psi_rad" || plain == kAngleDelay;
       const data::FitParameter* parameter = fit.find(problem.name(i));
       const bool known = parameter != nullptr && parameter->identifiable;
       if (own || !known || rest[i] < std::max(1.0, kClearly * with[i]) ||
