@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <map>
 #include <random>
@@ -261,6 +262,26 @@ TEST(SeveralRecordings, ShareTheBodyAndKeepTheirStarts) {
 
 // Eight samples to a nutation: the path bends far more between them than they scatter, which no
 // first guess of the noise tells.
+// From what each of them says of the body all had been fitted together: of 60 recordings 60 times.
+TEST(SeveralRecordings, AreFittedTogetherFromAFewOfThemWhereTheseAgree) {
+  constexpr int kTracks = 7, kRows = 2 * 250;
+  std::vector<data::Track> tracks;
+  for (std::uint64_t seed = 1; seed <= kTracks; ++seed)
+    tracks.push_back(thesis_track(25.0, 1e-3, seed));
+  FitOptions options;
+  options.threads = 1;
+  bool searching = true;
+  int together = 0;
+  options.log = [&](const std::string& line) {
+    searching = searching && line != "weighing the samples";
+    together += searching && std::atoi(line.c_str()) > (kTracks - 1) * kRows ? 1 : 0;
+  };
+  const data::Fit result = fit(tracks, top(), options);
+  EXPECT_EQ(result.verdict, data::FitVerdict::good) << result.verdict_words;
+  EXPECT_GT(together, 0);
+  EXPECT_LT(together, kTracks);
+}
+
 TEST(SeveralRecordings, WithoutCovariancesHaveEachItsOwnNoise) {
   constexpr double kDuration_s = 250.0;
   const std::array kNoise_m{2e-5, 2e-4};

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "trochoid/data/parallel.hpp"
 
@@ -379,9 +382,39 @@ Found find_arc(Problem problem, const SearchRequest& asked) {
   return better(from_given, best) ? from_given : best;
 }
 
+// Where all arcs together end, and the values the search for that began at.
+struct Together {
+  Solution solution;
+  std::vector<Eigen::VectorXd> base;
+};
+
+// @param leader  values of one of them alone, of which it gives those that all share.
+Together together_from(const Problem& problem, const Eigen::VectorXd& leader) {
+  Problem trial = problem;
+  for (const FreeParameter& parameter : problem.free)
+    if (parameter.arc < 0)
+      for (Eigen::VectorXd& base : trial.base) base[parameter.index] = leader[parameter.index];
+  Solution solution = solve(trial, trial.start());
+  return {std::move(solution), std::move(trial.base)};
+}
+
+// Whether most of these led to the best of them, and that passes the gate.
+bool agree(const Problem& problem, std::span<const Together> ends) {
+  constexpr double kSame = 1e-4;  // of chi-square, more than a descent leaves
+  double least = std::numeric_limits<double>::infinity();
+  for (const Together& end : ends)
+    if (end.solution.usable) least = std::min(least, end.solution.chi2);
+  const auto alike = std::count_if(ends.begin(), ends.end(), [&](const Together& end) {
+    return end.solution.usable && end.solution.chi2 <= (1.0 + kSame) * least;
+  });
+  return 4 * alike >= 3 * std::ssize(ends) &&
+         least < chi2_gate(problem.rows()) * free_rows(problem);
+}
+
 }  // namespace
 
-// Every arc alone, then all together from each arc's idea of the shared parameters.
+// Every arc alone, then all together from each arc's idea of the shared parameters, or, of many,
+// from that of a few.
 Found find(Problem& problem, const SearchRequest& asked) {
   if (problem.arcs.size() == 1) return find_arc(problem, asked);
   const int arcs = static_cast<int>(problem.arcs.size());
@@ -405,21 +438,22 @@ Found find(Problem& problem, const SearchRequest& asked) {
     best.path = arc == 0 || best.path == found[arc].path ? found[arc].path : "mixed";
     best.cut_short |= found[arc].cut_short;
   }
-  std::vector<Problem> trials(alone.size(), problem);
-  std::vector<Solution> solutions(alone.size());
-  data::in_parallel(arcs, threads, [&](std::size_t leader) {
-    Problem& trial = trials[leader];
-    for (const FreeParameter& parameter : problem.free)
-      if (parameter.arc < 0)
-        for (Eigen::VectorXd& base : trial.base)
-          base[parameter.index] = alone[leader].base[0][parameter.index];
-    solutions[leader] = solve(trial, trial.start());
-  });
-  for (int leader = 0; leader < arcs; ++leader) {
-    const Solution& solution = solutions[leader];
-    if (!solution.usable || (best.solution.usable && solution.chi2 >= best.solution.chi2)) continue;
-    best.solution = solution;
-    problem.base = trials[leader].base;
+  std::vector<Together> ends(alone.size());
+  const auto lead = [&](std::size_t first, std::size_t last) {
+    data::in_parallel(last - first, threads, [&](std::size_t i) {
+      ends[first + i] = together_from(problem, alone[first + i].base[0]);
+    });
+  };
+  // Where the first few lead to one minimum, so do the others.
+  constexpr std::size_t kFew = 4;
+  const std::size_t few = std::min(kFew, ends.size());
+  lead(0, few);
+  if (!agree(problem, std::span(ends).first(few))) lead(few, ends.size());
+  for (Together& end : ends) {
+    if (!end.solution.usable || (best.solution.usable && end.solution.chi2 >= best.solution.chi2))
+      continue;
+    best.solution = std::move(end.solution);
+    problem.base = std::move(end.base);
   }
   return best;
 }

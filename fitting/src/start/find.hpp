@@ -24,7 +24,8 @@ struct SearchRequest {
 };
 
 /// Every arc alone (in parallel), without a guess or from the given start; then all arcs together
-/// from each arc's idea of the shared parameters. Writes the arcs' values into problem.base.
+/// from each arc's idea of the shared parameters, or from that of the first few where these lead to
+/// one minimum that passes the gate. Writes the arcs' values into problem.base.
 /// @throws InputError if the strategy is not for the model.
 [[nodiscard]] Found find(Problem& problem, const SearchRequest& asked);
 
