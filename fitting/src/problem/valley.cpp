@@ -29,11 +29,19 @@ bool Valley::displaced(const Eigen::VectorXd& step, Eigen::VectorXd& residuals) 
 // range, as below a loss that is hardly there, or out of the model, the other has to do; empty
 // where both do.
 std::optional<Eigen::VectorXd> Valley::bend(const Eigen::VectorXd& distances) const {
+  // Along one or two of many directions.
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(values.rows());
+  Eigen::VectorXd straight = Eigen::VectorXd::Zero(all.residuals.size());
+  for (Eigen::Index k = 0; k < distances.size(); ++k) {
+    if (distances[k] == 0.0) continue;
+    step += distances[k] * values.col(k);
+    straight += distances[k] * tangents.col(k);
+  }
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(all.residuals.size()), there;
   int sides = 0;
   for (const double side : {1.0, -1.0}) {
-    if (!displaced(side * values * distances, there)) continue;
-    sum += there - all.residuals - side * tangents * distances;
+    if (!displaced(side * step, there)) continue;
+    sum += there - all.residuals - side * straight;
     ++sides;
   }
   if (sides == 0) return std::nullopt;
