@@ -735,6 +735,23 @@ TEST(BrokenDegeneracies, AreNotThoseOfWhatACircleHides) {
       EXPECT_TRUE(fit.find(name)->identifiable) << broken.words;
 }
 
+// "Without the spin seen in the recording, omega_s_rad_s would not be known": it was b I / Is.
+TEST(BrokenDegeneracies, AreNotThoseOfASpinThatTheMomentsTell) {
+  data::Track track = thesis_track(25.0, 2e-4, 1);
+  const Eigen::VectorXd spin = thesis_motion(25.0, {model::Observable::psi_rad});
+  for (std::size_t i = 0; i < track.samples.size(); ++i)
+    track.samples[i].psi = data::MeasuredAngle{spin[static_cast<Eigen::Index>(i)], 0.01};
+  data::Scene scene = top();
+  const data::Fit unknown = fit_of(track, scene);
+  ASSERT_EQ(unknown.broken_degeneracies.size(), 1U);
+  EXPECT_THAT(unknown.broken_degeneracies.front().parameters,
+              testing::ElementsAre("omega_s_rad_s"));
+  scene.body.emplace().kind = data::BodyKind::top;
+  scene.body->I_kg_m2 = 0.04;
+  scene.body->Is_kg_m2 = 0.01;
+  EXPECT_THAT(fit_of(track, scene).broken_degeneracies, testing::IsEmpty());
+}
+
 TEST(BrokenDegeneracies, AreNoneWhereThePathTellsAsMuch) {
   data::Track track = thesis_track(25.0, 2e-4, 1);
   const Eigen::VectorXd tilt = thesis_motion(25.0, {model::Observable::theta_rad});

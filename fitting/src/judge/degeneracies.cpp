@@ -72,7 +72,7 @@ data::BrokenDegeneracy broken_by(const std::string& readings,
 
 std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
                                                         const Eigen::VectorXd& u,
-                                                        const data::Fit& fit) {
+                                                        const data::Fit& fit, bool spin_follows) {
   constexpr double kClearly = 3.0;  // times less certain: else the natural size happens to be near
   const Linearised all = linearise(problem, u);
   const Channels angles = angles_read(all);
@@ -99,7 +99,8 @@ std::vector<data::BrokenDegeneracy> broken_degeneracies(const Problem& problem,
     std::vector<std::string> names;
     for (int i = 0; i < count; ++i) {
       const std::string& plain = problem.predictor->parameters()[problem.free[i].index].name;
-      const bool own = plain == "psi_rad" || plain == kAngleDelay;
+      const bool own =
+          plain == "psi_rad" || plain == kAngleDelay || (plain == "omega_s_rad_s" && spin_follows);
       const data::FitParameter* parameter = fit.find(problem.name(i));
       const bool known = parameter != nullptr && parameter->identifiable;
       if (own || !known || rest[i] < std::max(1.0, kClearly * with[i]) ||

@@ -112,6 +112,11 @@ Given combined(const Given& one, const Given& other) {
           1.0 / std::sqrt(of_one + of_other)};
 }
 
+// Whether a top has dimensions, from which moments follow.
+bool has_shape(const data::Scene& scene) {
+  return scene.body && scene.body->kind != data::BodyKind::top && scene.body->radius_m > 0.0;
+}
+
 // The first arc in which a parameter of its own is free; -1: none.
 int arc_that_frees(const Problem& problem, const char* name) {
   const int index = problem.predictor->index_of(name);
@@ -130,7 +135,7 @@ class DerivedTop {
         propagate_(problem, u, covariance, std::max(0, seen_in_)),
         fit_(fit),
         body_(scene.body.value_or(data::Body{})),
-        shaped_(scene.body && body_.kind != data::BodyKind::top && body_.radius_m > 0.0),
+        shaped_(has_shape(scene)),
         a_(problem.predictor->index_of("a_1_s2")),
         b_(problem.predictor->index_of("b_1_s")),
         l_(problem.predictor->index_of("l_m")),
@@ -255,6 +260,12 @@ void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
   const DerivedTop top(problem, u, covariance, scene, fit);
   top.add_ratio_and_spin();
   top.add_mass();
+}
+
+bool spin_follows(const data::Scene& scene) {
+  const data::Body body = scene.body.value_or(data::Body{});
+  return has_shape(scene) || (given(scene, "I_kg_m2", body.I_kg_m2).known &&
+                              given(scene, "Is_kg_m2", body.Is_kg_m2).known);
 }
 
 void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,

@@ -11,6 +11,9 @@ namespace trochoid::fitting {
 void add_derived_top(const Problem& problem, const Eigen::VectorXd& u,
                      const Eigen::MatrixXd& covariance, const data::Scene& scene, data::Fit& fit);
 
+/// Whether a top's spin follows from the fitted b without a mark: from its moments, or its shape.
+[[nodiscard]] bool spin_follows(const data::Scene& scene);
+
 /// The velocity of a body that rolls when its record begins, which follows from its spin.
 void add_derived_velocity(const Problem& problem, const Eigen::VectorXd& u,
                           const Eigen::MatrixXd& covariance, data::Fit& fit);

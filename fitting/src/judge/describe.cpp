@@ -244,7 +244,7 @@ void describe(const Problem& problem, const Solution& solution, const Uncertaint
     warn_short_top(problem, solution.u, fit);
     admit_steady_precession(problem, solution.u, fit);
   }
-  const auto broken = broken_degeneracies(problem, solution.u, fit);
+  const auto broken = broken_degeneracies(problem, solution.u, fit, spin_follows(scene));
   fit.broken_degeneracies.insert(fit.broken_degeneracies.end(), broken.begin(), broken.end());
 }
 
