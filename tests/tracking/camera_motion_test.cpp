@@ -14,12 +14,17 @@ namespace {
 constexpr int kFloorWidth = 320, kFloorHeight = 240, kPictures = 40;
 constexpr double kNoise_levels = 1.5;
 
-// A floor as it is drawn in drawn_floor(), some fraction of a pixel away, lit by a lamp of its own.
-cv::Mat floor_at(const Eigen::Vector2d& shift_px, double contrast, double lamp_levels) {
+const Eigen::Vector2d kMiddle_px(0.5 * (kFloorWidth - 1), 0.5 * (kFloorHeight - 1));
+
+// A floor as it is drawn in drawn_floor(), some fraction of a pixel away, larger by growth about
+// the middle, lit by a lamp of its own.
+cv::Mat floor_at(const Eigen::Vector2d& shift_px, double contrast, double lamp_levels,
+                 double growth = 0.0) {
   cv::Mat floor(kFloorHeight, kFloorWidth, CV_64F);
   for (int y = 0; y < kFloorHeight; ++y)
     for (int x = 0; x < kFloorWidth; ++x) {
-      const double u = x - shift_px.x(), v = y - shift_px.y();
+      const double u = kMiddle_px.x() + (x - shift_px.x() - kMiddle_px.x()) / (1.0 + growth),
+                   v = kMiddle_px.y() + (y - shift_px.y() - kMiddle_px.y()) / (1.0 + growth);
       floor.at<double>(y, x) =
           140.0 +
           contrast * (6.0 * std::sin(0.41 * u + 0.3) * std::sin(0.37 * v) +
@@ -34,6 +39,7 @@ struct Scenery {
   std::function<Eigen::Vector2d(int frame)> shift_px;
   double contrast = 1.0;
   double lamp_levels = 0.0;  // by the last frame
+  std::function<double(int frame)> growth = [](int) { return 0.0; };
 };
 
 // What is found of frames with a dark body that crosses them.
@@ -42,8 +48,8 @@ std::map<std::int64_t, PictureShift> found_in(const Scenery& scenery) {
   const cv::Mat plate = developed(floor_at({0.0, 0.0}, scenery.contrast, 0.0), 0.3, random);
   CameraMotion motion(plate, kNoise_levels);
   for (int i = 0; i < kPictures; ++i) {
-    cv::Mat picture =
-        floor_at(scenery.shift_px(i), scenery.contrast, scenery.lamp_levels * i / (kPictures - 1));
+    cv::Mat picture = floor_at(scenery.shift_px(i), scenery.contrast,
+                               scenery.lamp_levels * i / (kPictures - 1), scenery.growth(i));
     const Eigen::Vector2d at_px(60.0 + 5.0 * i, 120.0);
     draw_disc(picture, at_px.x(), at_px.y(), 20.0, 15.0, 0.3 * i, 40.0);
     Frame frame;
@@ -108,6 +114,36 @@ TEST(CameraMotion, OnStripesIsNotGuessed) {
     motion.look(frame, {});
   }
   EXPECT_TRUE(motion.shifts().empty());
+}
+
+// A lens that breathes as it focuses, and one that zooms at once: places far from the middle go by
+// more than a pixel, the middle by nothing.
+TEST(CameraMotion, AFocusThatBreathesOrAZoomLetsThePictureGrow) {
+  const auto still = [](int) { return Eigen::Vector2d(0.0, 0.0); };
+  const auto breathes = [](int i) { return 0.0004 * i; };
+  const auto zooms = [](int i) { return i < 20 ? 0.0 : 0.012; };
+  const Eigen::Vector2d corner_px(30.0, 30.0), from_px = corner_px - kMiddle_px;
+  for (const std::function<double(int)>& grows :
+       {std::function<double(int)>(breathes), std::function<double(int)>(zooms)}) {
+    const auto shifts = found_in({still, 1.0, 0.0, grows});
+    ASSERT_EQ(shifts.size(), static_cast<std::size_t>(kPictures));
+    const double first = grows(4) - 0.5 * (grows(4) - grows(3));
+    for (const auto& [index, shift] : shifts) {
+      const double growth = grows(static_cast<int>(index)) - first;
+      EXPECT_NEAR(shift.growth, growth, 0.001) << index;
+      EXPECT_LT(shift.px.norm(), 0.15) << index;
+      const PictureShift there = shift.at(corner_px);
+      EXPECT_LT((there.px - growth * from_px).norm(), 0.25) << index;
+      EXPECT_GT(there.sigma_px, shift.sigma_px);
+      EXPECT_LT(there.sigma_px, 0.15);
+    }
+  }
+}
+
+// A knock moves all of the picture, and it does not grow by that.
+TEST(CameraMotion, DoesNotMakeAZoomOfAKnock) {
+  const auto knocked = [](int i) { return Eigen::Vector2d(i < 20 ? 0.0 : 1.2, 0.0); };
+  for (const auto& [index, shift] : found_in({knocked})) EXPECT_EQ(shift.growth, 0.0) << index;
 }
 
 // A push by more than can be followed: before it the camera shakes, and that is seen all the same.

@@ -73,13 +73,46 @@ struct Slopes {
   }
 };
 
+/// What a look says of the whole picture: its shift along x and y, and its growth.
+constexpr auto shift_and_growth = [](const auto& look) {
+  return Eigen::Vector3d(look.shift_px.x(), look.shift_px.y(), look.growth);
+};
+
+/// Median of what the first so many looks say.
+template <class Looks, class Said>
+Eigen::Vector3d usual(const Looks& looks, std::size_t first, const Said& said) {
+  std::array<std::vector<double>, 3> values;
+  for (auto at = looks.begin(); at != looks.end() && values[0].size() < first; ++at) {
+    const Eigen::Vector3d value = said(at->second);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i].push_back(value(static_cast<Eigen::Index>(i)));
+  }
+  return {data::median(std::move(values[0])), data::median(std::move(values[1])),
+          data::median(std::move(values[2]))};
+}
+
+/// What the first tenth of the looks say, or where the picture shakes about one place, that.
+template <class Looks>
+Eigen::Vector3d at_rest(const Looks& looks, double reach_px) {
+  constexpr std::size_t kFewest = 8, kBeginning = 10;
+  const Eigen::Vector3d middle = usual(looks, looks.size(), shift_and_growth);
+  const Eigen::Vector3d begun =
+      usual(looks, std::max(kFewest, looks.size() / kBeginning), shift_and_growth);
+  const auto apart_px = [&](const Eigen::Vector3d& of) {
+    return (of - middle).cwiseProduct(Eigen::Vector3d(1.0, 1.0, reach_px)).norm();
+  };
+  std::vector<double> off_px;
+  for (const auto& [index, look] : looks) off_px.push_back(apart_px(shift_and_growth(look)));
+  constexpr double kNear = 0.5;  // a knock half way leaves the middle between the two places
+  return apart_px(begun) < kNear * data::median(std::move(off_px)) ? middle : begun;
+}
+
 }  // namespace
 
 std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Point>& quarter,
-                                                          const cv::Mat& luma,
-                                                          const cv::Mat& surroundings,
+                                                          const Picture& picture,
                                                           const Follower::Others& bodies,
-                                                          Eigen::Vector2d from_px) {
+                                                          Eigen::Vector2d from_px, double growth) {
   constexpr std::size_t kFewest = 50;
   constexpr int kRounds = 3;
   constexpr double kRadii = 2.5;        // a body's shadow is beside it
@@ -91,11 +124,16 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
         }))
       points.push_back(&point);
   if (points.size() < kFewest) return std::nullopt;
-  Found found{from_px, {}};
+  Found found{from_px, {}, Eigen::Vector2d::Zero()};
+  for (const Point* point : points)
+    found.about_px += point->at_px / static_cast<double>(points.size());
   std::vector<double> residuals(points.size()), sizes(points.size());
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      residuals[i] = level_at(luma, surroundings, points[i]->at_px + found.px) - points[i]->level;
+      const Eigen::Vector2d &at_px = points[i]->at_px,
+                            gone_px = found.px + growth * (at_px - found.about_px);
+      residuals[i] =
+          level_at(picture.luma, picture.surroundings, at_px + gone_px) - points[i]->level;
       sizes[i] = std::abs(residuals[i]);
     }
     constexpr double kRounding_levels = 0.3, kInlier = 2.0;
@@ -112,7 +150,8 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const std::vector<Poin
   return found;
 }
 
-CameraMotion::CameraMotion(const cv::Mat& plate, double noise_levels) {
+CameraMotion::CameraMotion(const cv::Mat& plate, double noise_levels)
+    : middle_px_(0.5 * (plate.cols - 1), 0.5 * (plate.rows - 1)) {
   constexpr int kCell_px = 16, kBorder_px = 6;
   constexpr std::size_t kEach = 2;
   constexpr double kLeast_levels = 0.7, kEnough = 0.5;
@@ -136,89 +175,130 @@ CameraMotion::CameraMotion(const cv::Mat& plate, double noise_levels) {
   tells_ = told > kEnough * cells;
 }
 
+/// How far the quarters are from the middle, about.
+double CameraMotion::reach_px() const {
+  return 0.5 * middle_px_.norm();
+}
+
+/// By least squares: one shift, and growth that parts the quarters.
+CameraMotion::Look CameraMotion::together(const Quarters& quarters, bool grows) const {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const auto& found : quarters) {
+    if (!found) continue;
+    Eigen::Matrix<double, 2, 3> by;
+    by << Eigen::Matrix2d::Identity(), grows ? found->about_px - middle_px_ : Eigen::Vector2d(0, 0);
+    normal += by.transpose() * found->information * by;
+    right += by.transpose() * (found->information * found->px);
+  }
+  if (!grows) normal(2, 2) = 1.0;
+  const Eigen::Matrix3d covariance = normal.inverse();
+  const Eigen::Vector3d solution = covariance * right;
+  Look look{.shift_px = solution.head<2>(), .of_quarters_px = {}};
+  look.sigma_px = std::sqrt(0.5 * covariance.topLeftCorner<2, 2>().trace());
+  if (grows) look.growth = solution.z(), look.sigma_growth = std::sqrt(covariance(2, 2));
+  return look;
+}
+
 // Each quarter is followed by itself: where a picture is mostly noise, what it makes of one of them
 // has nothing to do with what it makes of another.
-void CameraMotion::look(const Frame& frame, const Follower::Others& bodies) {
-  if (!tells_ || looks_.contains(frame.index)) return;
-  const cv::Mat surroundings = surroundings_of(frame.luma);
+std::optional<CameraMotion::Look> CameraMotion::look_at(const Picture& picture,
+                                                        const Follower::Others& bodies,
+                                                        Series& series) const {
+  constexpr int kRounds = 3;
+  constexpr double kSettled_px = 0.05;
+  double growth = series.last_growth;
+  Quarters found;
   Look look;
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  std::array<std::optional<Found>, kQuarters> found;
-  for (std::size_t k = 0; k < kQuarters; ++k) {
-    found[k] = shift_of(quarters_[k], frame.luma, surroundings, bodies, last_px_[k]);
-    if (!found[k]) continue;
-    information += found[k]->information;
-    sum += found[k]->information * found[k]->px;
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t k = 0; k < kQuarters; ++k)
+      found[k] = shift_of(quarters_[k], picture, bodies, series.last_px[k], growth);
+    if (std::count(found.begin(), found.end(), std::nullopt) > std::ssize(found) / 2)
+      return std::nullopt;
+    look = together(found, series.grows);
+    const double change = std::abs(look.growth - growth);
+    if (!(change * reach_px() > kSettled_px)) break;
+    growth = look.growth;
   }
-  if (std::count(found.begin(), found.end(), std::nullopt) > std::ssize(found) / 2) return;
-  look.shift_px = information.inverse() * sum;
-  look.sigma_px = std::sqrt(0.5 * information.inverse().trace());
   // One quarter alone, below a hand or after a knock that none can follow, says nothing of the
   // camera; and one that a body hides contradicts nobody.
   constexpr double kTogether_px = 2.0;
   for (std::size_t k = 0; k < kQuarters; ++k) {
-    const Eigen::Vector2d px = found[k] ? found[k]->px : look.shift_px;
-    if (!((px - look.shift_px).norm() < kTogether_px)) return;
+    Eigen::Vector2d px = look.shift_px;
+    if (found[k]) px = found[k]->px - look.growth * (found[k]->about_px - middle_px_);
+    if (!((px - look.shift_px).norm() < kTogether_px)) return std::nullopt;
     look.of_quarters_px.col(static_cast<Eigen::Index>(k)) = px;
   }
   for (std::size_t k = 0; k < kQuarters; ++k)
-    if (found[k]) last_px_[k] = found[k]->px;
-  looks_[frame.index] = look;
+    if (found[k]) series.last_px[k] = found[k]->px;
+  series.last_growth = look.growth;
+  return look;
 }
 
-template <class ShiftOf>
-Eigen::Vector2d CameraMotion::usual_px(std::size_t looks, const ShiftOf& shift_of) const {
-  std::vector<double> x, y;
-  for (auto at = looks_.begin(); at != looks_.end() && x.size() < looks; ++at) {
-    const Eigen::Vector2d shift_px = shift_of(at->second);
-    x.push_back(shift_px.x());
-    y.push_back(shift_px.y());
-  }
-  return {data::median(std::move(x)), data::median(std::move(y))};
+void CameraMotion::look(const Frame& frame, const Follower::Others& bodies) {
+  if (!tells_) return;
+  const cv::Mat surroundings = surroundings_of(frame.luma);
+  for (Series* series : {&shifted_, &grown_})
+    if (!series->looks.contains(frame.index))
+      if (const auto look = look_at({frame.luma, surroundings}, bodies, *series))
+        series->looks[frame.index] = *look;
 }
 
-bool CameraMotion::moves(double& disagree_px) const {
+bool CameraMotion::moves(const Series& series, double& disagree_px) const {
   constexpr double kLeast_px = 0.1, kClearly = 2.0;
-  const std::size_t all = looks_.size();
-  const Eigen::Vector2d middle_px = usual_px(all, [](const Look& look) { return look.shift_px; });
+  const std::size_t all = series.looks.size();
+  const Eigen::Vector3d middle = usual(series.looks, all, shift_and_growth);
   Eigen::Matrix<double, 2, kQuarters> middles_px;
   for (Eigen::Index k = 0; k < middles_px.cols(); ++k)
-    middles_px.col(k) = usual_px(all, [k](const Look& look) { return look.of_quarters_px.col(k); });
-  double moves2 = 0.0, disagree2 = 0.0;
-  for (const auto& [index, look] : looks_) {
-    moves2 += (look.shift_px - middle_px).squaredNorm();
+    middles_px.col(k) = usual(series.looks, all, [k](const auto& look) {
+                          return Eigen::Vector3d(look.of_quarters_px.col(k).homogeneous());
+                        }).head<2>();
+  double shifts2 = 0.0, grows2 = 0.0, disagree2 = 0.0;
+  for (const auto& [index, look] : series.looks) {
+    const Eigen::Vector3d gone = shift_and_growth(look) - middle;
+    shifts2 += gone.head<2>().squaredNorm();
+    grows2 += std::pow(gone.z() * reach_px(), 2);
     const Eigen::Matrix<double, 2, kQuarters> gone_px = look.of_quarters_px - middles_px;
     const Eigen::Vector2d together_px = gone_px.rowwise().mean();
     disagree2 += (gone_px.colwise() - together_px).squaredNorm() / kQuarters;
   }
   const auto count = static_cast<double>(all);
   disagree_px = std::sqrt(disagree2 / count);
-  return std::sqrt(moves2 / count) > std::max(kLeast_px, kClearly * disagree_px);
-}
-
-Eigen::Vector2d CameraMotion::rest_px() const {
-  constexpr std::size_t kFewest = 8, kBeginning = 10;
-  const auto whole = [](const Look& look) { return look.shift_px; };
-  const Eigen::Vector2d middle_px = usual_px(looks_.size(), whole);
-  const Eigen::Vector2d begun_px = usual_px(std::max(kFewest, looks_.size() / kBeginning), whole);
-  std::vector<double> off_px;
-  for (const auto& [index, look] : looks_) off_px.push_back((look.shift_px - middle_px).norm());
-  constexpr double kNear = 0.5;  // a knock half way leaves the middle between the two places
-  const bool shakes = (begun_px - middle_px).norm() < kNear * data::median(std::move(off_px));
-  return shakes ? middle_px : begun_px;
+  return std::sqrt((series.grows ? grows2 : shifts2) / count) >
+         std::max(kLeast_px, kClearly * disagree_px);
 }
 
 std::map<std::int64_t, PictureShift> CameraMotion::shifts() const {
   constexpr std::size_t kFewest = 8;
-  double disagree_px = 0.0;
-  if (looks_.size() < kFewest || !moves(disagree_px)) return {};
-  const Eigen::Vector2d rest = rest_px();
-  std::map<std::int64_t, PictureShift> shifts;
-  for (const auto& [index, look] : looks_)
-    shifts[index] = {look.shift_px - rest,
-                     std::hypot(look.sigma_px, disagree_px / std::sqrt(kQuarters))};
-  return shifts;
+  // Growth where it is plain; else a shift.
+  for (const Series* series : {&grown_, &shifted_}) {
+    double disagree_px = 0.0;
+    if (series->looks.size() < kFewest || !moves(*series, disagree_px)) continue;
+    const Eigen::Vector3d rest = at_rest(series->looks, reach_px());
+    const double of_quarters_px = disagree_px / std::sqrt(kQuarters);
+    std::map<std::int64_t, PictureShift> shifts;
+    for (const auto& [index, look] : series->looks) {
+      PictureShift& shift = shifts[index];
+      shift.growth = (1.0 + look.growth) / (1.0 + rest.z()) - 1.0;
+      shift.px = look.shift_px - (1.0 + shift.growth) * rest.head<2>();
+      shift.sigma_px = std::hypot(look.sigma_px, of_quarters_px);
+      if (!series->grows) continue;
+      shift.sigma_growth = std::hypot(look.sigma_growth, of_quarters_px / reach_px());
+      shift.about_px = middle_px_;
+    }
+    return shifts;
+  }
+  return {};
+}
+
+PictureShift PictureShift::at(const Eigen::Vector2d& place_px) const {
+  PictureShift there = *this;
+  const Eigen::Vector2d from_px = place_px - about_px;
+  // A place that is seen where it has gone to.
+  there.px += growth / (1.0 + growth) * (from_px - px);
+  there.sigma_px = std::hypot(sigma_px, sigma_growth * from_px.norm());
+  there.about_px = place_px;
+  return there;
 }
 
 }  // namespace trochoid::tracking

@@ -257,7 +257,7 @@ data::Track assemble_track(const BodyPath& path, int object,
     sample.centre_px = seen.centre_px;
     sample.quality = quality_of(seen);
     const double usual = *inflation++;
-    const PictureShift shift = shift_in(options.shifts, index);
+    const PictureShift shift = shift_in(options.shifts, index).at(seen.centre_px);
     if (seen.pose) {
       PoseMeasurement pose = *seen.pose;
       pose.inflate(usual);

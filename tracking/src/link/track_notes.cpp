@@ -128,20 +128,31 @@ std::vector<std::string> notes_about_recording(const VideoInfo& video, const Wha
 std::optional<std::string> note_about_camera_motion(
     const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frames, bool metres) {
   if (shifts.empty()) return std::nullopt;
-  double squares = 0.0, farthest_px = 0.0;
+  double squares = 0.0, farthest_px = 0.0, least = 0.0, most = 0.0;
   for (const auto& [index, shift] : shifts) {
     squares += shift.px.squaredNorm();
     farthest_px = std::max(farthest_px, shift.px.norm());
+    least = std::min(least, shift.growth);
+    most = std::max(most, shift.growth);
   }
   const Eigen::Vector2d gone_px = shifts.rbegin()->second.px - shifts.begin()->second.px;
-  std::string words = fmt::format(
-      "the camera moves: the picture of the floor by {:.2g} px rms, at most {:.2g} px, and {:.2g} "
-      "px from the beginning to the end; {}; fasten the camera",
-      std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm(),
+  const bool grows = most > least;
+  const std::string moves = fmt::format(
+      "by {:.2g} px rms, at most {:.2g} px, and {:.2g} px from the beginning to the end",
+      std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
+  std::string words =
+      grows ? fmt::format(
+                  "the camera focuses or zooms: the picture of the floor gets {:.2g} % "
+                  "larger and smaller, and its middle moves {}",
+                  100.0 * (most - least), moves)
+            : "the camera moves: the picture of the floor " + moves;
+  words += fmt::format(
+      "; {}; {}",
       metres ? "metres are those of a camera that stands still, as a whole known no better than to "
                "some tenths of that (a top's precession and spin go along); pixels and tilts are "
                "left as they are"
-             : "pixels are left as they are");
+             : "pixels are left as they are",
+      grows ? "lock focus and zoom" : "fasten the camera");
   constexpr double kNearlyAll = 0.9;
   if (const auto told = static_cast<std::int64_t>(shifts.size());
       static_cast<double>(told) < kNearlyAll * static_cast<double>(frames))
