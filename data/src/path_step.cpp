@@ -68,6 +68,9 @@ std::optional<PathStep> step_at(const std::vector<double>& t_s, const Eigen::Mat
     if (!standing) step.frames += unknowns[kUnknowns - 1];
     if (!(std::abs(step.frames) < kBeside)) return std::nullopt;
   }
+  const Powers slope = slopes(0.5 * step.frames / kBeside) / kBeside;
+  step.way = std::abs(step.frames) * std::hypot(slope.dot(unknowns.head<kOrder>()),
+                                                slope.dot(unknowns.segment<kOrder>(kOrder)));
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
   const Eigen::MatrixXd upper = qr.matrixR().topRows(kUnknowns).triangularView<Eigen::Upper>();
   const Eigen::VectorXd last =
@@ -107,10 +110,11 @@ std::vector<PathStep> path_steps(const std::vector<double>& t_s, const Eigen::Ma
 }
 
 std::vector<PathStep> clear_path_steps(const std::vector<double>& t_s, const Eigen::MatrixX2d& at,
-                                       double most_sigma) {
+                                       double most_sigma, double least_way) {
   constexpr std::size_t kFew = 6, kRarely = 40;
   std::vector<PathStep> steps = path_steps(t_s, at);
-  std::erase_if(steps, [&](const PathStep& step) { return step.sigma > most_sigma; });
+  std::erase_if(
+      steps, [&](const PathStep& step) { return step.sigma > most_sigma || step.way < least_way; });
   if (steps.size() > std::min(kFew, t_s.size() / kRarely)) steps.clear();
   return steps;
 }

@@ -36,6 +36,7 @@ TEST(PathSteps, TellWholeFramesThatAreMissingOrTooMany) {
     ASSERT_EQ(steps.size(), 1U) << frames;
     EXPECT_EQ(steps[0].sample, 50);
     EXPECT_LT(std::abs(steps[0].frames - frames), 4.0 * steps[0].sigma);
+    EXPECT_NEAR(steps[0].way, 3.14 * kStep_s * std::abs(frames), 0.005);
   }
 }
 
@@ -77,7 +78,7 @@ TEST(PathSteps, AreNotClearWhereTimesJitter) {
     at.row(i) = place(i + jitter(generator));
   }
   EXPECT_FALSE(path_steps(t_s, at).empty()) << "else it tests nothing";
-  EXPECT_TRUE(clear_path_steps(t_s, at, 0.1).empty());
+  EXPECT_TRUE(clear_path_steps(t_s, at, 0.1, 0.0).empty());
 }
 
 }  // namespace

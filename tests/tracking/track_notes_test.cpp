@@ -40,6 +40,15 @@ TEST(TrackNotes, APictureThatCameTwiceIsNotOneThatIsMissing) {
   EXPECT_THAT(*note, Not(HasSubstr("missing_frames")));
 }
 
+// Codecs hold the picture of what rests and renew it with a key frame: it drifts by hundredths of a
+// pixel, and leaps by as little.
+TEST(TrackNotes, ABodyAtRestWhosePictureIsRenewedHasLostNoPictures) {
+  constexpr double kDrift = 1e-3;
+  data::Track track = round_with(1);
+  for (data::TrackSample& sample : track.samples) sample.centre_px *= kDrift;
+  EXPECT_FALSE(note_about_steps(track, {}));
+}
+
 /// A body of 20 px radius in a picture of 200 px, seen from frame 40 to frame 99 but for a few.
 BodyPath seen_late(double x_px) {
   BodyPath path;

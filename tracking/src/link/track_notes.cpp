@@ -179,7 +179,7 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
 
 std::optional<std::string> note_about_steps(const data::Track& track,
                                             const std::vector<std::int64_t>& known) {
-  constexpr double kClear = 0.05;
+  constexpr double kClear = 0.05, kLeast_px = 0.1;
   const auto& samples = track.samples;
   std::vector<double> t_s;
   Eigen::MatrixX2d at_px(std::ssize(samples), 2);
@@ -187,7 +187,7 @@ std::optional<std::string> note_about_steps(const data::Track& track,
     t_s.push_back(samples[i].t_s);
     at_px.row(static_cast<Eigen::Index>(i)) = samples[i].centre_px;
   }
-  const std::vector<data::PathStep> steps = data::clear_path_steps(t_s, at_px, kClear);
+  const std::vector<data::PathStep> steps = data::clear_path_steps(t_s, at_px, kClear, kLeast_px);
   if (steps.empty()) return std::nullopt;
   std::vector<std::int64_t> missing = known;
   bool all_missing = true;
