@@ -147,6 +147,20 @@ TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
 }
 
 // Matroska counts milliseconds.
+TEST_F(FrameSourceTest, TellsPixelsThatAreNotAsWideAsHigh) {
+  const auto film = [&](const std::string& aspect) {
+    const fs::path path = folder_ / "film.y4m";
+    std::ofstream file(path, std::ios::binary);
+    file << "YUV4MPEG2 W16 H16 F50:1 Ip A" << aspect << " C420jpeg\n";
+    for (int i = 0; i < 3; ++i) file << "FRAME\n" << std::string(16 * 16 * 3 / 2, '\x80');
+    file.close();
+    return open_video(path)->info().pixel_aspect;
+  };
+  EXPECT_DOUBLE_EQ(film("4:3"), 4.0 / 3.0);
+  EXPECT_DOUBLE_EQ(film("1:1"), 1.0);
+  EXPECT_DOUBLE_EQ(film("0:0"), 1.0) << "unknown";
+}
+
 TEST_F(FrameSourceTest, PicturesOfOneTimeAreRefusedUnlessTheRateIsGiven) {
   const fs::path path = write_clip("fast.mkv", "FFV1", 2000.0);
   EXPECT_THAT(error_of(path), IsEmpty()) << "nobody minds";

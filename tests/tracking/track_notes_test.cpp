@@ -49,6 +49,13 @@ TEST(TrackNotes, ABodyAtRestWhosePictureIsRenewedHasLostNoPictures) {
   EXPECT_FALSE(note_about_steps(track, {}));
 }
 
+TEST(TrackNotes, PixelsThatAreNotSquareAreTold) {
+  VideoInfo video;
+  EXPECT_FALSE(note_about_pixel_aspect(video));
+  video.pixel_aspect = 4.0 / 3.0;
+  EXPECT_THAT(note_about_pixel_aspect(video).value_or(""), HasSubstr("1.333 times"));
+}
+
 /// A body of 20 px radius in a picture of 200 px, seen from frame 40 to frame 99 but for a few.
 BodyPath seen_late(double x_px) {
   BodyPath path;

@@ -69,6 +69,12 @@ Turn turn_of(const AVStream& stream, const AVFrame* photograph) {
   return matrix != nullptr ? Turn::of(reinterpret_cast<const std::int32_t*>(matrix)) : Turn{};
 }
 
+/// Of the stored picture: width over height of a pixel, 1 where the file does not tell.
+double stored_pixel_aspect(AVFormatContext& container, AVStream& stream) {
+  const AVRational told = av_guess_sample_aspect_ratio(&container, &stream, nullptr);
+  return told.num > 0 && told.den > 0 ? av_q2d(told) : 1.0;
+}
+
 /// Rate at which a phone says it filmed; slow motion may be stored at a lower one.
 std::optional<double> capture_rate_hz(const AVFormatContext& container) {
   const AVDictionaryEntry* entry =
@@ -188,6 +194,8 @@ class LibavSource final : public FrameSource {
     const cv::Size upright = turn_.upright(decoder_->width, decoder_->height);
     info_.width_px = upright.width;
     info_.height_px = upright.height;
+    info_.pixel_aspect = stored_pixel_aspect(*container_, *stream_);
+    if (turn_.transposed) info_.pixel_aspect = 1.0 / info_.pixel_aspect;
     const double average = av_q2d(stream_->avg_frame_rate), base = av_q2d(stream_->r_frame_rate);
     const bool has_average = std::isfinite(average) && average > 0.0;
     info_.frame_rate_hz = has_average ? average : (std::isfinite(base) ? base : 0.0);

@@ -125,6 +125,18 @@ std::vector<std::string> notes_about_recording(const VideoInfo& video, const Wha
   return notes;
 }
 
+std::optional<std::string> note_about_pixel_aspect(const VideoInfo& video) {
+  constexpr double kNoticeable = 0.01;
+  if (std::abs(std::log(video.pixel_aspect)) < kNoticeable) return std::nullopt;
+  return fmt::format(
+      "by what the file says its pixels are {:.4g} times as wide as high, and without a camera "
+      "file "
+      "they are taken for square: lengths and tilts are wrong by as much; make them square first "
+      "(ffmpeg -i VIDEO -vf scale=iw*sar:ih,setsar=1 -crf 12 SQUARE.mp4), or calibrate the camera "
+      "by pictures of a board",
+      video.pixel_aspect);
+}
+
 std::optional<std::string> note_about_camera_motion(
     const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frames, bool metres) {
   if (shifts.empty()) return std::nullopt;

@@ -25,6 +25,9 @@ struct WhatWasRead {
 [[nodiscard]] std::vector<std::string> notes_about_recording(const VideoInfo& video,
                                                              const WhatWasRead& read);
 
+/// That pixels are not as wide as high, which only a camera's file allows for.
+[[nodiscard]] std::optional<std::string> note_about_pixel_aspect(const VideoInfo& video);
+
 /// By how much the camera moves, where it does.
 /// @param frames  of the recording.  @param metres  whether its tracks have any.
 [[nodiscard]] std::optional<std::string> note_about_camera_motion(

@@ -166,6 +166,7 @@ std::vector<std::string> notes_about(const FollowedRecording& of,
     notes.emplace_back(
         "it is not seen to lean, as if it lay on its face: with kind = \"flat\" under [support] "
         "a fit takes it for a body that slides, not for one that rolls on its rim");
+  if (!of.camera || of.camera->file.empty()) add(note_about_pixel_aspect(of.recording.info()));
   if (!of.camera && has_shape(of.scene)) add(note_about_scale(of.scene.support));
   for (std::string& note : notes_about_recording(of.recording.info(), of.read))
     notes.push_back(std::move(note));

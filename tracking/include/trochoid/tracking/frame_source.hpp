@@ -38,6 +38,8 @@ struct VideoInfo {
   /// That of the file's time stamps where pictures are timed by the capture rate instead: slow
   /// motion, whose stamps are those of playing it.
   std::optional<double> played_rate_hz{};
+  /// Width over height of a pixel of the upright picture, as the file says it is to be shown.
+  double pixel_aspect = 1.0;
   int orientation = 1;  ///< how the stored pictures were turned to be upright, by Exif's numbers
 };
 
