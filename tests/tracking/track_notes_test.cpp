@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 namespace trochoid::tracking {
 namespace {
@@ -47,6 +48,24 @@ TEST(TrackNotes, ABodyAtRestWhosePictureIsRenewedHasLostNoPictures) {
   data::Track track = round_with(1);
   for (data::TrackSample& sample : track.samples) sample.centre_px *= kDrift;
   EXPECT_FALSE(note_about_steps(track, {}));
+}
+
+// Back at the start of its round from one picture to the next, or with four lost between.
+TEST(TrackNotes, ABodyThatIsSomewhereElseAtOnceIsTold) {
+  constexpr double kRadius_px = 30.0;
+  for (const int lost : {0, 4}) {
+    data::Track track = round_with(0);
+    for (std::size_t i = 40; i < track.samples.size(); ++i) {
+      track.samples[i].centre_px.y() -= 80.0;
+      track.samples[i].frame += lost;
+    }
+    const auto note = note_about_cuts(track, kRadius_px);
+    ASSERT_TRUE(note);
+    EXPECT_THAT(*note, HasSubstr("from frame " + std::to_string(40 + lost) + " on"));
+  }
+  EXPECT_FALSE(note_about_cuts(round_with(0), kRadius_px));
+  EXPECT_FALSE(note_about_cuts(round_with(1), kRadius_px));
+  EXPECT_FALSE(note_about_cuts(round_with(0), 2.0)) << "it goes farther than it is large";
 }
 
 TEST(TrackNotes, PixelsThatAreNotSquareAreTold) {

@@ -219,6 +219,33 @@ std::optional<std::string> note_about_steps(const data::Track& track,
   return note;
 }
 
+std::optional<std::string> note_about_cuts(const data::Track& track, double radius_px) {
+  constexpr std::size_t kBeside = 5;
+  constexpr std::int64_t kFewFrames = 15;
+  constexpr double kRadii = 1.5, kTimesAsFast = 2.0;
+  const auto& samples = track.samples;
+  const auto speed_px = [&](std::size_t i) {  // a frame, up to sample i
+    return (samples[i].centre_px - samples[i - 1].centre_px).norm() /
+           static_cast<double>(samples[i].frame - samples[i - 1].frame);
+  };
+  std::vector<std::int64_t> cuts;
+  for (std::size_t i = kBeside + 1; i + kBeside < samples.size(); ++i) {
+    const std::int64_t frames = samples[i].frame - samples[i - 1].frame;
+    const double way_px = (samples[i].centre_px - samples[i - 1].centre_px).norm();
+    if (frames > kFewFrames || way_px < kRadii * radius_px) continue;
+    double fastest_px = 0.0;
+    for (std::size_t k = 1; k <= kBeside; ++k)
+      fastest_px = std::max({fastest_px, speed_px(i - k), speed_px(i + k)});
+    if (way_px > kTimesAsFast * fastest_px * static_cast<double>(frames))
+      cuts.push_back(samples[i].frame);
+  }
+  if (cuts.empty()) return std::nullopt;
+  return fmt::format(
+      "the body is somewhere else at once from frame {} on: where the film is cut, or the body is "
+      "thrown again, no motion leads from one part to the next; track each by itself (from, to)",
+      fmt::join(cuts, ", from "));
+}
+
 std::optional<std::string> note_about_lost(const BodyPath& path, const FramesRead& read,
                                            const VideoInfo& video) {
   constexpr double kMuch = 0.1;

@@ -44,6 +44,12 @@ struct WhatWasRead {
 [[nodiscard]] std::optional<std::string> note_about_steps(const data::Track& track,
                                                           const std::vector<std::int64_t>& known);
 
+/// Where a body is somewhere else from one picture to the next, or after a few without it: farther
+/// away than it is large, and than it could have gone.
+/// @param radius_px  of the body.
+[[nodiscard]] std::optional<std::string> note_about_cuts(const data::Track& track,
+                                                         double radius_px);
+
 /// Which frames were looked at for a body.
 struct FramesRead {
   std::int64_t first = 0, last = 0;

@@ -144,6 +144,7 @@ void add_track(const FollowedRecording& of, int object, bool alone, BodyPath& pa
       result.file.notes.push_back(alone ? *note : fmt::format("object {}: {}", object, *note));
   };
   add(note_about_lost(path, of.span, of.recording.info()));
+  add(note_about_cuts(track, usual_radius_px(path)));
   add(note_about_steps(track, of.scene.camera.missing_frames));
 }
 
