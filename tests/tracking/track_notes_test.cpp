@@ -62,6 +62,8 @@ TEST(TrackNotes, ABodyThatIsSomewhereElseAtOnceIsTold) {
     const auto note = note_about_cuts(track, kRadius_px);
     ASSERT_TRUE(note);
     EXPECT_THAT(*note, HasSubstr("from frame " + std::to_string(40 + lost) + " on"));
+    EXPECT_TRUE(note_about_cuts(track, 70.0)) << "as far away as a shadow";
+    EXPECT_FALSE(note_about_cuts(track, 90.0)) << "within the body";
   }
   EXPECT_FALSE(note_about_cuts(round_with(0), kRadius_px));
   EXPECT_FALSE(note_about_cuts(round_with(1), kRadius_px));

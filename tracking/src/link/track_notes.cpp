@@ -221,7 +221,7 @@ std::optional<std::string> note_about_steps(const data::Track& track,
 std::optional<std::string> note_about_cuts(const data::Track& track, double radius_px) {
   constexpr std::size_t kBeside = 5;
   constexpr std::int64_t kFewFrames = 15;
-  constexpr double kRadii = 1.5, kTimesAsFast = 2.0;
+  constexpr double kRadii = 1.0, kTimesAsFast = 2.0;
   const auto& samples = track.samples;
   const auto speed_px = [&](std::size_t i) {  // a frame, up to sample i
     return (samples[i].centre_px - samples[i - 1].centre_px).norm() /
@@ -241,7 +241,8 @@ std::optional<std::string> note_about_cuts(const data::Track& track, double radi
   if (cuts.empty()) return std::nullopt;
   return fmt::format(
       "the body is somewhere else at once from frame {} on: where the film is cut, or the body is "
-      "thrown again, no motion leads from one part to the next; track each by itself (from, to)",
+      "thrown again, no motion leads from one part to the next; track each by itself (from, to), "
+      "unless its shadow or another thing is followed in one of them",
       fmt::join(cuts, ", from "));
 }
 

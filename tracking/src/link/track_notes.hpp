@@ -45,7 +45,7 @@ struct WhatWasRead {
                                                           const std::vector<std::int64_t>& known);
 
 /// Where a body is somewhere else from one picture to the next, or after a few without it: farther
-/// away than it is large, and than it could have gone.
+/// away than its radius, and than it could have gone. Its shadow begins so near.
 /// @param radius_px  of the body.
 [[nodiscard]] std::optional<std::string> note_about_cuts(const data::Track& track,
                                                          double radius_px);
