@@ -42,6 +42,15 @@ class LostPictures : public testing::Test {
   }
   [[nodiscard]] data::Fit found() const { return fit(std::span(&motion_.track, 1), motion_.scene); }
 
+  void expect_two_told() {
+    drop(100);
+    drop(180);
+    const data::Fit fit = found();
+    EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
+    EXPECT_THAT(fit.verdict_words, AllOf(HasSubstr("1 frame too early from " + time_s(100)),
+                                         HasSubstr("1 frame too early from " + time_s(180))));
+  }
+
   NoisyMotion motion_ = noisy("s06_roll_disc", 2.0, kSigma_m, 2);
 };
 
@@ -52,12 +61,7 @@ TEST_F(LostPictures, AreNotSeenWhereNoneIs) {
 
 // The parameters had been 4 error bars off, with a verdict of good_correlated.
 TEST_F(LostPictures, AreToldWithTheTimesOfTheNext) {
-  drop(100);
-  drop(180);
-  const data::Fit fit = found();
-  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
-  EXPECT_THAT(fit.verdict_words, AllOf(HasSubstr("1 frame too early from " + time_s(100)),
-                                       HasSubstr("1 frame too early from " + time_s(180))));
+  expect_two_told();
 }
 
 TEST_F(LostPictures, AreToldFromOneThatCameTwice) {
@@ -78,12 +82,7 @@ TEST_F(LostPictures, AreToldWherePositionsErrMostlyAlongOneWay) {
     sample.centre_m += normal(generator) * along;
     sample.covariance_m2 += kAlong_m * kAlong_m * along * along.transpose();
   }
-  drop(100);
-  drop(180);
-  const data::Fit fit = found();
-  EXPECT_EQ(fit.verdict, data::FitVerdict::doubtful);
-  EXPECT_THAT(fit.verdict_words, AllOf(HasSubstr("1 frame too early from " + time_s(100)),
-                                       HasSubstr("1 frame too early from " + time_s(180))));
+  expect_two_told();
 }
 
 // Glitches had turned the parameters, by which frames were told that nothing had happened at.
