@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "find/body_search.hpp"
@@ -18,7 +17,6 @@
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
 #include "trochoid/data/parallel.hpp"
-#include "trochoid/data/pose_motion.hpp"
 
 namespace trochoid::tracking {
 namespace {
