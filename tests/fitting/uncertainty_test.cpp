@@ -260,8 +260,6 @@ TEST(SeveralRecordings, ShareTheBodyAndKeepTheirStarts) {
   EXPECT_EQ(fit(tracks, scene, options).find("l_m")->value, l.value);
 }
 
-// Eight samples to a nutation: the path bends far more between them than they scatter, which no
-// first guess of the noise tells.
 // From what each of them says of the body all had been fitted together: of 60 recordings 60 times.
 TEST(SeveralRecordings, AreFittedTogetherFromAFewOfThemWhereTheseAgree) {
   constexpr int kTracks = 7, kRows = 2 * 250;
@@ -282,6 +280,8 @@ TEST(SeveralRecordings, AreFittedTogetherFromAFewOfThemWhereTheseAgree) {
   EXPECT_LT(together, kTracks);
 }
 
+// Eight samples to a nutation: the path bends far more between them than they scatter, which no
+// first guess of the noise tells.
 TEST(SeveralRecordings, WithoutCovariancesHaveEachItsOwnNoise) {
   constexpr double kDuration_s = 250.0;
   const std::array kNoise_m{2e-5, 2e-4};

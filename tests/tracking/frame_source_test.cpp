@@ -146,7 +146,6 @@ TEST_F(FrameSourceTest, APhoneHeldSidewaysGivesUprightPictures) {
   }
 }
 
-// Matroska counts milliseconds.
 TEST_F(FrameSourceTest, TellsPixelsThatAreNotAsWideAsHigh) {
   const auto film = [&](const std::string& aspect) {
     const fs::path path = folder_ / "film.y4m";
@@ -161,6 +160,7 @@ TEST_F(FrameSourceTest, TellsPixelsThatAreNotAsWideAsHigh) {
   EXPECT_DOUBLE_EQ(film("0:0"), 1.0) << "unknown";
 }
 
+// Matroska counts milliseconds.
 TEST_F(FrameSourceTest, PicturesOfOneTimeAreRefusedUnlessTheRateIsGiven) {
   const fs::path path = write_clip("fast.mkv", "FFV1", 2000.0);
   EXPECT_THAT(error_of(path), IsEmpty()) << "nobody minds";
