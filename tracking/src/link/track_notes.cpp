@@ -131,8 +131,8 @@ std::optional<std::string> note_about_pixel_aspect(const VideoInfo& video) {
   return fmt::format(
       "by what the file says its pixels are {:.4g} times as wide as high, and without a camera "
       "file they are taken for square: lengths and tilts are wrong by as much; make them square "
-      "first (ffmpeg -i VIDEO -vf scale=iw*sar:ih,setsar=1 -crf 12 SQUARE.mp4), or calibrate the "
-      "camera by pictures of a board",
+      "first (ffmpeg -i VIDEO -vf \"scale=2*round(iw*sar/2):ih,setsar=1\" -crf 12 SQUARE.mp4), or "
+      "calibrate the camera by pictures of a board",
       video.pixel_aspect);
 }
 
