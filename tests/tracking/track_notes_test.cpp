@@ -70,6 +70,18 @@ TEST(TrackNotes, ABodyThatIsSomewhereElseAtOnceIsTold) {
   EXPECT_FALSE(note_about_cuts(round_with(0), 2.0)) << "it goes farther than it is large";
 }
 
+// The numbers of pictures that are missing by the file's time stamps are not counted.
+TEST(TrackNotes, ABodyThatGoesOnWhilePicturesAreMissingIsNotSomewhereElseAtOnce) {
+  constexpr int kPictures = 4;
+  constexpr double kRadius_px = 30.0;
+  data::Track track = round_with(kPictures);
+  EXPECT_TRUE(note_about_steps(track, {}));
+  EXPECT_FALSE(note_about_cuts(track, kRadius_px)) << "the steps of its times are told";
+  for (std::size_t i = 40; i < track.samples.size(); ++i) track.samples[i].t_s += 0.025 * kPictures;
+  EXPECT_FALSE(note_about_steps(track, {}));
+  EXPECT_FALSE(note_about_cuts(track, kRadius_px)) << "there was time enough";
+}
+
 TEST(TrackNotes, PixelsThatAreNotSquareAreTold) {
   VideoInfo video;
   EXPECT_FALSE(note_about_pixel_aspect(video));

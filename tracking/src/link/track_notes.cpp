@@ -188,17 +188,34 @@ std::optional<std::string> note_about_edges(const std::vector<BodyPath>& paths,
       std::abs(usual_px), usual_px > 0.0 ? "brighter" : "darker", linear ? "sRGB" : "linear");
 }
 
+namespace {
+
+struct TimedPath {
+  std::vector<double> t_s;
+  Eigen::MatrixX2d at_px;
+};
+
+TimedPath path_of(const data::Track& track) {
+  TimedPath path{.t_s = {}, .at_px = Eigen::MatrixX2d(std::ssize(track.samples), 2)};
+  for (const data::TrackSample& sample : track.samples) {
+    path.at_px.row(std::ssize(path.t_s)) = sample.centre_px;
+    path.t_s.push_back(sample.t_s);
+  }
+  return path;
+}
+
+std::vector<data::PathStep> steps_of_path(const TimedPath& path) {
+  constexpr double kClear = 0.05, kLeast_px = 0.1;
+  return data::clear_path_steps(path.t_s, path.at_px, kClear, kLeast_px);
+}
+
+}  // namespace
+
 std::optional<std::string> note_about_steps(const data::Track& track,
                                             const std::vector<std::int64_t>& known) {
-  constexpr double kClear = 0.05, kLeast_px = 0.1;
   const auto& samples = track.samples;
-  std::vector<double> t_s;
-  Eigen::MatrixX2d at_px(std::ssize(samples), 2);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    t_s.push_back(samples[i].t_s);
-    at_px.row(static_cast<Eigen::Index>(i)) = samples[i].centre_px;
-  }
-  const std::vector<data::PathStep> steps = data::clear_path_steps(t_s, at_px, kClear, kLeast_px);
+  const TimedPath path = path_of(track);
+  const std::vector<data::PathStep> steps = steps_of_path(path);
   if (steps.empty()) return std::nullopt;
   std::vector<std::int64_t> missing = known;
   bool all_missing = true;
@@ -210,7 +227,7 @@ std::optional<std::string> note_about_steps(const data::Track& track,
   std::string note = fmt::format(
       "the body goes on by whole frames at once ({}), as where a recorder dropped pictures, or "
       "wrote some twice, and its times do not show it",
-      data::words_of(steps, t_s));
+      data::words_of(steps, path.t_s));
   std::sort(missing.begin(), missing.end());
   if (all_missing)
     note += fmt::format("; [camera] missing_frames = [{}] puts the times right",
@@ -223,27 +240,33 @@ std::optional<std::string> note_about_cuts(const data::Track& track, double radi
   constexpr std::int64_t kFewFrames = 15;
   constexpr double kRadii = 1.0, kTimesAsFast = 2.0;
   const auto& samples = track.samples;
-  const auto speed_px = [&](std::size_t i) {  // a frame, up to sample i
-    return (samples[i].centre_px - samples[i - 1].centre_px).norm() /
-           static_cast<double>(samples[i].frame - samples[i - 1].frame);
+  const auto way_px = [&](std::size_t i) {  // up to sample i
+    return (samples[i].centre_px - samples[i - 1].centre_px).norm();
   };
-  std::vector<std::int64_t> cuts;
+  // Pictures that are missing by the file's own word have their time, and no number.
+  const auto time_s = [&](std::size_t i) { return samples[i].t_s - samples[i - 1].t_s; };
+  std::vector<std::size_t> cuts;
   for (std::size_t i = kBeside + 1; i + kBeside < samples.size(); ++i) {
-    const std::int64_t frames = samples[i].frame - samples[i - 1].frame;
-    const double way_px = (samples[i].centre_px - samples[i - 1].centre_px).norm();
-    if (frames > kFewFrames || way_px < kRadii * radius_px) continue;
-    double fastest_px = 0.0;
+    if (samples[i].frame - samples[i - 1].frame > kFewFrames || way_px(i) < kRadii * radius_px)
+      continue;
+    double fastest_px_s = 0.0;
     for (std::size_t k = 1; k <= kBeside; ++k)
-      fastest_px = std::max({fastest_px, speed_px(i - k), speed_px(i + k)});
-    if (way_px > kTimesAsFast * fastest_px * static_cast<double>(frames))
-      cuts.push_back(samples[i].frame);
+      for (const std::size_t beside : {i - k, i + k})
+        fastest_px_s = std::max(fastest_px_s, way_px(beside) / time_s(beside));
+    if (way_px(i) > kTimesAsFast * fastest_px_s * time_s(i)) cuts.push_back(i);
   }
+  // Where it goes on along its way, pictures were dropped, and that is told.
+  if (!cuts.empty())
+    for (const data::PathStep& step : steps_of_path(path_of(track)))
+      std::erase(cuts, static_cast<std::size_t>(step.sample));
   if (cuts.empty()) return std::nullopt;
+  std::vector<std::int64_t> frames;
+  for (const std::size_t i : cuts) frames.push_back(samples[i].frame);
   return fmt::format(
       "the body is somewhere else at once from frame {} on: where the film is cut, or the body is "
       "thrown again, no motion leads from one part to the next; track each by itself (from, to), "
       "unless its shadow or another thing is followed in one of them",
-      fmt::join(cuts, ", from "));
+      fmt::join(frames, ", from "));
 }
 
 std::optional<std::string> note_about_lost(const BodyPath& path, const FramesRead& read,
