@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <string>
 
 namespace trochoid::tracking {
@@ -80,6 +82,23 @@ TEST(TrackNotes, ABodyThatGoesOnWhilePicturesAreMissingIsNotSomewhereElseAtOnce)
   for (std::size_t i = 40; i < track.samples.size(); ++i) track.samples[i].t_s += 0.025 * kPictures;
   EXPECT_FALSE(note_about_steps(track, {}));
   EXPECT_FALSE(note_about_cuts(track, kRadius_px)) << "there was time enough";
+}
+
+// "Gets 1 % larger and smaller", where it but grew.
+TEST(TrackNotes, AZoomIsToldByHowMuchThePictureChangesInSize) {
+  std::map<std::int64_t, PictureShift> shifts;
+  for (const std::int64_t frame : {0, 1, 2, 3}) {
+    shifts[frame].px = {0.1 * static_cast<double>(frame), 0.0};
+    shifts[frame].growth = -0.004 * static_cast<double>(frame);
+  }
+  EXPECT_THAT(note_about_camera_motion(shifts, 4, true).value_or(""),
+              AllOf(HasSubstr("changes by 1.2 % in size"), HasSubstr("at most 0.3 px"),
+                    HasSubstr("lock focus and zoom"), Not(HasSubstr("does not tell"))));
+  for (auto& [frame, shift] : shifts) shift.growth = 0.0;
+  EXPECT_THAT(note_about_camera_motion(shifts, 40, true).value_or(""),
+              AllOf(HasSubstr("the camera moves"), HasSubstr("fasten the camera"),
+                    HasSubstr("in 36 of 40 frames the floor does not tell")));
+  EXPECT_FALSE(note_about_camera_motion({}, 4, true));
 }
 
 TEST(TrackNotes, PixelsThatAreNotSquareAreTold) {

@@ -151,12 +151,12 @@ std::optional<std::string> note_about_camera_motion(
   const std::string moves = fmt::format(
       "by {:.2g} px rms, at most {:.2g} px, and {:.2g} px from the beginning to the end",
       std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
-  std::string words =
-      grows ? fmt::format(
-                  "the camera focuses or zooms: the picture of the floor gets {:.2g} % "
-                  "larger and smaller, and its middle moves {}",
-                  100.0 * (most - least), moves)
-            : "the camera moves: the picture of the floor " + moves;
+  std::string words = grows
+                          ? fmt::format(
+                                "the camera focuses or zooms: the picture of the floor changes by "
+                                "{:.2g} % in size, and its middle moves {}",
+                                100.0 * (most - least), moves)
+                          : "the camera moves: the picture of the floor " + moves;
   words += fmt::format(
       "; {}; {}",
       metres ? "metres are those of a camera that stands still, as a whole known no better than to "
