@@ -85,16 +85,21 @@ TEST(TrackNotes, ABodyThatGoesOnWhilePicturesAreMissingIsNotSomewhereElseAtOnce)
 }
 
 // "Gets 1 % larger and smaller", where it but grew.
-TEST(TrackNotes, AZoomIsToldByHowMuchThePictureChangesInSize) {
+TEST(TrackNotes, AZoomIsToldByHowMuchThePictureChangesInSizeAndATurnByItsAngle) {
   std::map<std::int64_t, PictureShift> shifts;
   for (const std::int64_t frame : {0, 1, 2, 3}) {
     shifts[frame].px = {0.1 * static_cast<double>(frame), 0.0};
-    shifts[frame].growth = -0.004 * static_cast<double>(frame);
+    shifts[frame].factor = 1.0 - 0.004 * static_cast<double>(frame);
   }
   EXPECT_THAT(note_about_camera_motion(shifts, 4, true).value_or(""),
               AllOf(HasSubstr("changes by 1.2 % in size"), HasSubstr("at most 0.3 px"),
                     HasSubstr("lock focus and zoom"), Not(HasSubstr("does not tell"))));
-  for (auto& [frame, shift] : shifts) shift.growth = 0.0;
+  for (auto& [frame, shift] : shifts)
+    shift.factor = std::polar(1.0, data::radians(0.2) * static_cast<double>(frame));
+  EXPECT_THAT(note_about_camera_motion(shifts, 4, true).value_or(""),
+              AllOf(HasSubstr("the camera turns: the picture of the floor turns by 0.6 deg, and"),
+                    HasSubstr("fasten the camera")));
+  for (auto& [frame, shift] : shifts) shift.factor = 1.0;
   EXPECT_THAT(note_about_camera_motion(shifts, 40, true).value_or(""),
               AllOf(HasSubstr("the camera moves"), HasSubstr("fasten the camera"),
                     HasSubstr("in 36 of 40 frames the floor does not tell")));

@@ -72,10 +72,12 @@ bool lies(const BodyPath& path) {
   return spread(roundness) < kAsRound && spread(along) < kTurned && spread(across) < kTurned;
 }
 
-/// Codecs hold back what hardly changes in a picture, and with it some of the shift.
+/// Codecs hold back what hardly changes in a picture, and with it some of the shift, but no more
+/// than goes without notice.
 double sigma2_px2(const PictureShift& shift) {
-  constexpr double kHeldBack = 0.15;
-  return shift.sigma_px * shift.sigma_px + kHeldBack * kHeldBack * shift.px.squaredNorm();
+  constexpr double kHeldBack = 0.15, kNoticed_px = 1.0;
+  return std::pow(shift.sigma_px, 2) +
+         std::pow(kHeldBack * std::min(shift.px.norm(), kNoticed_px), 2);
 }
 
 /// Of the frame, or of the one nearest to it in which the floor told, known the worse the farther
@@ -93,8 +95,19 @@ PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts, std::i
   return shift;
 }
 
-/// A pose as a camera that stands still would have seen it, but for its tilt: some pixels turn the
-/// view by next to nothing.
+/// What a picture that has gone by so much says of the attitude: a camera that has leaned sees it
+/// from elsewhere, one that has gone sideways does not, and the floor does not tell which.
+void allow_for_leaning(const PictureShift& shift, const data::Camera& camera,
+                       PoseMeasurement& measured) {
+  constexpr double kPart = 0.5, kLeastTilt_rad = 1e-3;
+  if (camera.projection == data::Camera::Projection::orthographic) return;
+  const double sigma_rad = kPart * shift.px.norm() / camera.fx;
+  const double across = std::max(std::sin(measured.pose.theta_rad), kLeastTilt_rad);
+  measured.sigma_theta_rad = std::hypot(measured.sigma_theta_rad, sigma_rad);
+  measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, sigma_rad / across);
+}
+
+/// A pose as a camera that stands still would have seen it, but for how that leans.
 void take_back(const PictureShift& shift, const AssemblyOptions& options,
                PoseMeasurement& measured) {
   data::Pose<>& pose = measured.pose;
@@ -104,7 +117,13 @@ void take_back(const PictureShift& shift, const AssemblyOptions& options,
   pose.centre_m.head<2>() -= m_per_px * shift.px;
   const Eigen::Matrix2d covariance_m2 = sigma2_px2(shift) * m_per_px * m_per_px.transpose();
   measured.covariance_m2 += covariance_m2;
-  if (!options.pivot_m) return;
+  allow_for_leaning(shift, *options.camera, measured);
+  if (!options.pivot_m) {
+    // The image's y points down, the table's up.
+    pose.phi_rad -= std::copysign(std::arg(shift.factor), m_per_px.determinant());
+    measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, shift.sigma_factor);
+    return;
+  }
   const Eigen::Vector2d from_m = before_m - *options.pivot_m,
                         to_m = pose.centre_m.head<2>() - *options.pivot_m;
   const double turn_rad =

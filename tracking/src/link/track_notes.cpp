@@ -136,33 +136,60 @@ std::optional<std::string> note_about_pixel_aspect(const VideoInfo& video) {
       video.pixel_aspect);
 }
 
+namespace {
+
+struct Range {
+  double least = 0.0, most = 0.0;
+  void add(double value) {
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  [[nodiscard]] double width() const { return most - least; }
+};
+
+// Both, unless one is small beside the other.
+std::string how_it_warps(double growth, double turn_rad) {
+  constexpr double kSmall = 0.3;
+  std::string words;
+  if (growth > kSmall * turn_rad)
+    words = fmt::format("changes by {:.2g} % in size", 100.0 * growth);
+  if (turn_rad > kSmall * growth)
+    words +=
+        fmt::format("{}turns by {:.2g} deg", words.empty() ? "" : " and ", data::degrees(turn_rad));
+  return words;
+}
+
+}  // namespace
+
 std::optional<std::string> note_about_camera_motion(
     const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frames, bool metres) {
   if (shifts.empty()) return std::nullopt;
-  double squares = 0.0, farthest_px = 0.0, least = 0.0, most = 0.0;
+  double squares = 0.0, farthest_px = 0.0;
+  Range growth, turn_rad;
   for (const auto& [index, shift] : shifts) {
     squares += shift.px.squaredNorm();
     farthest_px = std::max(farthest_px, shift.px.norm());
-    least = std::min(least, shift.growth);
-    most = std::max(most, shift.growth);
+    growth.add(std::abs(shift.factor) - 1.0);
+    turn_rad.add(std::arg(shift.factor));
   }
   const Eigen::Vector2d gone_px = shifts.rbegin()->second.px - shifts.begin()->second.px;
-  const bool grows = most > least;
   const std::string moves = fmt::format(
       "by {:.2g} px rms, at most {:.2g} px, and {:.2g} px from the beginning to the end",
       std::sqrt(squares / static_cast<double>(shifts.size())), farthest_px, gone_px.norm());
-  std::string words = grows
-                          ? fmt::format(
-                                "the camera focuses or zooms: the picture of the floor changes by "
-                                "{:.2g} % in size, and its middle moves {}",
-                                100.0 * (most - least), moves)
-                          : "the camera moves: the picture of the floor " + moves;
+  const bool warps = growth.width() > 0.0 || turn_rad.width() > 0.0;
+  const bool grows = growth.width() > turn_rad.width();
+  std::string words = "the camera moves: the picture of the floor " + moves;
+  if (warps)
+    words = fmt::format("{}: the picture of the floor {}, and its middle moves {}",
+                        grows ? "the camera focuses or zooms" : "the camera turns",
+                        how_it_warps(growth.width(), turn_rad.width()), moves);
   words += fmt::format(
       "; {}; {}",
-      metres ? "metres are those of a camera that stands still, as a whole known no better than to "
-               "some tenths of that (a top's precession and spin go along); pixels and tilts are "
-               "left as they are"
-             : "pixels are left as they are",
+      metres
+          ? "metres and precession are those of a camera that stands still, as a whole known no "
+            "better than to some tenths of that; tilts are left as they are, with error bars for a "
+            "camera that leans, and pixels"
+          : "pixels are left as they are",
       grows ? "lock focus and zoom" : "fasten the camera");
   constexpr double kNearlyAll = 0.9;
   if (const auto told = static_cast<std::int64_t>(shifts.size());
