@@ -334,12 +334,18 @@ std::map<std::int64_t, PictureShift> CameraMotion::shifts() const {
     if (series->looks.size() < kFewest || !moves(*series, disagree_px)) continue;
     const Eigen::Vector4d rest = at_rest(series->looks, reach_px());
     const double of_quarters_px = disagree_px / std::sqrt(kQuarters);
+    constexpr double kAtOnce_px = 0.5;
     std::map<std::int64_t, PictureShift> shifts;
+    Eigen::Vector2d last_px = rest.head<2>(), jumped_px = Eigen::Vector2d::Zero();
     for (const auto& [index, look] : series->looks) {
       PictureShift& shift = shifts[index];
       shift.factor = look.factor / std::complex<double>(rest(2), rest(3));
       shift.px = look.shift_px - times(shift.factor, rest.head<2>());
       shift.sigma_px = std::hypot(look.sigma_px, of_quarters_px);
+      const Eigen::Vector2d step_px = look.shift_px - last_px;
+      if (step_px.norm() > kAtOnce_px) jumped_px += step_px;
+      shift.crept_px = (shift.px - jumped_px).norm();
+      last_px = look.shift_px;
       if (!series->warps) continue;
       shift.sigma_factor = std::hypot(look.sigma_factor, of_quarters_px / reach_px());
       shift.about_px = middle_px_;
@@ -353,7 +359,9 @@ PictureShift PictureShift::at(const Eigen::Vector2d& place_px) const {
   PictureShift there = *this;
   const Eigen::Vector2d from_px = place_px - about_px;
   // A place that is seen where it has gone to.
-  there.px += times((factor - 1.0) / factor, from_px - px);
+  const Eigen::Vector2d further_px = times((factor - 1.0) / factor, from_px - px);
+  there.px += further_px;
+  there.crept_px += further_px.norm();
   there.sigma_px = std::hypot(sigma_px, sigma_factor * from_px.norm());
   there.about_px = place_px;
   return there;

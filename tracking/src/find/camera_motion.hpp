@@ -17,6 +17,7 @@ namespace trochoid::tracking {
 struct PictureShift {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;  ///< of either component
+  double crept_px = 0.0;  ///< how much of it came little by little
   /// By how much the picture is larger than at rest and turned (right on the screen): what lies d =
   /// x + iy from about_px at rest lies factor d from where that has gone to.
   std::complex<double> factor = 1.0;

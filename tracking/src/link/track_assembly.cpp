@@ -72,12 +72,10 @@ bool lies(const BodyPath& path) {
   return spread(roundness) < kAsRound && spread(along) < kTurned && spread(across) < kTurned;
 }
 
-/// Codecs hold back what hardly changes in a picture, and with it some of the shift, but no more
-/// than goes without notice.
+/// Codecs hold back what hardly changes in a picture, and with it some of what creeps.
 double sigma2_px2(const PictureShift& shift) {
-  constexpr double kHeldBack = 0.15, kNoticed_px = 1.0;
-  return std::pow(shift.sigma_px, 2) +
-         std::pow(kHeldBack * std::min(shift.px.norm(), kNoticed_px), 2);
+  constexpr double kHeldBack = 0.15;
+  return std::pow(shift.sigma_px, 2) + std::pow(kHeldBack * shift.crept_px, 2);
 }
 
 /// Of the frame, or of the one nearest to it in which the floor told, known the worse the farther
