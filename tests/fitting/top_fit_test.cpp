@@ -200,6 +200,26 @@ TEST(TopFit, FindsAPivotFarFromWhereThePathSuggestsIt) {
   }
 }
 
+// The least length it may have was taken from the table's origin: five metres away that was where
+// it began, and of starts as far off as these a good third led nowhere.
+TEST(TopFit, IsShotInSegmentsWhereverItsPivotIs) {
+  Planted planted;
+  planted.pivot_m = {4.0, -3.0};
+  const data::Track track = planted_track(planted);
+  for (int signs = 0; signs < 8; ++signs) {
+    FitOptions options;
+    options.strategy = Strategy::multiple;
+    options.start = kThesis;
+    for (int bit = 0; const char* name : {"a_1_s2", "b_1_s", "l_m"})
+      options.start[name] *= (signs >> bit++ & 1) != 0 ? 1.4 : 0.6;
+    const data::Fit result = fit_one(track, top_scene(planted.pivot_m), options);
+    ASSERT_TRUE(result.converged) << signs << ": " << result.reason;
+    EXPECT_EQ(result.start_path, "multiple_shooting");
+    for (const char* name : {"a_1_s2", "b_1_s", "l_m"})
+      EXPECT_LT(pull(result, name, kThesis.at(name)), kFar) << signs << ": " << name;
+  }
+}
+
 TEST(TopFit, ShrugsOffGlitches) {
   data::Track track = planted_track({});
   for (std::size_t i = 7; i < track.samples.size(); i += 31) track.samples[i].centre_m.x() += 0.02;

@@ -9,17 +9,22 @@
 namespace trochoid::fitting {
 namespace {
 
-// The state of a top at an instant from the smoothed path: r = l sin(theta), the axis above the
-// horizontal, x y' - y x' = r^2 dphi and r r' = l^2 sin(theta) cos(theta) dtheta.
-NodeStarter nodes_of(const Problem& problem) {
-  const ArcData& arc = problem.arcs[0];
+Eigen::MatrixXd places_about_pivot_m(const Problem& problem) {
   const model::Predictor& predictor = *problem.predictor;
-  Eigen::MatrixXd xy = arc.positions_m();
+  Eigen::MatrixXd xy = problem.arcs[0].positions_m();
   const int px = predictor.index_of("pivot_x_m"), py = predictor.index_of("pivot_y_m");
   if (px >= 0) xy.col(0).array() -= problem.base[0][px];
   if (py >= 0) xy.col(1).array() -= problem.base[0][py];
-  return [&predictor, t_s = arc.t_s, curve = smooth_auto(arc.t_s, xy)](double t,
-                                                                       Eigen::VectorXd& values) {
+  return xy;
+}
+
+// The state of a top at an instant from the smoothed path: r = l sin(theta), the axis above the
+// horizontal, x y' - y x' = r^2 dphi and r r' = l^2 sin(theta) cos(theta) dtheta.
+NodeStarter nodes_of(const Problem& problem) {
+  const model::Predictor& predictor = *problem.predictor;
+  const std::vector<double>& times_s = problem.arcs[0].t_s;
+  return [&predictor, t_s = times_s, curve = smooth_auto(times_s, places_about_pivot_m(problem))](
+             double t, Eigen::VectorXd& values) {
     const auto place = std::lower_bound(t_s.begin(), t_s.end(), t) - t_s.begin();
     const auto i = std::min<Eigen::Index>(place, curve.value.rows() - 1);
     const double x = curve.value(i, 0), y = curve.value(i, 1);
@@ -46,7 +51,7 @@ Found shoot_over(const Problem& problem, const Problem& started, double over_nut
   const int window = std::clamp(static_cast<int>(share * all), std::min(24, all), all);
   own.arcs[0] = arc.slice(0, window);
   // Shorter than the path reaches out no l can be.
-  const double reach = own.arcs[0].positions_m().rowwise().norm().maxCoeff();
+  const double reach = places_about_pivot_m(own).rowwise().norm().maxCoeff();
   double& l = own.base[0][own.predictor->index_of("l_m")];
   l = std::max(l, 1.05 * reach);
   Found best;
