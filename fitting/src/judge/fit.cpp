@@ -37,6 +37,7 @@ namespace {
 // step astray.
 Problem without_outliers(Problem problem) {
   for (ArcData& arc : problem.arcs) arc = arc.keep(consistent_samples(arc));
+  for (Eigen::VectorXd& of_all : problem.row_weights) of_all.resize(0);
   return problem;
 }
 
