@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
 
 #include "choose/exchange.hpp"
@@ -115,6 +116,22 @@ TEST_F(Contested, ACreepIsNotSearchedForAfterASearchInVainWithAllThatUsuallyActs
   };
   constexpr int kTimesAsMany = 2;  // and mostly far more
   EXPECT_GT(lines_logged(false), kTimesAsMany * lines_logged(true));
+}
+
+// A test for whiteness that fails by little is no reason to leave out what the error bars allow
+// for: an air couple that stood for another that grows with the square of the speed as well had
+// been 14 of them off.
+TEST_F(Contested, WhatStandsBesideARungIsFittedWhereResidualsHangTogetherNextToNothing) {
+  const auto names_beside = [&](double whiteness_p) {
+    Rungs rungs{fitted({term("air force"), term("pivoting friction")})};
+    rungs[0].fit.whiteness_p = whiteness_p;
+    (void)exchange_while_worth(contest_, rungs);
+    std::set<std::string> names;
+    for (const Rung& rung : rungs) names.insert(rung.name);
+    return names;
+  };
+  EXPECT_GT(names_beside(0.5).size(), 1u);
+  EXPECT_EQ(names_beside(5e-3), names_beside(0.5));
 }
 
 // Residuals that hang together are no ground to fit them, and yet which loss acts may be open.

@@ -31,14 +31,16 @@ bool counts_in_error_bars(const ScoreTest::Change& change, double gained) {
 
 // Whether a score-tested change of a known rung may come to something. One that hardly follows the
 // track has to be mended for a good part. Where what is left hangs together, a further term may be
-// what is missing, and all that it takes away counts; what takes the place of another, or stands
-// beside a rung that leaves noise, may do as well as that. So may what differs by more terms, but
-// of that only what is expected to do as well.
+// what is missing, and all that it takes away counts; no other does, as in the error bars
+// (rivals.cpp). What takes the place of another, or stands beside a rung that leaves next to
+// nothing but noise, may do as well as that. So may what differs by more terms, but of that only
+// what is expected to do as well.
 bool worth_a_fit(const Rung& known, double inflation, const ScoreTest& test,
                  const ScoreTest::Change& change, const Difference& by) {
   const double gained = gain(test, change), paid = price(test, change);
   if (leaves_much(known)) return gained > kGoodPart * test.before;
-  if (by.larger() && known.fit.whiteness_p < kWhite) return gained > paid;
+  if (by.larger() && known.fit.whiteness_p < kWhite && gained > paid) return true;
+  if (by.larger() && !leaves_independent(known, inflation)) return false;
   if (by.larger() && counts_in_error_bars(change, gained / inflation)) return true;
   const double against = paid - gained / inflation;
   if (by.larger()) return against < most_evidence_against(known);
@@ -57,9 +59,10 @@ bool has_idle_terms(const std::map<int, Terms>& sets, int key,
 
 // Whether a further loss need not be fitted to know what it comes to. Where a body slides that is
 // dear.
-bool gains_nothing(const Rung& known, double gained, int parameters, const Difference& by) {
+bool gains_nothing(const Rung& known, double inflation, double gained, int parameters,
+                   const Difference& by) {
   constexpr double kByChance = 1.0;  // what a parameter gains of chi-square
-  return by.larger() && known.fit.model == "sliding" && known.fit.whiteness_p >= kWhite &&
+  return by.larger() && known.fit.model == "sliding" && leaves_independent(known, inflation) &&
          gained < kByChance * parameters;
 }
 
@@ -111,7 +114,7 @@ std::vector<Neighbour> worth_exchanging(const Contest& contest, const Rung& know
     const bool near = by.larger() || by.exchanged();
     if (!near && (far >= kMostFar || has_idle_terms(sets, key, bic))) continue;
     const double gained = gain(*test, change(key)) / inflation;
-    if (gains_nothing(known, gained, change(key).parameters, by)) {
+    if (gains_nothing(known, inflation, gained, change(key).parameters, by)) {
       add_score_tested(score_tested(contest, known, terms, *test, change(key), inflation), rungs);
       continue;
     }
@@ -148,13 +151,15 @@ const Rung* exchange_terms(const Contest& contest, const Rung& known, Rungs& run
   constexpr std::size_t kFirst = 2;
   fit_stuck_anew(contest, known, rungs);
   const std::vector<Neighbour> worth = worth_exchanging(contest, known, rungs);
+  std::span<const Neighbour> open = worth;
   // Where something is missing, the likeliest leads on, and changes what the others gain.
-  if (known.fit.whiteness_p < kWhite && worth.size() > kFirst) {
-    add_neighbours(contest, std::span(worth).first(kFirst), known, rungs);
+  if (known.fit.whiteness_p < kWhite && open.size() > kFirst) {
+    add_neighbours(contest, open.first(kFirst), known, rungs);
     const Rung* best = simplest_sufficient(contest.ladder, rungs);
     if (best->fit.converged && best->bic < known.bic - kVeryStrong) return best;
+    open = open.subspan(kFirst);
   }
-  add_neighbours(contest, worth, known, rungs);
+  add_neighbours(contest, open, known, rungs);
   return simplest_sufficient(contest.ladder, rungs);
 }
 

@@ -74,7 +74,7 @@ struct Standing {
         acts(adds_only(likely(grounds), rung, chosen)),
         open(larger && adds_only(grounds.usual, rung, chosen) &&
              leaves_open(rung, chosen, grounds.losses)),
-        independent(chosen.fit.whiteness_p >= kWhite || grounds.inflation < kNearlyIndependent),
+        independent(leaves_independent(chosen, grounds.inflation)),
         slips(chosen.rolls_at_first && !rung.rolls_at_first && rung.terms == chosen.terms) {}
   bool larger;       // has all of the chosen rung's terms, and further ones or another minimum
   bool too_large;    // there is strong evidence against it, for that

@@ -37,6 +37,10 @@ bool leaves_much(const Rung& rung) {
          rung.fit.verdict == data::FitVerdict::unexplained;
 }
 
+bool leaves_independent(const Rung& rung, double inflation) {
+  return rung.fit.whiteness_p >= kWhite || inflation < kNearlyIndependent;
+}
+
 bool explains(const Rung& rung) {
   constexpr double kTrackersOwn = 1.3;
   return rung.fitted && !leaves_much(rung) &&

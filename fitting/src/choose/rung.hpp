@@ -109,6 +109,10 @@ void allow_for_rivals(const Rungs& rungs, const Rung& chosen, data::Fit& fit,
 /// Whether a rung's verdict is doubtful or unexplained: it hardly follows the track.
 [[nodiscard]] bool leaves_much(const Rung& rung);
 
+/// Whether what a rung leaves is white, or hangs together next to nothing.
+/// @param inflation  variance_inflation() of the rung.
+[[nodiscard]] bool leaves_independent(const Rung& rung, double inflation);
+
 /// How a rung is looked for: searched for where the solution below does not lead to it, or not.
 enum class Reach { search, from_below };
 
