@@ -174,6 +174,28 @@ TEST_F(Contested, UsualLossesOfWhichTheSceneSaysMoreAreNotTested) {
   }
 }
 
+// A search had ended elsewhere before the way up led there: the rung was fitted once more from its
+// own solution, and counted twice among those that are as likely.
+TEST_F(Contested, OfTwoRungsWithTheSameTermsTheLikelierOneIsKnown) {
+  const Rung good = fitted({term("air force"), term("pivoting friction")});
+  Rung elsewhere = good;
+  elsewhere.bic = elsewhere.fit.bic = good.bic + 1e3;
+  for (Rungs rungs : {Rungs{elsewhere, good}, Rungs{good, elsewhere}}) {
+    EXPECT_EQ(known_rung(rungs, good.terms)->bic, good.bic);
+    EXPECT_FALSE(is_open({good.terms, {values_of(good.fit), 0.0}}, good, rungs));
+  }
+}
+
+TEST_F(Contested, ARungThatIsFittedAnewWasSearchedForInVainAllTheSame) {
+  const Rung known = fitted({term("air force"), term("pivoting friction")});
+  Rung rung =
+      rung_with(ladder_, {term("air force"), term("pivoting friction"), term("air couple")});
+  rung.in_vain = true;
+  fit_or_better(contest_, known, {}, rung);
+  EXPECT_TRUE(rung.fitted);
+  EXPECT_TRUE(rung.in_vain);
+}
+
 // A later test, beside another rung, had taken the place of a better one.
 TEST_F(Contested, OfTwoScoreTestsForTheSameTermsTheBetterOneStays) {
   Rung tested = rung_with(ladder_, {term("air force")});

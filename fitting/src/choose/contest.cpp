@@ -13,12 +13,15 @@ namespace trochoid::fitting {
 
 namespace {
 
-// The rung with these terms that is only score-tested, or that is not; null where there is none.
+// The likeliest rung with these terms that is only score-tested, or that is not; null where there
+// is none.
 Rung* rung_of(Rungs& rungs, const Terms& terms, bool by_score_test) {
-  const auto found = std::find_if(rungs.begin(), rungs.end(), [&](const Rung& rung) {
-    return rung.terms == terms && rung.by_score_test == by_score_test;
-  });
-  return found != rungs.end() ? &*found : nullptr;
+  Rung* likeliest = nullptr;
+  for (Rung& rung : rungs)
+    if (rung.terms == terms && rung.by_score_test == by_score_test &&
+        (likeliest == nullptr || rung.bic < likeliest->bic))
+      likeliest = &rung;
+  return likeliest;
 }
 
 // A rung with these terms, not fitted yet: a new one, or in the place of one that was only
@@ -61,6 +64,7 @@ void fit_or_better(const Contest& contest, const Rung& known, const FitOptions& 
                    const Nearby& near) {
   Rung again = rung_with(contest.ladder, rung.terms);
   again.fitted_anew = rung.fitted_anew;
+  again.in_vain = rung.in_vain;
   fit_neighbour(contest.tracks, known, options, again, near);
   if (!rung.fitted || again.bic < rung.bic) rung = std::move(again);
 }

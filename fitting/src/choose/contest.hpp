@@ -50,7 +50,8 @@ void fit_or_better(const Contest& contest, const Rung& known, const FitOptions& 
 std::vector<const Rung*> add_neighbours(const Contest& contest, std::span<const Neighbour> wanted,
                                         const Rung& known, Rungs& rungs);
 
-/// The rung with these terms that is not only score-tested; null where there is none.
+/// The likeliest rung with these terms that is not only score-tested: a way up may lead where a
+/// search did not. Null where there is none.
 [[nodiscard]] Rung* known_rung(Rungs& rungs, const Terms& terms);
 [[nodiscard]] bool is_known(const Rungs& rungs, const Terms& terms);
 
