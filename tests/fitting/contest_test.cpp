@@ -11,8 +11,10 @@
 #include "choose/leave_out.hpp"
 #include "choose/slide.hpp"
 #include "choose/terms.hpp"
+#include "problem/problem.hpp"
 #include "reference_motion.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/model/predictor.hpp"
 
 namespace trochoid::fitting {
 namespace {
@@ -132,6 +134,31 @@ TEST_F(Contested, WhatStandsBesideARungIsFittedWhereResidualsHangTogetherNextToN
   };
   EXPECT_GT(names_beside(0.5).size(), 1u);
   EXPECT_EQ(names_beside(5e-3), names_beside(0.5));
+}
+
+// What it loses was only found once it was let slide, with a slip at first that ends between two
+// samples: neither how strong friction is came out nor any rate.
+TEST_F(Contested, ABodyThatNeedNotSlideRollsWithTheLossesItWasFoundToHave) {
+  const Terms losses{term("air force"), term("pivoting friction")};
+  const Rung rolling = fitted(losses);
+  Terms terms = losses;
+  terms.insert(term("sliding"));
+  Rungs rungs{rung_with(ladder_, terms)};
+  std::map<std::string, double> start = values_of(rolling.fit);
+  const auto predictor = model::make_predictor(rungs[0].scene);
+  const Eigen::Vector2d v_m_s =
+      rolling_velocity(*predictor, fitted_values(*predictor, rolling.fit)).m_s;
+  start["friction"] = 0.9;
+  start["w3_rad_s"] += 1.0;
+  start["vx_m_s"] = v_m_s.x();
+  start["vy_m_s"] = v_m_s.y();
+  fit_from_values(tracks_, start, {}, rungs[0]);
+  ASSERT_TRUE(explains(rungs[0])) << rungs[0].reason;
+  ASSERT_TRUE(roll_instead(contest_, rungs[0], rungs));
+  const Rung* chosen = simplest_sufficient(ladder_, rungs);
+  EXPECT_EQ(chosen->terms, losses);
+  EXPECT_NEAR(chosen->fit.chi2, rolling.fit.chi2, 0.1);
+  EXPECT_FALSE(roll_instead(contest_, *chosen, rungs));
 }
 
 // Residuals that hang together are no ground to fit them, and yet which loss acts may be open.

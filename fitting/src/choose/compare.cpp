@@ -153,6 +153,8 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   if (chosen != nullptr &&
       (creep_instead(contest, *chosen, rungs) || soften_instead(contest, *chosen, rungs)))
     chosen = exchange_while_worth(contest, rungs);
+  if (chosen != nullptr && roll_instead(contest, *chosen, rungs))
+    chosen = exchange_while_worth(contest, rungs);
   if (chosen == nullptr) {
     Comparison none{rungs[0].fit, rungs[0].scene};
     none.fit.comparison = table_of(rungs, nullptr);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -382,6 +383,62 @@ void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
       fit_softly(tracks, own, rung);
     else
       take(draft_one_of_several(tracks, rung.scene, own), rung);
+    rung.fitted = usable(rung.fit);
+  });
+}
+
+namespace {
+
+// Values by name when a sliding body has come to roll, carried back to where its record begins at
+// the rates it has then; nothing where it still slips after so many samples.
+std::optional<Values> as_if_rolling_all_along(const Rung& sliding, double frame_s) {
+  constexpr double kStill = 1e-3;  // of the speed of its size
+  constexpr int kMost = 32;
+  const auto predictor = model::make_predictor(sliding.scene);
+  Eigen::VectorXd values = fitted_values(*predictor, sliding.fit);
+  std::vector<int> state;
+  for (int i = 0; i < values.size(); ++i)
+    if (predictor->parameters()[i].role == model::ParameterInfo::Role::initial) state.push_back(i);
+  const double speed_m_s =
+      std::sqrt(sliding.scene.model.gravity_m_s2 * sliding.scene.body->radius_m);
+  const auto value = [&](const char* name) -> double& { return values[predictor->index_of(name)]; };
+  model::PredictRequest request;
+  request.want_end_state = true;
+  request.rolls_at_first = sliding.rolls_at_first;
+  const Eigen::VectorXd start = values;
+  for (int sample = 0; sample <= kMost; ++sample) {
+    const std::array<double, 1> at_s{sample * frame_s};
+    request.t_s = at_s;
+    const Eigen::VectorXd there = predictor->predict(start, request).end_state;
+    if (there.size() != std::ssize(state)) return std::nullopt;  // it has ended
+    values(state) = there;
+    const Eigen::Vector2d v_m_s(value("vx_m_s"), value("vy_m_s"));
+    if (!((v_m_s - rolling_velocity(*predictor, values).m_s).norm() < kStill * speed_m_s)) continue;
+    value("x_m") -= at_s[0] * v_m_s.x();
+    value("y_m") -= at_s[0] * v_m_s.y();
+    value("phi_rad") -= at_s[0] * value("w2_rad_s") / std::sin(value("theta_rad"));
+    value("theta_rad") -= at_s[0] * value("w1_rad_s");
+    Values named;
+    for (int i = 0; i < values.size(); ++i) named[predictor->parameters()[i].name] = values[i];
+    return named;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void fit_rolling(std::span<const data::Track> tracks, const Rung& sliding,
+                 const FitOptions& options, Rung& rung) {
+  try_rung(rung, [&] {
+    const auto values = as_if_rolling_all_along(sliding, frame_time_s(tracks));
+    if (!values) return;
+    FitOptions own = options;
+    start_from_other_model(*values, own);
+    for (const Strategy strategy : {Strategy::single, Strategy::growing}) {
+      own.strategy = strategy;
+      keep_better(draft_one_of_several(tracks, rung.scene, own), rung);
+      if (usable(rung.fit) && !leaves_much(rung)) break;
+    }
     rung.fitted = usable(rung.fit);
   });
 }

@@ -163,6 +163,12 @@ void fit_creeping(std::span<const data::Track> tracks, const Rung& rolling,
 void fit_softly_beside(std::span<const data::Track> tracks, const Rung& known,
                        const FitOptions& options, Rung& rung);
 
+/// Fits a rolling rung with the losses of a known one that slides, of one arc, from where that
+/// rolls, which it may from the beginning: followed back from there as if it had. Not fitted where
+/// that never rolls.
+void fit_rolling(std::span<const data::Track> tracks, const Rung& sliding,
+                 const FitOptions& options, Rung& rung);
+
 /// Fits a rung from near its solution.
 void fit_from_values(std::span<const data::Track> tracks,
                      const std::map<std::string, double>& values, const FitOptions& options,

@@ -164,4 +164,27 @@ bool soften_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
   return true;
 }
 
+bool roll_instead(const Contest& contest, const Rung& chosen, Rungs& rungs) {
+  constexpr double kSurelyThere_sigmas = 4.0;
+  constexpr double kMost = 1.0;  // hardly any floor grips more
+  const data::FitParameter* friction = chosen.fit.find("friction");
+  if (chosen.fit.model != "sliding" || !explains(chosen) || chosen.fit.arcs.size() != 1 ||
+      friction == nullptr ||
+      (friction->value < kMost && friction->value > kSurelyThere_sigmas * friction->sigma))
+    return false;
+  Terms terms = chosen.terms;
+  std::erase_if(terms, [&](int index) {
+    return contest.ladder.terms[static_cast<std::size_t>(index)].last_resort;
+  });
+  Rung* const before = known_rung(rungs, terms);
+  if (before != nullptr && explains(*before)) return false;
+  Rung rolls = rung_with(contest.ladder, terms);
+  fit_rolling(contest.tracks, chosen, options_for(rolls, contest.options), rolls);
+  if (!explains(rolls)) return false;
+  Rung& added = before != nullptr ? *before : rungs.emplace_back();
+  added = std::move(rolls);
+  step_down(contest, added, rungs);
+  return true;
+}
+
 }  // namespace trochoid::fitting

@@ -24,4 +24,9 @@ bool creep_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
 /// @returns whether the chosen rung's friction sets in gently now.
 bool soften_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
 
+/// Losses that were only found of a body that may slide, where no search for one that rolls led
+/// anywhere: rolling with them, where the chosen rung of one arc does not show how strong friction
+/// is. @returns whether a rung was added, or found better, that explains the track.
+bool roll_instead(const Contest& contest, const Rung& chosen, Rungs& rungs);
+
 }  // namespace trochoid::fitting
