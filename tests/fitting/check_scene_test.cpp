@@ -3,6 +3,7 @@
 
 #include "trochoid/data/error.hpp"
 #include "trochoid/data/io.hpp"
+#include "trochoid/fitting/compare.hpp"
 #include "trochoid/fitting/fit.hpp"
 
 namespace trochoid::fitting {
@@ -21,6 +22,26 @@ TEST(CheckScene, TakesWhatAFitCanFree) {
   EXPECT_NO_THROW(check_scene(disc_to_fit(
       "free = [\"rolling_friction_m\", \"readout_s\", \"angle_delay_s\"]\nfree_scale = true\n"
       "prior = { radius_m = [0.03, 0.0003], frame_rate_hz = [100, 1] }\n")));
+}
+
+// What the support leaves open is open: a name may be that of a disc on its pivot or of a top.
+TEST(CheckScene, RefusesNamesThatNoneOfTheModelsComparedHas) {
+  data::Scene scene = disc_to_fit("fixed = { friction = 0.2 }\nbounds = { slope_x = [0, 1] }\n");
+  scene.model.name = "auto";
+  EXPECT_NO_THROW(check_compared(scene));
+  scene.fit.fixed["frictoin"] = 0.2;
+  const auto refuses = testing::ThrowsMessage<InputError>(
+      testing::HasSubstr("[fit] fixed: the models compared have no parameter 'frictoin'"));
+  EXPECT_THAT([&] { check_compared(scene); }, refuses);
+  scene.support.kind = data::SupportKind::pivot;
+  scene.fit = {};
+  scene.fit.fixed = {{"spin_down_viscous_1_s", 0.1}, {"l_m", 0.1}};
+  EXPECT_NO_THROW(check_compared(scene));
+  scene.fit.fixed["frictoin"] = 0.2;
+  EXPECT_THAT([&] { check_compared(scene); }, refuses);
+  scene.support.kind = data::SupportKind::floor;
+  scene.body.reset();  // nothing is compared then, and compare() says so
+  EXPECT_NO_THROW(check_compared(scene));
 }
 
 TEST(CheckScene, RefusesWhatNoTrackCouldMend) {

@@ -39,6 +39,19 @@ bool show_spin(std::span<const data::Track> tracks) {
   });
 }
 
+// A scene as its ladder is made from.
+data::Scene to_be_compared(const data::Scene& scene, const FitOptions& options) {
+  data::Scene named = scene;
+  if (!options.model.empty()) named.model.name = options.model;
+  free_all_terms(named.fit);
+  return named;
+}
+
+// What is held at a pivot may be either of two models, unless the tracks say which.
+bool may_lean_or_lie(const data::Scene& named) {
+  return named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
+}
+
 // @throws InputError for a name that means nothing to any of the models.
 void check_names(const data::FitSettings& fit, const std::set<std::string>& known) {
   const auto check = [&](const char* key, const std::string& name) {
@@ -126,17 +139,15 @@ RivalGrounds rival_grounds(const Contest& contest, const Rung& chosen) {
 
 Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
                    const FitOptions& options) {
-  data::Scene named = scene;
-  if (!options.model.empty()) named.model.name = options.model;
+  data::Scene named = to_be_compared(scene, options);
   // A body held at a pivot that leans there is a top, one that lies on it only turns; to tell them
   // apart takes its radius.
-  const bool open = named.model.name == "auto" && named.support.kind == data::SupportKind::pivot;
-  if (open && (!named.body || leaves_pivot(tracks, named, options))) named.model.name = "top";
+  if (may_lean_or_lie(named) && (!named.body || leaves_pivot(tracks, named, options)))
+    named.model.name = "top";
   if (!named.body && named.model.name == "auto")
     throw InputError(
         "models can be compared for a [body] with its kind and radius_m; without one name the "
         "model: --model top needs none");
-  free_all_terms(named.fit);
   const Ladder ladder = ladder_of(named, show_spin(tracks));
   const std::set<std::string> known = parameters_of_any(ladder);
   check_names(scene.fit, known);
@@ -197,6 +208,21 @@ Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene
   result.fit.recommendation =
       sentence(rungs, *chosen, ladder, result.fit.verdict, !apart || !apart->differ);
   return result;
+}
+
+void check_compared(const data::Scene& scene, const FitOptions& options) {
+  data::Scene named = to_be_compared(scene, options);
+  std::set<std::string> known;
+  try {
+    if (named.body) known = parameters_of_any(ladder_of(named, false));
+    if (may_lean_or_lie(named)) {
+      named.model.name = "top";
+      known.merge(parameters_of_any(ladder_of(named, false)));
+    }
+  } catch (const InputError&) {  // compare() says what the scene lacks
+    return;
+  }
+  if (!known.empty()) check_names(scene.fit, known);
 }
 
 }  // namespace trochoid::fitting

@@ -76,13 +76,19 @@ std::string stem_of(const RunOptions& options) {
   return recording_name(options.inputs.video);
 }
 
-// A model that is named must be able to take its scene: said before the recording is tracked.
-// Without a scale none is fitted.
+// A model that is named must be able to take its scene, and what [fit] says must mean something to
+// one of those that are compared: said before the recording is tracked. Without a scale none is
+// fitted.
 void check_model(const data::Scene& scene, const std::optional<data::Camera>& camera,
                  const std::string& scene_name) {
   const bool scaled = camera || scene.camera.scale_px_per_m || scene.body;
-  if (scene.model.name == "auto" || !scaled) return;
-  in_scene(scene_name, [&] { fitting::check_scene(with_rows(scene)); });
+  if (!scaled) return;
+  in_scene(scene_name, [&] {
+    if (scene.model.name == "auto")
+      fitting::check_compared(with_rows(scene));
+    else
+      fitting::check_scene(with_rows(scene));
+  });
 }
 
 Run prepared(const RunOptions& options) {

@@ -39,4 +39,9 @@ struct Comparison {
 [[nodiscard]] Comparison compare(std::span<const data::Track> tracks, const data::Scene& scene,
                                  const FitOptions& options = {});
 
+/// What compare() says of the names under [fit] whatever the tracks: before there are any, which
+/// takes time. Of a scene that lacks what all of the models need it says nothing.
+/// @throws InputError for names that none of the models has.
+void check_compared(const data::Scene& scene, const FitOptions& options = {});
+
 }  // namespace trochoid::fitting
