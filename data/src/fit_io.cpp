@@ -345,6 +345,9 @@ Fit parse_fit(const std::string& text, const std::string& where) {
     static_cast<void>(reader.at(needed));
   Fit fit;
   from_json(json, fit, where);
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i)
+    if (!json["parameters"][i].contains("value"))
+      reader.fail(fmt::format("\"parameters\"[{}] has no \"value\"", i));
   check_fit(fit, where);
   return fit;
 }
