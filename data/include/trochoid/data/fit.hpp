@@ -143,7 +143,8 @@ struct Fit {
   std::string verdict_words;  ///< the same as a sentence
   /// Which start won: integral_matching, integrals (the motion of a pin), windows, spectrum (a fast
   /// top), spin (a rim in steady rolling), slip (one that slips at first), rolls_first (one that
-  /// rolls at first), multiple_shooting, multistart, given; mixed if those of several arcs differ.
+  /// rolls at first), multiple_shooting, multistart, given, other_model (what another model
+  /// compared came to), none (no start led anywhere); mixed if those of several arcs differ.
   std::string start_path;
   std::vector<FitParameter> parameters;       ///< free, fixed and derived ones
   std::vector<std::string> covariance_names;  ///< free parameters, in the order of the rows
