@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,9 @@
 
 /// One function per rung; predictor.cpp and simulate.cpp choose by the scene's model name.
 namespace trochoid::model {
+
+/// A range of a parameter that has no end.
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::unique_ptr<Predictor> make_top(const data::Scene& scene);
 std::unique_ptr<Predictor> make_top_euler(const data::Scene& scene);

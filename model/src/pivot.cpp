@@ -13,7 +13,6 @@
 namespace trochoid::model {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using Role = ParameterInfo::Role;
 using Dual8 = Dual<8>;
 

@@ -14,7 +14,6 @@
 namespace trochoid::model {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using Role = ParameterInfo::Role;
 
 enum class Floor { rolling, smooth, sliding };
