@@ -125,6 +125,7 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
   using Steps = Stepping<DormandPrince, System::kStates>;
   friend Steps;
   using Steps::control_, Steps::counts_, Steps::step_, Steps::t_, Steps::t_previous_;
+  static constexpr bool kDerives = requires { S::kLanes; };
 
   TROCHOID_INLINE void evaluate(double t_s, const Y& y, Y& dy) {
     system_.derivative(t_s, y, dy);
@@ -152,6 +153,7 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
       Y y;
       widely<S>([&]() TROCHOID_LAMBDA_INLINE { stage_state<Row>(h, y); });
       evaluate(t_ + dop853::kC[Row] * h, y, k_[Row]);
+      if constexpr (kDerives && Row == dop853::kStages - 1) y_last_ = y;
       run_stages<Row + 1>(h);
     }
   }
@@ -160,8 +162,43 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
   [[nodiscard]] Attempt attempt(double h) {
     run_stages<1>(h);
     widely<S>([&]() TROCHOID_LAMBDA_INLINE { stage_state<dop853::kStages>(h, y_next_); });
-    const double error = error_norm(h);
+    double error = error_norm(h);
+    if constexpr (kDerives) {
+      if (error <= 1.0) {
+        evaluate(t_ + h, y_next_, k_[dop853::kStages]);
+        const double growth = instability(h);
+        error = growth > error ? growth : error;
+      }
+    }
     return {__builtin_isfinite(error) ? Attempt::End::done : Attempt::End::not_finite, error};
+  }
+
+  /// Where a strong loss holds the body, values stay at rest however long a step is, but
+  /// derivatives run away beyond the method's limit of stability. The last stage and the new state
+  /// are of one instant: how far apart their rates are over how far apart they are themselves is
+  /// the fastest rate ([HairerWanner1996] IV.2), here of derivatives that have begun to run.
+  /// @returns that times the step over the limit, to the power for which step_factor() keeps to it.
+  [[nodiscard]] double instability(double h) const {
+    constexpr double kStable = 6.1, kBegun = 1e-5;  // of the derivatives
+    double fastest2 = 0.0;
+    widely<S>([&]() TROCHOID_LAMBDA_INLINE {
+      typename S::Lanes rates{}, states{}, whole{};
+      for (int c = 0; c < kN; ++c) {
+        const double size = scale(c, value_of(y_[c]), value_of(y_next_[c]));
+        const double weight = 1.0 / (size * size);
+        const auto& after = y_next_[c].derivative;
+        const auto rate = k_[dop853::kStages][c].derivative - k_[dop853::kStages - 1][c].derivative;
+        const auto state = after - y_last_[c].derivative;
+        rates += rate * rate * weight;
+        states += state * state * weight;
+        whole += after * after * weight;
+      }
+      for (int lane = 0; lane < S::kLanes; ++lane)
+        if (states[lane] > kBegun * kBegun * whole[lane] && rates[lane] > fastest2 * states[lane])
+          fastest2 = rates[lane] / states[lane];
+    });
+    const double share2 = h * h * fastest2 * (1.0 / (kStable * kStable));
+    return share2 * share2 * share2 * share2;
   }
 
   template <int J = 0>
@@ -240,7 +277,7 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
   }
 
   void accept(double /*h*/, double t_new) {
-    evaluate(t_new, y_next_, k_[dop853::kStages]);
+    if constexpr (!kDerives) evaluate(t_new, y_next_, k_[dop853::kStages]);
     y_previous_ = y_;
     first_stage_ = k_[0];
     y_ = y_next_;
@@ -321,6 +358,7 @@ class DormandPrince : public Stepping<DormandPrince<System>, System::kStates> {
   System system_;
   unsigned dense_ready_ = 0;
   Y y_, y_previous_, y_next_, first_stage_;
+  Y y_last_;  ///< at the last stage
   Y k_[dop853::kAllStages];
   Y r_[7];
 };
