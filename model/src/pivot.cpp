@@ -77,6 +77,9 @@ template <bool Unbalanced, class S>
 PivotPath<S> run_pivot_with(const S (&p)[kParameters], std::span<const double> t_s,
                             double tolerance, int max_steps) {
   using P = Pivot<S, Unbalanced>;
+  constexpr bool kDerives = requires {
+    S::kLanes;
+  };
   PivotPath<S> path;
   const auto add = [&](const S& turned, const S& speed) {
     path.rows.push_back({p[kPsi] + turned, speed});
@@ -98,7 +101,9 @@ PivotPath<S> run_pivot_with(const S (&p)[kParameters], std::span<const double> t
   while (true) {
     if (!turning) {
       const double pull = pivot.values().weight(value_of(y[P::turned]));
-      if (std::abs(pull) <= dry) {
+      // What nothing pulls or holds stays, but goes away by any other speed: it has derivatives.
+      const bool poised = kDerives && dry == 0.0 && from_s == 0.0;
+      if (std::abs(pull) <= dry && !poised) {
         path.rest_s = from_s;
         break;
       }

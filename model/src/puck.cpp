@@ -41,6 +41,9 @@ struct PuckScene {
 
 // On its very rim a body turns as hard as an even face half as large again.
 constexpr double kWidestContact = 1.5;
+// A smaller one does not brake its turning within any recording; on none there is no turning to
+// tell.
+constexpr double kLeastContact = 1e-3;
 
 PuckScene puck_scene(const data::Scene& scene) {
   if (!scene.body) throw InputError("[body] is missing: the puck model needs kind and radius_m");
@@ -54,14 +57,15 @@ PuckScene puck_scene(const data::Scene& scene) {
   if (!(scene.model.gravity_m_s2 > 0.0))
     throw InputError(
         fmt::format("model.gravity_m_s2 = {} must be greater than 0", scene.model.gravity_m_s2));
-  if (const double contact_m = scene.model.contact_radius_m.value_or(0.0);
-      contact_m > kWidestContact * scene.body->radius_m)
+  const double radius_m = scene.body->radius_m;
+  if (const double contact_m = scene.model.contact_radius_m.value_or(radius_m);
+      !(contact_m >= kLeastContact * radius_m && contact_m <= kWidestContact * radius_m))
     throw InputError(
-        fmt::format("model.contact_radius_m = {} must be at most {} times radius_m = {}", contact_m,
-                    kWidestContact, scene.body->radius_m));
+        fmt::format("model.contact_radius_m = {} must lie between {:g} and {} times radius_m = {}",
+                    contact_m, kLeastContact, kWidestContact, radius_m));
   PuckScene puck;
   puck.gravity = scene.model.gravity_m_s2;
-  puck.radius_m = scene.body->radius_m;
+  puck.radius_m = radius_m;
   // A hoop without width has no face; this one's error is its width over R, 1e-5.
   constexpr double kWidestBore = 1.0 - 1e-5;
   puck.bore = std::min(scene.body->inner_radius_m / puck.radius_m, kWidestBore);
@@ -110,8 +114,8 @@ std::vector<ParameterInfo> puck_parameters(const PuckScene& puck) {
     list.push_back({"air_force_N_s_m", "N s/m", Role::dynamics, 0.0, kInfinity, true,
                     puck.value[kDrag], true, "air force on the centre of mass"});
   // Only a spin that is seen tells how far out the face rests on the floor.
-  list.push_back({"contact_radius_m", "m", Role::dynamics, 0.0, kWidestContact * puck.radius_m,
-                  true, puck.value[kContact], false,
+  list.push_back({"contact_radius_m", "m", Role::dynamics, kLeastContact * puck.radius_m,
+                  kWidestContact * puck.radius_m, true, puck.value[kContact], false,
                   "radius of the contact, as of an evenly pressed face"});
   if (puck.sloped)
     for (const ParameterInfo& info : slope_parameters({puck.value[kSlopeX], puck.value[kSlopeY]}))

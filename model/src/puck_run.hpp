@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -59,9 +60,15 @@ template <class S>
   // rest; what is left of the path is the square of it.
   constexpr double kRest = 1e-9;
   const double rest_speed = kRest * speed(start);
+  // On a floor too steep for its friction a puck that comes to rest turns back, which is no motion
+  // of this law.
+  const bool held =
+      std::hypot(value_of(puck.rise_x), value_of(puck.rise_y)) <= value_of(puck.friction);
   if (speed(start) == 0.0) {
-    path.rest_s = 0.0;
-    path.rows.assign(t_s.size(), start);
+    if (held) path.rest_s = 0.0;
+    if (!held) path.end = StepEnd::not_finite;
+    const auto known = held ? t_s.end() : std::upper_bound(t_s.begin(), t_s.end(), 0.0);
+    path.rows.assign(static_cast<std::size_t>(known - t_s.begin()), start);
     return path;
   }
   StepControl<7> control = uniform_control<7>(tolerance);
@@ -83,7 +90,9 @@ template <class S>
     }
   }
   if (path.rows.empty() && !t_s.empty() && t_s.front() <= 0.0) path.rows.push_back(start);
-  if (path.end == StepEnd::accepted && speed(stepper.y()) <= rest_speed) {
+  const bool rests = path.end == StepEnd::accepted && speed(stepper.y()) <= rest_speed;
+  if (rests && !held) path.end = StepEnd::not_finite;
+  if (rests && held) {
     State<S, 7> rest = stepper.y();
     path.rest_s = value_of(rest[P::t]);
     rest[P::vx] = rest[P::vy] = rest[P::q] = S(0.0);

@@ -221,6 +221,55 @@ TEST(Puck, DifferentiatesByEveryParameterMovingAndAtRest) {
   }
 }
 
+// On a small contact it spins on for long while any velocity of its centre dies at once: nothing in
+// the path, a point, asks for short steps. Friction only takes away from how far a push leads.
+TEST(Puck, SpinningOnASmallContactGoesNoFartherByAPushThanWithoutFriction) {
+  data::Scene scene = puck_scene();
+  scene.model.friction = 1.0;
+  scene.model.contact_radius_m = 1e-3 * scene.body->radius_m;
+  scene.start.vx_m_s = scene.start.vy_m_s = 0.0;
+  scene.start.w3_rad_s = -90.0;
+  const auto predictor = make_predictor(scene);
+  const std::vector<double> t_s{0.5, 1.0, 2.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.derivatives = {predictor->index_of("vx_m_s")};
+  const Prediction run = predictor->predict(defaults(*predictor), request);
+  for (std::size_t n = 0; n < t_s.size(); ++n) {
+    const double by_push_s = run.jacobian(static_cast<Eigen::Index>(2 * n), 0);
+    EXPECT_GT(by_push_s, 0.0);
+    EXPECT_LT(by_push_s, t_s[n]);
+  }
+}
+
+TEST(Puck, HasAContactThatIsNeitherNothingNorWiderThanARimMakesIt) {
+  data::Scene scene = puck_scene();
+  for (const double of_radius : {0.0, 1e-4, -1.0, 1.6, std::nan("")}) {
+    scene.model.contact_radius_m = of_radius * scene.body->radius_m;
+    EXPECT_THROW((void)simulate(scene), InputError) << of_radius;
+    EXPECT_THROW((void)make_predictor(scene), InputError) << of_radius;
+  }
+}
+
+// Where it would turn back, or set off, there is no answer; it had been said to rest.
+TEST(Puck, DoesNotRestOnAFloorTooSteepForItsFriction) {
+  data::Scene scene = puck_scene();
+  scene.model.friction = 0.05;
+  scene.support.slope_x = 0.1;
+  scene.start.vy_m_s = scene.start.w3_rad_s = 0.0;
+  const std::vector<double> t_s{0.0, 0.01, 60.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  for (const double vx_m_s : {0.3, 0.0}) {
+    scene.start.vx_m_s = vx_m_s;
+    const auto predictor = make_predictor(scene);
+    const Prediction run = predictor->predict(defaults(*predictor), request);
+    EXPECT_EQ(run.outcome, Outcome::out_of_domain) << vx_m_s;
+    EXPECT_TRUE(run.values.head(2).allFinite()) << vx_m_s;
+    EXPECT_TRUE(run.values.tail(2).array().isNaN().all()) << vx_m_s;
+  }
+}
+
 TEST(Puck, StaysWhereItIsWhenItStartsAtRest) {
   data::Scene scene = puck_scene();
   scene.start.vx_m_s = scene.start.vy_m_s = 0.0;
@@ -380,6 +429,22 @@ TEST(Pivot, DifferentiatesByEveryParameter) {
   // Turns over a few times, then swings back and forth, then rests.
   expect_derivatives(*make_predictor(scene), std::vector{0.5, 1.0, 3.0, 4.0, 5.0, 60.0},
                      {Observable::psi_rad});
+}
+
+// A disc that does not turn, and that nothing holds, turns by t for every radian per second.
+TEST(Pivot, DifferentiatesWhereItStandsStillWithoutDryFriction) {
+  data::Scene scene = pivot_scene();
+  scene.start.w3_rad_s = 0.0;
+  const auto predictor = make_predictor(scene);
+  const std::vector<double> t_s{0.5, 3.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.observables = {Observable::psi_rad};
+  request.derivatives = {predictor->index_of("w3_rad_s")};
+  const Prediction run = predictor->predict(defaults(*predictor), request);
+  constexpr double kRounding = 1e-12;
+  EXPECT_NEAR(run.jacobian(0, 0), 0.5, kRounding);
+  EXPECT_NEAR(run.jacobian(1, 0), 3.0, kRounding);
 }
 
 TEST(Pivot, NeedsDryFrictionForWeakening) {
