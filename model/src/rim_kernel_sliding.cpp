@@ -37,7 +37,11 @@ template <class S>
 RimPath<S> run_sliding(const RimModel& model, const RimInput<S>& input, const RimRunOptions& given,
                        std::span<const double> t_s) {
   RimRunOptions options = given;
-  const Coulomb<S> friction{input.friction, input.eps_v};
+  Coulomb<S> friction{input.friction, input.eps_v};
+  // A floor without friction never holds the body, which Coulomb's law does to one that does not
+  // slip; set in softly its friction still has a derivative.
+  if (value_of(friction.mu) == 0.0 && value_of(friction.eps_v) == 0.0)
+    friction.eps_v = S(stick_speed_m_s(model.body));
   const double steps = explicit_steps(model, friction.values(), options.end_s);
   options.stiff =
       asks_for_implicit_steps(model, steps, value_of(input.theta), value_of(input.w2), options);

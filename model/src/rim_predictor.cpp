@@ -125,6 +125,7 @@ class RimPredictor : public Predictor {
   void fill_values(const RimPath<S>& path, Call& call, Prediction& out) const;
   void fill_lanes(const RimPath<Dual8>& path, const Call& call, const std::vector<int>& columns,
                   Prediction& out) const;
+  void shorten(const RimPath<Dual8>& path, Call& call, Prediction& out) const;
   void fill_cyclic(const Call& call, Prediction& out) const;
   [[nodiscard]] bool cyclic(int parameter) const {
     const int s = entries_.slots[static_cast<std::size_t>(parameter)];
@@ -236,9 +237,10 @@ void RimPredictor::fill_lanes(const RimPath<Dual8>& path, const Call& call,
                               const std::vector<int>& columns, Prediction& out) const {
   const auto& wanted = call.request.observables;
   const auto stride = static_cast<Eigen::Index>(wanted.size());
+  const std::size_t known = std::min(path.rows.size(), call.path_m.size());
   for (std::size_t lane = 0; lane < columns.size(); ++lane) {
     auto column = out.jacobian.col(columns[lane]);
-    for (std::size_t n = 0; n < path.rows.size(); ++n)
+    for (std::size_t n = 0; n < known; ++n)
       for (std::size_t o = 0; o < wanted.size(); ++o)
         column[static_cast<Eigen::Index>(n) * stride + static_cast<Eigen::Index>(o)] =
             path.rows[n][row_component(wanted[o])].derivative[lane];
@@ -248,6 +250,20 @@ void RimPredictor::fill_lanes(const RimPath<Dual8>& path, const Call& call,
   for (std::size_t lane = 0; lane < columns.size(); ++lane)
     for (int i = 0; i < initial_count(); ++i)
       out.end_state_jacobian(i, columns[lane]) = end[i].derivative[lane];
+}
+
+/// More parameters than lanes take several runs of the same motion, each with steps of its own: it
+/// is known as far as the one that ends first.
+void RimPredictor::shorten(const RimPath<Dual8>& path, Call& call, Prediction& out) const {
+  if (path.rows.size() >= call.path_m.size()) return;
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t missing = call.request.t_s.size() - path.rows.size();
+  const auto rows = static_cast<Eigen::Index>(missing * call.request.observables.size());
+  out.values.tail(rows).setConstant(kNan);
+  out.jacobian.bottomRows(rows).setConstant(kNan);
+  out.outcome = path.end.outcome;
+  out.valid_until_s = call.request.start_s + path.end.end_s;
+  call.path_m.resize(path.rows.size());
 }
 
 /// A shift of the start shifts the path, a turn of the start turns it about the start: derivative
@@ -332,6 +348,7 @@ Prediction RimPredictor::predict(const Eigen::Ref<const Eigen::VectorXd>& values
     const RimPath<Dual8> path = seen(run(in, call), call);
     if (from == 0) fill_values(path, call, out);
     fill_lanes(path, call, columns, out);
+    shorten(path, call, out);
   }
   fill_cyclic(call, out);
   return out;

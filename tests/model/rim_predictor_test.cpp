@@ -316,6 +316,55 @@ TEST(RimPredictor, CountsTheStepsOfAllPhasesAgainstTheLimit) {
   EXPECT_EQ(predictor->predict(defaults(*predictor), request).outcome, Outcome::step_limit);
 }
 
+// Coulomb's law holds a body that does not slip; a floor without friction holds none.
+TEST(RimPredictor, SlidesFromRollingOnAFloorWithoutFriction) {
+  data::Scene scene = reference_scene("s10_stick_slip_event");
+  scene.start.vx_m_s.reset();  // as it rolls
+  scene.start.vy_m_s.reset();
+  const std::vector<double> t_s{0.02, 0.1, 0.3};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.tolerance = 1e-12;
+  scene.model.name = "smooth";
+  const auto smooth = make_predictor(scene);
+  const Prediction expected = smooth->predict(defaults(*smooth), request);
+  scene.model.name = "sliding";
+  scene.model.friction = 0.0;
+  const auto sliding = make_predictor(scene);
+  request.derivatives = {sliding->index_of("friction")};
+  const Prediction run = sliding->predict(defaults(*sliding), request);
+  ASSERT_EQ(run.outcome, expected.outcome);
+  constexpr double kSame_m = 1e-10;  // tolerance 1e-12, of a hundred steps
+  EXPECT_LT((run.values - expected.values).cwiseAbs().maxCoeff(), kSame_m);
+  EXPECT_TRUE(run.jacobian.allFinite());
+}
+
+// Nine parameters and more take two runs, each with steps of its own; either may be the one that
+// the limit ends.
+TEST(RimPredictor, IsKnownAsFarAsAllItsDerivativesAre) {
+  data::Scene scene = reference_scene("s10_stick_slip_event");
+  scene.model.rolling_friction_m = scene.model.pivoting_friction_m = 1e-4;
+  const auto predictor = make_predictor(scene);
+  const std::vector<double> t_s{0.2, 0.4, 0.6, 0.8};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.tolerance = 1e-5;
+  const Eigen::VectorXd values = defaults(*predictor);
+  for (int i = 0; i < values.size(); ++i) request.derivatives.push_back(i);
+  const int first = predictor->predict(values, request).steps;
+  for (int order = 0; order < 2; ++order) {
+    for (int steps = first; steps <= 2 * first; ++steps) {
+      request.max_steps = steps;
+      const Prediction run = predictor->predict(values, request);
+      for (Eigen::Index row = 0; row < run.values.size(); ++row)
+        ASSERT_EQ(run.jacobian.row(row).allFinite(), !std::isnan(run.values[row]))
+            << steps << " steps, row " << row;
+      ASSERT_EQ(run.outcome == Outcome::reached_end, run.values.allFinite()) << steps;
+    }
+    std::reverse(request.derivatives.begin(), request.derivatives.end());
+  }
+}
+
 TEST(RimPredictor, AsksForTheMassOnlyWhenATermNeedsIt) {
   data::Scene scene = reference_scene("s06_roll_disc");
   scene.body->mass_kg.reset();
