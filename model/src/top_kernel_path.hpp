@@ -64,15 +64,12 @@ void write_path(const Series<S>& kx, const Series<S>& ky, double t0_s, const dou
   if constexpr (requires { S::kLanes; }) {
     const double* xy = path.xy;
     for (int n = 2 * first; n < 2 * last; n += 2) {
-      if (path.by_l != nullptr) {
-        path.by_l[n] = (xy[n] - px) / l;
-        path.by_l[n + 1] = (xy[n + 1] - py) / l;
-      }
-      if (path.by_phi != nullptr) {
-        path.by_phi[n] = py - xy[n + 1];
-        path.by_phi[n + 1] = xy[n] - px;
-      }
+      if (path.by_phi == nullptr) break;
+      path.by_phi[n] = py - xy[n + 1];
+      path.by_phi[n + 1] = xy[n] - px;
     }
+    const auto as_it_is = [](Eight&, Eight&) TROCHOID_LAMBDA_INLINE {};
+    if (path.by_l != nullptr) write_column(series, t0_s, t_s, first, last, path.by_l, as_it_is);
     for (int lane = 0; lane < S::kLanes; ++lane) {
       double* column = path.by_variable[lane];
       if (column == nullptr) continue;
@@ -80,8 +77,7 @@ void write_path(const Series<S>& kx, const Series<S>& ky, double t0_s, const dou
         series.x[n] = l * kx[n].derivative[lane];
         series.y[n] = l * ky[n].derivative[lane];
       }
-      write_column(series, t0_s, t_s, first, last, column,
-                   [](Eight&, Eight&) TROCHOID_LAMBDA_INLINE {});
+      write_column(series, t0_s, t_s, first, last, column, as_it_is);
     }
   }
 }

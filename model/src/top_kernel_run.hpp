@@ -139,7 +139,10 @@ class Run {
       // Dry drag that stops it within rounding of the start would otherwise drive it backwards.
       const bool turns = spin != 0.0 && !(run_.spin_stops_s <= run_.start_s);
       system.sense = turns ? __builtin_copysign(1.0, spin) : 0.0;
-      if constexpr (System::kDry) system.dry_1_s2 = variable<S>(run_, kTopDry);
+      if constexpr (System::kDry) {
+        system.dry_1_s2 = variable<S>(run_, kTopDry);
+        if (run_.spin_stops_s <= run_.start_s) y[System::kSpin] = S(0.0);
+      }
       if constexpr (System::kQuadratic) system.quadratic = variable<S>(run_, kTopQuadratic);
     }
     return system;

@@ -178,16 +178,18 @@ struct TopPredictor::Work {
   }
   /// How far that has turned by time n, and its derivative.
   [[nodiscard]] double turn_s(int n) const {
-    return counts_turns() ? share(value(kTopTurns, n)) : decayed(n).integral;
+    return counts_turns() ? share(value(kTopTurns, n)) : held() ? 0.0 : decayed(n).integral;
   }
   [[nodiscard]] double turn_s_by(Parameter by, int n) const {
-    if (!counts_turns()) return by == kGamma3 ? decayed(n).by_rate : 0.0;
+    if (!counts_turns()) return by == kGamma3 && !held() ? decayed(n).by_rate : 0.0;
     return lane_of(by) < 0 ? 0.0 : share_by(by, lane(kTopTurns, n, lane_of(by)), turn_s(n));
   }
   /// A top without spin turns by nothing however that would slow it.
   [[nodiscard]] bool counts_turns() const {
     return (run.dry || run.quadratic) && run.variable[kTopB] != 0.0;
   }
+  /// Dry drag lets none begin.
+  [[nodiscard]] bool held() const { return run.spin_stops_s <= run.start_s; }
   [[nodiscard]] Decay decayed(int n) const {
     return decay(run.variable[kTopGamma3], request.t_s[n] - request.start_s);
   }
@@ -360,10 +362,12 @@ void TopPredictor::fill_end(const Work& work, Prediction& prediction) const {
   const TopResult& result = work.result;
   const double ran_s = result.reached_s - work.request.start_s;
   const double gamma3 = work.run.variable[kTopGamma3];
-  const Decay linear = decay(gamma3, ran_s);
+  const Decay linear = work.held() ? Decay{0.0, 0.0} : decay(gamma3, ran_s);
   const bool counted = work.counts_turns();
   // Of one radian per second of spin at the start: what is left, and how far it has turned.
-  const double left = counted ? work.share(result.end[4]) : std::exp(-gamma3 * ran_s);
+  const double left = counted       ? work.share(result.end[4])
+                      : work.held() ? 0.0
+                                    : std::exp(-gamma3 * ran_s);
   const double turn_s = counted ? work.share(result.end[6]) : linear.integral;
   // In the order of the initial parameters: b, theta, phi, dtheta, dphi, psi, omega_s.
   constexpr int kSource[] = {4, 0, 1, 2, 3, 5};

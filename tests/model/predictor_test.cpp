@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "trochoid/data/io.hpp"
@@ -58,6 +59,26 @@ TEST_P(EveryPredictor, GivesTheStartThoughNothingElseIsAskedFor) {
   ASSERT_EQ(alone.outcome, Outcome::reached_end);
   EXPECT_TRUE(alone.values.allFinite()) << alone.values.transpose();
   EXPECT_EQ(alone.values, among.values.head(3));
+}
+
+TEST_P(EveryPredictor, HasNumbersAtTheEndsOfTheRangesOfItsParameters) {
+  const std::vector<double> t_s{kStart_s, kStart_s + 0.1, kStart_s + 0.2};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.start_s = kStart_s;
+  for (int i = 0; i < values_.size(); ++i) request.derivatives.push_back(i);
+  for (std::size_t i = 0; i < predictor_->parameters().size(); ++i) {
+    const ParameterInfo& info = predictor_->parameters()[i];
+    for (const double end : {info.lower, info.upper}) {
+      if (!std::isfinite(end)) continue;
+      Eigen::VectorXd values = values_;
+      values[static_cast<Eigen::Index>(i)] = end;
+      const Prediction run = predictor_->predict(values, request);
+      if (run.outcome != Outcome::reached_end) continue;
+      EXPECT_TRUE(run.values.allFinite()) << info.name << " = " << end;
+      EXPECT_TRUE(run.jacobian.allFinite()) << info.name << " = " << end;
+    }
+  }
 }
 
 TEST_P(EveryPredictor, KeepsToTheLimitOfSteps) {

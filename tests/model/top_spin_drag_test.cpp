@@ -192,6 +192,24 @@ TEST(TopSpinDrag, HoldsASpinThatIsUsedUpAtOnce) {
   }
 }
 
+// Dry drag takes away a little spin within a time that goes as the spin, so that what it does goes
+// as the square.
+TEST(TopSpinDrag, HasNoDerivativeByASpinThatDryDragHolds) {
+  const auto predictor = make_predictor(scene_of(kDry));
+  Eigen::VectorXd at = defaults(*predictor);
+  at[predictor->index_of("b_1_s")] = at[predictor->index_of("omega_s_rad_s")] = 0.0;
+  const std::vector<double> t_s{0.0, 0.4, 1.0};
+  PredictRequest request;
+  request.t_s = t_s;
+  request.observables = {Observable::x_m, Observable::y_m, Observable::theta_rad,
+                         Observable::phi_rad, Observable::psi_rad};
+  constexpr double kDifferences = 1e-3;  // of a kink's curvature over steps of 1e-7
+  for (const DerivativeColumn& column : derivative_columns(*predictor, at, request, 1e-5))
+    if (column.parameter == "b_1_s") {
+      EXPECT_LT(column.error(), kDifferences);
+    }
+}
+
 TEST(TopSpinDrag, IsRefusedWhereTheIntegratorDoesNotKnowIt) {
   data::Scene scene = scene_of(kDry);
   scene.run.until_s = 1.0;
