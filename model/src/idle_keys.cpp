@@ -24,6 +24,7 @@ const std::vector<Readers>& readers() {
                                               "top",     "top-euler", "free"};
   const std::vector<std::string_view> floor{"rolling", "smooth", "sliding", "puck"};
   static const std::vector<Readers> list{
+      {"support.pivot_m", {"top", "top-euler", "pivot"}},
       {"support.slope_x", floor},
       {"support.slope_y", floor},
       {"model.gravity_m_s2", {"rolling", "smooth", "sliding", "top", "top-euler", "puck"}},
@@ -65,6 +66,21 @@ const std::vector<Readers>& readers() {
   return list;
 }
 
+/// Whether a model is one of bodies held as the scene says, where it says other than a floor.
+bool is_held_so(const data::Scene& scene, const std::string& law) {
+  switch (scene.support.kind) {
+    case data::SupportKind::flat:
+      return law == "puck";
+    case data::SupportKind::pivot:
+      return law == "top" || law == "top-euler" || law == "pivot";
+    case data::SupportKind::none:
+      return law == "free";
+    case data::SupportKind::floor:
+      break;
+  }
+  return true;
+}
+
 /// A body in flight whose three rates are given together looks at no other rate.
 bool passed_over(const data::Scene& scene, const std::string& law, std::string_view key) {
   constexpr std::array<std::string_view, 7> kRates{
@@ -81,6 +97,7 @@ std::vector<std::string> idle_keys(const data::Scene& scene) {
   const std::string law = law_of(scene);
   std::erase_if(idle, [&](const std::string& key) {
     if (passed_over(scene, law, key)) return false;
+    if (key == "support.kind") return is_held_so(scene, law);
     const auto found = std::find_if(readers().begin(), readers().end(),
                                     [&](const Readers& known) { return known.key == key; });
     return found == readers().end() ||

@@ -130,6 +130,16 @@ TEST(IdleKeys, AreTheRatesThatABodyInFlightIsGivenTwice) {
   EXPECT_EQ(idle_keys(scene_of(keys, "free")), expected);
 }
 
+TEST(IdleKeys, AreASupportOfAnotherModelThanTheOneNamed) {
+  using Names = std::vector<std::string>;
+  const Keys pinned{{"support.kind", "\"pivot\""}, {"support.pivot_m", "[0, 0, 0]"}};
+  EXPECT_EQ(idle_keys(scene_of(pinned, "rolling")), (Names{"support.kind", "support.pivot_m"}));
+  EXPECT_EQ(idle_keys(scene_of(pinned, "top")), Names{});
+  EXPECT_EQ(idle_keys(scene_of({{"support.kind", "\"flat\""}}, "sliding")), Names{"support.kind"});
+  EXPECT_EQ(idle_keys(scene_of({{"support.kind", "\"flat\""}}, "puck")), Names{});
+  EXPECT_EQ(idle_keys(scene_of({{"support.kind", "\"none\""}}, "top")), Names{"support.kind"});
+}
+
 // A file is shared by several models; what all of them know is never idle, nor what is not given.
 TEST(IdleKeys, OfAnEmptySceneAreNone) {
   EXPECT_TRUE(idle_keys(scene_of({}, "rolling")).empty());
