@@ -5,15 +5,15 @@
 
 writes OUT/<folder name>_<variant> for each, in the layout that `trochoid study tracking OUT/*` reads: arms and bars over the
 body, other things on the floor, lamps that flicker, the body leaving the picture or resting, noise, compression. The
-picture's own light stays what the recording had. A stand sags (by 3 px in all), shakes (1 px, 17 and 23 Hz) or is knocked
-(1.5 px): truth.csv's metres stay, its pixels go along. It says which share of the outline is left to see. At most 200
+picture's own light stays what the recording had. A stand sags (by 3 px in all), shakes (1 px, 17 and 23 Hz), is knocked (by
+1.5 px, or far: 20 px) or turns (by 1 degree): truth.csv's metres and angles stay, its pixels go along. It says which share of the outline is left to see. At most 200
 frames of each are used. Needs numpy, scipy, ffmpeg.
 """
 import argparse, csv, json, subprocess
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, shift
+from scipy.ndimage import affine_transform, gaussian_filter
 
 FRAMES, GAMMA = 200, 2.2
 
@@ -122,14 +122,23 @@ def rests(clip, random):
     return frames
 
 
-def camera_moves(path_of):
-    """@param path_of (times in s) -> where the picture has gone, n x 2 [px]"""
+def camera_moves(path_of, turned_of=np.zeros_like):
+    """@param path_of (times in s) -> where the picture has gone, n x 2 [px]
+    @param turned_of (times in s) -> by how much it has turned about its middle, right on the screen [rad]"""
     def variant(clip, random):
-        gone = path_of(np.arange(len(clip.frames)) / clip.camera["fps"])
-        for row, (dx, dy) in zip(clip.truth, gone):
-            row["x_px"], row["y_px"] = float(row["x_px"]) + dx, float(row["y_px"]) + dy
-        moved = lambda f, by: np.stack([shift(f[..., c], by, order=3, mode="nearest") for c in range(3)], axis=2)
-        return [moved(f, (dy, dx)) + random.normal(0, 0.4, f.shape) for f, (dx, dy) in zip(clip.frames, gone)]
+        t = np.arange(len(clip.frames)) / clip.camera["fps"]
+        middle = 0.5 * (np.array(clip.x.shape[::-1]) - 1)
+        ways = list(zip(path_of(t), turned_of(t)))
+        for row, (gone, by) in zip(clip.truth, ways):
+            turn = np.array([[np.cos(by), -np.sin(by)], [np.sin(by), np.cos(by)]])
+            at = np.array([float(row["x_px"]), float(row["y_px"])])
+            row["x_px"], row["y_px"] = middle + turn @ (at - middle) + gone
+
+        def moved(frame, gone, by):
+            back = np.array([[np.cos(by), -np.sin(by)], [np.sin(by), np.cos(by)]])  # of (y, x)
+            start = middle[::-1] - back @ (middle + gone)[::-1]
+            return np.stack([affine_transform(frame[..., c], back, start, order=3, mode="nearest") for c in range(3)], axis=2)
+        return [moved(f, *way) + random.normal(0, 0.4, f.shape) for f, way in zip(clip.frames, ways)]
     return variant
 
 
@@ -154,6 +163,8 @@ VARIANTS = {
     "leaves": (leaves, H264), "rests": (rests, H264), "noise": (noisy(9.0), H264), "dim": (noisy(4.0, 0.25, 0.12), H264),
     "sags": (camera_moves(lambda t: 3 * np.outer(t / t[-1], [0.8, 0.6])), H264), "shakes": (camera_moves(shakes), H264),
     "knocked": (camera_moves(lambda t: 1.5 * np.outer(t > 0.6 * t[-1], [0.8, -0.6])), H264),
+    "far": (camera_moves(lambda t: 20 * np.outer(t > 0.6 * t[-1], [0.8, -0.6])), H264),
+    "turns": (camera_moves(lambda t: 0 * np.outer(t, [1, 1]), lambda t: np.radians(1) * t / t[-1]), H264),
     "strong": (noisy(0.0), ["-c:v", "libx264", "-crf", "27", "-pix_fmt", "yuv420p"]),
     "hevc10": (noisy(0.0), ["-c:v", "libx265", "-x265-params", "log-level=none", "-crf", "14", "-pix_fmt", "yuv420p10le"]),
 }

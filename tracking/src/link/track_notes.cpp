@@ -187,8 +187,8 @@ std::optional<std::string> note_about_camera_motion(
       "; {}; {}",
       metres
           ? "metres and precession are those of a camera that stands still, as a whole known no "
-            "better than to some tenths of that; tilts are left as they are, with error bars for a "
-            "camera that leans, and pixels"
+            "better than to some tenths of that; pixels and tilts are left as they are, tilts with "
+            "error bars for a camera that has leaned"
           : "pixels are left as they are",
       grows ? "lock focus and zoom" : "fasten the camera");
   constexpr double kNearlyAll = 0.9;
