@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -183,6 +184,48 @@ TEST(TrackAssembly, OfACameraThatMovesIsWhatOneThatStandsStillWouldShow) {
     const double turned_rad = kPhi_rad - path.frames[static_cast<int>(i)].seen.pose->pose.phi_rad;
     EXPECT_NEAR(sample.psi->value_rad, 0.3 - std::cos(0.5) * turned_rad, 1e-4);
     EXPECT_GT(sample.covariance_m2(0, 0), 1e-8);
+  }
+}
+
+/// What samples say of a turn about the vertical.
+using Turns = std::function<double(const data::TrackSample&)>;
+
+// By the same angle to either side: seen of precession, of the spin of a body that lies, of a body
+// seen face on, and of a rim that is followed with its mark.
+TEST(TrackAssembly, ACameraThatTurnsToEitherSideIsTakenBack) {
+  constexpr double kTurned_rad = 0.02;
+  constexpr int kFrom = 10;
+  const data::Camera camera = data::Camera::overhead(640, 480, 1000.0, 1.2);
+  const auto of_psi = [](const data::TrackSample& s) { return s.psi->value_rad; };
+  const auto of_phi = [](const data::TrackSample& s) { return s.phi->value_rad; };
+  for (const double turned_rad : {kTurned_rad, -kTurned_rad}) {
+    AssemblyOptions how;
+    how.camera = &camera;
+    for (int i = 0; i < 30; ++i)
+      how.shifts[i].factor = std::polar(1.0, i < kFrom ? 0.0 : turned_rad);
+    const auto expect_steady = [&](const BodyPath& path, const Turns& turn, double each_rad) {
+      const data::Track track = assemble_track(path, 0, {}, how);
+      for (std::size_t i = 0; i < track.samples.size(); ++i)
+        EXPECT_NEAR(turn(track.samples[i]) - turn(track.samples[0]),
+                    each_rad * static_cast<double>(i), 1e-9)
+            << "turned by " << turned_rad << ", frame " << i;
+    };
+    // Turning right on the screen is a negative turn in the table frame.
+    BodyPath tilted = turning(1.0, 0.0), lies = turning(0.0, 0.0),
+             rim = marked([](int) { return 0.4; });
+    for (int i = kFrom; i < 30; ++i) {
+      tilted.frames[i].seen.pose->pose.phi_rad -= turned_rad;
+      lies.frames[i].seen.pose->pose.psi_rad -= turned_rad;
+    }
+    for (int i = kFrom; i < 20; ++i) *rim.frames[i].seen.turned_rad += turned_rad;
+    expect_steady(tilted, of_phi, 0.0);
+    how.on_pin = true;
+    expect_steady(tilted, of_psi, 0.5);
+    how.on_pin = false;
+    how.flat = true;
+    expect_steady(lies, of_psi, 0.5);
+    how.flat = false;
+    expect_steady(rim, of_psi, -0.1);
   }
 }
 

@@ -105,6 +105,19 @@ void allow_for_leaning(const PictureShift& shift, const data::Camera& camera,
   measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, sigma_rad / across);
 }
 
+/// What is measured turns with the picture about the vertical: precession, or where the node line
+/// stays, as of a body that lies, spin.
+void turn_back(double turn_rad, double sigma_rad, bool flat, PoseMeasurement& measured) {
+  if (!flat) {
+    measured.pose.phi_rad += turn_rad;
+    measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, sigma_rad);
+    return;
+  }
+  measured.pose.psi_rad += std::copysign(1.0, std::cos(measured.pose.theta_rad)) * turn_rad;
+  if (measured.sigma_psi_rad)
+    measured.sigma_psi_rad = std::hypot(*measured.sigma_psi_rad, sigma_rad);
+}
+
 /// A pose as a camera that stands still would have seen it, but for how that leans.
 void take_back(const PictureShift& shift, const AssemblyOptions& options,
                PoseMeasurement& measured) {
@@ -115,11 +128,11 @@ void take_back(const PictureShift& shift, const AssemblyOptions& options,
   pose.centre_m.head<2>() -= m_per_px * shift.px;
   const Eigen::Matrix2d covariance_m2 = sigma2_px2(shift) * m_per_px * m_per_px.transpose();
   measured.covariance_m2 += covariance_m2;
-  allow_for_leaning(shift, *options.camera, measured);
+  if (!options.flat) allow_for_leaning(shift, *options.camera, measured);
   if (!options.pivot_m) {
     // The image's y points down, the table's up.
-    pose.phi_rad -= std::copysign(std::arg(shift.factor), m_per_px.determinant());
-    measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, shift.sigma_factor);
+    const double handed = std::copysign(1.0, m_per_px.determinant());
+    turn_back(-handed * std::arg(shift.factor), shift.sigma_factor, options.flat, measured);
     return;
   }
   const Eigen::Vector2d from_m = before_m - *options.pivot_m,
@@ -176,7 +189,8 @@ bool turns_face_on(const BodyPath& path) {
 }
 
 /// @param measured as the picture gave it: the spin's error holds the precession's of that pose.
-void join_turns(const PoseMeasurement& measured, data::TrackSample& sample) {
+/// @param phi_rad   of a camera that stands still.
+void join_turns(const PoseMeasurement& measured, double phi_rad, data::TrackSample& sample) {
   if (sample.psi) {
     const double theta = measured.pose.theta_rad;
     const double of_phi =
@@ -184,7 +198,7 @@ void join_turns(const PoseMeasurement& measured, data::TrackSample& sample) {
     // A lean that is not there moves a mark on its ellipse by so much.
     const double of_lean = 0.25 * theta * theta;
     const double own2 = *measured.sigma_psi_rad * *measured.sigma_psi_rad - of_phi * of_phi;
-    sample.psi = {sample.psi->value_rad + measured.pose.phi_rad,
+    sample.psi = {sample.psi->value_rad + phi_rad,
                   std::hypot(std::sqrt(std::max(own2, 0.0)), of_lean)};
   }
   sample.phi.reset();
@@ -282,7 +296,7 @@ data::Track assemble_track(const BodyPath& path, int object,
       sample.centre_m = pose.pose.centre_m.head<2>();
       sample.covariance_m2 = pose.covariance_m2;
       angles_from_pose(sample, pose, options.fold, options.mark_rad);
-      if (face_on) join_turns(*seen.pose, sample);
+      if (face_on) join_turns(*seen.pose, pose.pose.phi_rad, sample);
       // Counted from the node line, spin means nothing where that is not known.
       else if (!sample.phi && !options.flat)
         sample.psi.reset();
@@ -290,8 +304,9 @@ data::Track assemble_track(const BodyPath& path, int object,
       metres_from_rim(sample, seen, shift, floor);
       // The image's y points down, the table's up: turning right on the screen is a negative spin.
       if (turns_as_it_spins && seen.turned_rad)
-        sample.psi = {-(path.marks->reference_angle_rad() + *seen.turned_rad),
-                      seen.turned_sigma_rad};
+        sample.psi = {
+            std::arg(shift.factor) - (path.marks->reference_angle_rad() + *seen.turned_rad),
+            std::hypot(seen.turned_sigma_rad, shift.sigma_factor)};
     }
     if (sample.phi) sample.phi->value_rad = phi(sample.phi->value_rad, sample.t_s);
     if (sample.psi) sample.psi->value_rad = psi(sample.psi->value_rad, sample.t_s);
