@@ -229,5 +229,21 @@ TEST(TrackAssembly, ACameraThatTurnsToEitherSideIsTakenBack) {
   }
 }
 
+// Where the node line may be off, spin, which is counted from it, is off by as much.
+TEST(TrackAssembly, ACameraThatLeansMakesSpinUncertainWithThePrecession) {
+  const data::Camera camera = data::Camera::overhead(640, 480, 1000.0, 1.2);
+  BodyPath path = turning(1.0, 0.0);
+  for (auto& [index, at] : path.frames) {
+    at.seen.pose->pose.theta_rad = 0.5;
+    at.seen.pose->sigma_phi_rad = *(at.seen.pose->sigma_psi_rad = 1e-4);
+  }
+  AssemblyOptions how;
+  how.camera = &camera;
+  for (int i = 0; i < 30; ++i) how.shifts[i].px = {i < 10 ? 0.0 : 30.0, 0.0};
+  const data::TrackSample last = assemble_track(path, 0, {}, how).samples.back();
+  EXPECT_GT(last.phi->sigma_rad, 0.01);
+  EXPECT_NEAR(last.psi->sigma_rad, std::cos(0.5) * last.phi->sigma_rad, 1e-3);
+}
+
 }  // namespace
 }  // namespace trochoid::tracking

@@ -103,6 +103,10 @@ void allow_for_leaning(const PictureShift& shift, const data::Camera& camera,
   const double across = std::max(std::sin(measured.pose.theta_rad), kLeastTilt_rad);
   measured.sigma_theta_rad = std::hypot(measured.sigma_theta_rad, sigma_rad);
   measured.sigma_phi_rad = std::hypot(measured.sigma_phi_rad, sigma_rad / across);
+  // Counted from the node line, spin is off by what that is.
+  if (measured.sigma_psi_rad)
+    measured.sigma_psi_rad =
+        std::hypot(*measured.sigma_psi_rad, std::cos(measured.pose.theta_rad) * sigma_rad / across);
 }
 
 /// What is measured turns with the picture about the vertical: precession, or where the node line
