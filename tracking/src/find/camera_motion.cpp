@@ -13,6 +13,7 @@ namespace trochoid::tracking {
 namespace {
 
 constexpr int kReduced = 4;  // the surroundings of a point are some of these, averaged
+constexpr double kRounding_levels = 0.3;
 
 /// Mean levels around each place, at a quarter of the size.
 cv::Mat surroundings_of(const cv::Mat& luma) {
@@ -149,7 +150,7 @@ std::optional<CameraMotion::Found> CameraMotion::shift_of(const Quarter& quarter
           level_at(picture.luma, picture.surroundings, at_px + gone_px) - points[i]->level;
       sizes[i] = std::abs(residuals[i]);
     }
-    constexpr double kRounding_levels = 0.3, kInlier = 2.0;
+    constexpr double kInlier = 2.0;
     found.off_levels = data::kSdOverMedianDistance * data::median(sizes);
     const double scale = found.off_levels + kRounding_levels;
     ShiftSums sums;
@@ -274,7 +275,9 @@ std::optional<CameraMotion::Look> CameraMotion::look_at(const Picture& picture,
     return look_from(from_px, series.warps, series.last.factor, picture, bodies);
   };
   std::optional<Look> best = from(series.last.gone_px);
-  if (best && best->off_levels < kAsBefore * series.usual_off_levels) return best;
+  // Codecs repeat what does not change: where next to nothing is usual, rounding is no knock.
+  if (best && best->off_levels < std::max(kAsBefore * series.usual_off_levels, kRounding_levels))
+    return best;
   for (const auto seek : {&FarShift::by_phases, &FarShift::by_likeness}) {
     Ways far_px;
     for (std::size_t k = 0; k < kQuarters; ++k)
