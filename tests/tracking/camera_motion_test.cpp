@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <complex>
-#include <ctime>
 #include <functional>
 #include <random>
 
@@ -188,26 +187,6 @@ TEST(CameraMotion, FollowsAKnockByManyPixels) {
 TEST(CameraMotion, DoesNotMakeAZoomOfAKnock) {
   const auto knocked = [](int i) { return Eigen::Vector2d(i < 20 ? 0.0 : 1.2, 0.0); };
   for (const auto& [index, shift] : found_in({knocked})) EXPECT_EQ(shift.factor, 1.0) << index;
-}
-
-// What a codec repeats is off by nothing, or by a hundredth of a level now and then. To seek the
-// picture all around takes several times as long as to look where it was.
-TEST(CameraMotion, DoesNotSeekAllAroundForRounding) {
-  constexpr int kLooks = 40;
-  constexpr double kAsLong = 2.0;
-  std::mt19937 random(5);
-  const cv::Mat plate = developed(floor_at({0.0, 0.0}, 1.0, 0.0), 0.3, random);
-  Frame still, noisy;
-  plate.copyTo(still.luma);
-  noisy.luma = developed(floor_at({0.0, 0.0}, 1.0, 0.0), kNoise_levels, random);
-  const auto time_of = [&](Frame frame) {
-    CameraMotion motion(plate, kNoise_levels);
-    motion.look(frame, {});  // the first has nothing to go by
-    const std::clock_t begun = std::clock();
-    for (frame.index = 1; frame.index <= kLooks; ++frame.index) motion.look(frame, {});
-    return static_cast<double>(std::clock() - begun);
-  };
-  EXPECT_LT(time_of(still), kAsLong * time_of(noisy));
 }
 
 // A push by more than can be followed: before it the camera shakes, and that is seen all the same.

@@ -84,6 +84,20 @@ TEST(TrackNotes, ABodyThatGoesOnWhilePicturesAreMissingIsNotSomewhereElseAtOnce)
   EXPECT_FALSE(note_about_cuts(track, kRadius_px)) << "there was time enough";
 }
 
+TEST(TrackNotes, ACameraThatIsKnockedDoesNotTakeTheBodyElsewhere) {
+  constexpr double kRadius_px = 30.0;
+  constexpr std::size_t kKnocked = 40;
+  data::Track track = round_with(0);
+  std::map<std::int64_t, PictureShift> shifts;
+  for (std::size_t i = 0; i < track.samples.size(); ++i) {
+    PictureShift& shift = shifts[track.samples[i].frame];
+    if (i >= kKnocked) shift.px = {35.0, -40.0};
+    track.samples[i].centre_px += shift.px;
+  }
+  EXPECT_TRUE(note_about_cuts(track, kRadius_px));
+  EXPECT_FALSE(note_about_cuts(as_camera_at_rest_sees(track, shifts), kRadius_px));
+}
+
 // "Gets 1 % larger and smaller", where it but grew.
 TEST(TrackNotes, AZoomIsToldByHowMuchThePictureChangesInSizeAndATurnByItsAngle) {
   std::map<std::int64_t, PictureShift> shifts;

@@ -78,21 +78,6 @@ double sigma2_px2(const PictureShift& shift) {
   return std::pow(shift.sigma_px, 2) + std::pow(kHeldBack * shift.crept_px, 2);
 }
 
-/// Of the frame, or of the one nearest to it in which the floor told, known the worse the farther
-/// that is: a hand may hide it for a while.
-PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frame) {
-  constexpr double kGoes_px = 0.1;  // a frame
-  if (shifts.empty()) return {};
-  auto nearest = shifts.lower_bound(frame);
-  if (nearest == shifts.end() ||
-      (nearest != shifts.begin() && frame - std::prev(nearest)->first < nearest->first - frame))
-    --nearest;
-  PictureShift shift = nearest->second;
-  shift.sigma_px =
-      std::hypot(shift.sigma_px, kGoes_px * static_cast<double>(std::abs(frame - nearest->first)));
-  return shift;
-}
-
 /// What a picture that has gone by so much says of the attitude: a camera that has leaned sees it
 /// from elsewhere, one that has gone sideways does not, and the floor does not tell which.
 void allow_for_leaning(const PictureShift& shift, const data::Camera& camera,
@@ -263,6 +248,26 @@ void allow_for_other_readings(const BodyPath& path, data::Track& track) {
 }
 
 }  // namespace
+
+PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts, std::int64_t frame) {
+  constexpr double kGoes_px = 0.1;  // a frame
+  if (shifts.empty()) return {};
+  auto nearest = shifts.lower_bound(frame);
+  if (nearest == shifts.end() ||
+      (nearest != shifts.begin() && frame - std::prev(nearest)->first < nearest->first - frame))
+    --nearest;
+  PictureShift shift = nearest->second;
+  shift.sigma_px =
+      std::hypot(shift.sigma_px, kGoes_px * static_cast<double>(std::abs(frame - nearest->first)));
+  return shift;
+}
+
+data::Track as_camera_at_rest_sees(data::Track track,
+                                   const std::map<std::int64_t, PictureShift>& shifts) {
+  for (data::TrackSample& sample : track.samples)
+    sample.centre_px -= shift_in(shifts, sample.frame).at(sample.centre_px).px;
+  return track;
+}
 
 double usual_radius_px(const BodyPath& path) {
   std::vector<double> sizes;

@@ -58,4 +58,13 @@ struct AssemblyOptions {
 /// Median of the rim's semi-major axis over the path [px]: what the known radius is compared with.
 [[nodiscard]] double usual_radius_px(const BodyPath& path);
 
+/// Of the frame, or of the one nearest to it in which the floor told, known the worse the farther
+/// that is: a hand may hide it for a while. None of a camera that stands still.
+[[nodiscard]] PictureShift shift_in(const std::map<std::int64_t, PictureShift>& shifts,
+                                    std::int64_t frame);
+
+/// A track whose pixels are those of a camera that stands still, as its metres are.
+[[nodiscard]] data::Track as_camera_at_rest_sees(
+    data::Track track, const std::map<std::int64_t, PictureShift>& shifts);
+
 }  // namespace trochoid::tracking

@@ -144,8 +144,9 @@ void add_track(const FollowedRecording& of, int object, bool alone, BodyPath& pa
       result.file.notes.push_back(alone ? *note : fmt::format("object {}: {}", object, *note));
   };
   add(note_about_lost(path, of.span, of.recording.info()));
-  add(note_about_cuts(track, usual_radius_px(path)));
-  add(note_about_steps(track, of.scene.camera.missing_frames));
+  const data::Track at_rest = as_camera_at_rest_sees(track, of.shifts);
+  add(note_about_cuts(at_rest, usual_radius_px(path)));
+  add(note_about_steps(at_rest, of.scene.camera.missing_frames));
 }
 
 /// What is to be known of all tracks, in this order.
