@@ -193,6 +193,7 @@ CameraMotion::CameraMotion(const cv::Mat& plate, double noise_levels)
       }
     }
   tells_ = told > kEnough * cells;
+  shifted_.usual_off_levels = warped_.usual_off_levels = noise_levels;
   if (!tells_) return;
   for (Quarter& quarter : quarters_) quarter.pattern.emplace(plate(quarter.part));
 }
@@ -265,26 +266,28 @@ std::optional<CameraMotion::Look> CameraMotion::look_from(const Ways& from_px, b
   return look;
 }
 
-// From where the quarters were last. If the floor does not look there as it did, from where they
-// seem to have gone to: a knock.
+// From where the quarters were last. If the floor does not look there as it usually does, from
+// where they seem to have gone to, if it does there: a knock.
 std::optional<CameraMotion::Look> CameraMotion::look_at(const Picture& picture,
                                                         const Follower::Others& bodies,
                                                         const Series& series) const {
-  constexpr double kAsBefore = 1.3, kClearly = 0.8;
+  constexpr double kAsUsual = 1.3, kNearly = 1.6, kClearly = 0.8;
   const auto from = [&](const Ways& from_px) {
     return look_from(from_px, series.warps, series.last.factor, picture, bodies);
   };
   std::optional<Look> best = from(series.last.gone_px);
   // Codecs repeat what does not change: where next to nothing is usual, rounding is no knock.
-  if (best && best->off_levels < std::max(kAsBefore * series.usual_off_levels, kRounding_levels))
-    return best;
+  const double usual_levels = std::max(series.usual_off_levels, kRounding_levels / kAsUsual);
+  if (best && best->off_levels < kAsUsual * usual_levels) return best;
   for (const auto seek : {&FarShift::by_phases, &FarShift::by_likeness}) {
     Ways far_px;
     for (std::size_t k = 0; k < kQuarters; ++k)
       far_px.col(static_cast<Eigen::Index>(k)) =
           (*quarters_[k].pattern.*seek)(picture.luma(quarters_[k].part));
     std::optional<Look> far = from(far_px);
-    if (far && (!best || far->off_levels < kClearly * best->off_levels)) best = std::move(far);
+    if (far && far->off_levels < kNearly * usual_levels &&
+        (!best || far->off_levels < kClearly * best->off_levels))
+      best = std::move(far);
   }
   return best;
 }
