@@ -266,27 +266,24 @@ std::optional<CameraMotion::Look> CameraMotion::look_from(const Ways& from_px, b
   return look;
 }
 
-// From where the quarters were last. If the floor does not look there as it usually does, from
-// where they seem to have gone to, if it does there: a knock.
-std::optional<CameraMotion::Look> CameraMotion::look_at(const Picture& picture,
-                                                        const Follower::Others& bodies,
-                                                        const Series& series) const {
-  constexpr double kAsUsual = 1.3, kNearly = 1.6, kClearly = 0.8;
-  const auto from = [&](const Ways& from_px) {
-    return look_from(from_px, series.warps, series.last.factor, picture, bodies);
-  };
-  std::optional<Look> best = from(series.last.gone_px);
+bool CameraMotion::as_usual(const std::optional<Look>& look, const Series& series, double times) {
   // Codecs repeat what does not change: where next to nothing is usual, rounding is no knock.
-  const double usual_levels = std::max(series.usual_off_levels, kRounding_levels / kAsUsual);
-  if (best && best->off_levels < kAsUsual * usual_levels) return best;
+  return look && look->off_levels < std::max(times * series.usual_off_levels, kRounding_levels);
+}
+
+// From where the quarters seem to have gone to, if the floor looks there as it usually does.
+std::optional<CameraMotion::Look> CameraMotion::look_around(const Picture& picture,
+                                                            const Follower::Others& bodies,
+                                                            const Series& series,
+                                                            std::optional<Look> best) const {
+  constexpr double kNearly = 1.6, kClearly = 0.8;
   for (const auto seek : {&FarShift::by_phases, &FarShift::by_likeness}) {
     Ways far_px;
     for (std::size_t k = 0; k < kQuarters; ++k)
       far_px.col(static_cast<Eigen::Index>(k)) =
           (*quarters_[k].pattern.*seek)(picture.luma(quarters_[k].part));
-    std::optional<Look> far = from(far_px);
-    if (far && far->off_levels < kNearly * usual_levels &&
-        (!best || far->off_levels < kClearly * best->off_levels))
+    std::optional<Look> far = look_from(far_px, series.warps, series.last.factor, picture, bodies);
+    if (as_usual(far, series, kNearly) && (!best || far->off_levels < kClearly * best->off_levels))
       best = std::move(far);
   }
   return best;
@@ -299,13 +296,24 @@ void CameraMotion::take(const Look& look, std::int64_t frame, Series& series) {
   series.looks[frame] = series.last = look;
 }
 
+// From where the quarters were last. If the floor does not look there as it usually does, however
+// it may have moved, all around: a knock.
 void CameraMotion::look(const Frame& frame, const Follower::Others& bodies) {
-  if (!tells_) return;
+  constexpr double kAsUsual = 1.3;
+  if (!tells_ || shifted_.looks.contains(frame.index) || warped_.looks.contains(frame.index))
+    return;
   const cv::Mat surroundings = surroundings_of(frame.luma);
-  for (Series* series : {&shifted_, &warped_})
-    if (!series->looks.contains(frame.index))
-      if (const auto look = look_at({frame.luma, surroundings}, bodies, *series))
-        take(*look, frame.index, *series);
+  const Picture picture{frame.luma, surroundings};
+  const auto near = [&](const Series& series) {
+    return look_from(series.last.gone_px, series.warps, series.last.factor, picture, bodies);
+  };
+  std::optional<Look> shifted = near(shifted_), warped = near(warped_);
+  if (!as_usual(shifted, shifted_, kAsUsual) && !as_usual(warped, warped_, kAsUsual)) {
+    shifted = look_around(picture, bodies, shifted_, std::move(shifted));
+    warped = look_around(picture, bodies, warped_, std::move(warped));
+  }
+  if (shifted) take(*shifted, frame.index, shifted_);
+  if (warped) take(*warped, frame.index, warped_);
 }
 
 bool CameraMotion::moves(const Series& series, double& disagree_px) const {

@@ -105,8 +105,13 @@ class CameraMotion {
   [[nodiscard]] std::optional<Look> look_from(const Ways& from_px, bool warps,
                                               std::complex<double> factor, const Picture& picture,
                                               const Follower::Others& bodies) const;
-  [[nodiscard]] std::optional<Look> look_at(const Picture& picture, const Follower::Others& bodies,
-                                            const Series& series) const;
+  [[nodiscard]] std::optional<Look> look_around(const Picture& picture,
+                                                const Follower::Others& bodies,
+                                                const Series& series,
+                                                std::optional<Look> best) const;
+  /// Whether the floor is off by no more than so many times what is usual.
+  [[nodiscard]] static bool as_usual(const std::optional<Look>& look, const Series& series,
+                                     double times);
   static void take(const Look& look, std::int64_t frame, Series& series);
   [[nodiscard]] double reach_px() const;
   [[nodiscard]] bool moves(const Series& series, double& disagree_px) const;
